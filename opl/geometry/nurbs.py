@@ -1,0 +1,264 @@
+"""Rational B-spline (NURBS) surfaces and the file they are read from.
+
+Equation numbers are those of Piegl and Tiller, The NURBS Book, 2nd edition.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import comb
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy.interpolate import NdBSpline
+
+from opl import documents
+from opl.errors import InputError
+
+Array = NDArray[np.float64]
+
+# du x dv below this fraction of its average over the surface is taken for zero
+_DEGENERATE_AREA = 1e-9
+
+
+class DegenerateNormalError(ValueError):
+    """A surface has no normal where one is needed: its two parameter lines have no area there.
+
+    Args:
+        uv: Parameters of the place, shape (2,).
+        point: The place in [m], shape (3,).
+    """
+
+    def __init__(self, uv: Array, point: Array) -> None:
+        x, y, z = 1e3 * point
+        super().__init__(
+            f"the surface has no normal at (u, v) = ({uv[0]:.6g}, {uv[1]:.6g}), "
+            f"point ({x:.4g}, {y:.4g}, {z:.4g}) mm: du x dv is zero"
+        )
+        self.uv = uv
+        self.point = point
+
+
+@dataclass(frozen=True, eq=False)
+class NurbsSurface:
+    """A rational B-spline surface S(u, v), eq. (4.11).
+
+    Attributes:
+        degree_u: Degree along u, at least 1.
+        degree_v: Degree along v, at least 1.
+        knots_u: Knots along u, not decreasing, shape (nu + degree_u + 1,).
+        knots_v: Knots along v, not decreasing, shape (nv + degree_v + 1,).
+        control_points: Control points in [m], shape (nu, nv, 3).
+        weights: Weights, positive, shape (nu, nv).
+
+    Raises:
+        ValueError: If these do not make a surface; the message begins with the attribute.
+    """
+
+    degree_u: int
+    degree_v: int
+    knots_u: Array
+    knots_v: Array
+    control_points: Array
+    weights: Array
+    _homogeneous: NdBSpline = field(init=False, repr=False)
+    _smallest_area: float = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name in ("knots_u", "knots_v", "control_points", "weights"):
+            array = np.array(getattr(self, name), dtype=float)
+            if not np.isfinite(array).all():
+                raise ValueError(f"{name}: must be finite")
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        points, weights = self.control_points, self.weights
+        if points.ndim != 3 or points.shape[2] != 3:
+            raise ValueError(f"control_points: must have shape (nu, nv, 3), got {points.shape}")
+        if weights.shape != points.shape[:2]:
+            raise ValueError(
+                f"weights: must have the shape of the control net, {points.shape[:2]}, "
+                f"got {weights.shape}"
+            )
+        if weights.min() <= 0.0:
+            raise ValueError(f"weights: must be positive, got {weights.min():g}")
+        _check_knots("u", self.degree_u, self.knots_u, points.shape[0])
+        _check_knots("v", self.degree_v, self.knots_v, points.shape[1])
+
+        homogeneous = np.concatenate([weights[..., None] * points, weights[..., None]], axis=-1)
+        spline = NdBSpline(
+            (self.knots_u, self.knots_v),
+            homogeneous,
+            (self.degree_u, self.degree_v),
+            extrapolate=False,
+        )
+        object.__setattr__(self, "_homogeneous", spline)
+        diagonal = np.ptp(points.reshape(-1, 3), axis=0)
+        area = float(diagonal @ diagonal / np.ptp(self.domain, axis=0).prod())
+        object.__setattr__(self, "_smallest_area", _DEGENERATE_AREA * area)
+
+    @property
+    def domain(self) -> Array:
+        """Return the smallest and the largest (u, v), shape (2, 2)."""
+        (u0, u1), (v0, v1) = (
+            (knots[degree], knots[-degree - 1])
+            for knots, degree in ((self.knots_u, self.degree_u), (self.knots_v, self.degree_v))
+        )
+        return np.array([[u0, v0], [u1, v1]])
+
+    def point(self, uv: Array) -> Array:
+        """Return S(u, v) in [m], shape (..., 3); nan outside the domain.
+
+        Args:
+            uv: Parameters, shape (..., 2).
+        """
+        homogeneous = self._homogeneous(uv)
+        return homogeneous[..., :3] / homogeneous[..., 3:]
+
+    def derivatives(self, uv: Array, order: int = 1) -> Array:
+        """Return the point and its partial derivatives, eq. (4.20).
+
+        At a knot where a derivative jumps it is the one of the larger parameters.
+
+        Args:
+            uv: Parameters, shape (..., 2).
+            order: Highest total order k + l.
+
+        Returns:
+            Shape (..., order + 1, order + 1, 3) in [m]: entry [..., k, l, :] is the k-th derivative
+            along u of the l-th along v; entries with k + l > order are zero. [..., 0, 0, :] is the
+            point itself.
+        """
+        uv = np.asarray(uv)
+        A = np.zeros((*uv.shape[:-1], order + 1, order + 1, 4))
+        S = np.zeros((*uv.shape[:-1], order + 1, order + 1, 3))
+        orders = [(k, n - k) for n in range(order + 1) for k in range(n + 1)]
+        for k, m in orders:
+            if k <= self.degree_u and m <= self.degree_v:
+                A[..., k, m, :] = self._homogeneous(uv, nu=(k, m))
+        w = A[..., 3:]
+        for k, m in orders:
+            lower = [(i, j) for i in range(k + 1) for j in range(m + 1) if i or j]
+            rest = sum(
+                comb(k, i) * comb(m, j) * w[..., i, j, :] * S[..., k - i, m - j, :]
+                for i, j in lower
+            )
+            S[..., k, m, :] = (A[..., k, m, :3] - rest) / w[..., 0, 0, :]
+        return S
+
+    def normal(self, uv: Array) -> Array:
+        """Return the unit normals along du x dv, shape (..., 3).
+
+        Args:
+            uv: Parameters, shape (..., 2).
+
+        Raises:
+            DegenerateNormalError: Where du x dv is zero, at a pole or a cusp, and for parameters
+                outside the domain.
+        """
+        S = self.derivatives(uv, 1)
+        return self._unit_normal(uv, S)
+
+    def principal_curvatures(self, uv: Array) -> Array:
+        """Return the smallest and the largest normal curvature in [1/m], shape (..., 2).
+
+        They are the eigenvalues of the second fundamental form in the first (do Carmo, Differential
+        Geometry of Curves and Surfaces, section 3.3). Where the surface bends away from du x dv, as
+        a ball does from its outward normal, they are positive.
+
+        Args:
+            uv: Parameters, shape (..., 2).
+
+        Raises:
+            DegenerateNormalError: Where the surface has no normal.
+        """
+        S = self.derivatives(uv, 2)
+        n = self._unit_normal(uv, S)
+        du, dv = S[..., 1, 0, :], S[..., 0, 1, :]
+        E, F, G = (np.sum(a * b, axis=-1) for a, b in ((du, du), (du, dv), (dv, dv)))
+        # sign turned: positive means bending away from the normal
+        L, M, N = (-np.sum(S[..., k, m, :] * n, axis=-1) for k, m in ((2, 0), (1, 1), (0, 2)))
+        area_squared = E * G - F * F
+        mean = (E * N - 2.0 * F * M + G * L) / (2.0 * area_squared)
+        gauss = (L * N - M * M) / area_squared
+        half_difference = np.sqrt(np.maximum(mean * mean - gauss, 0.0))
+        return np.stack([mean - half_difference, mean + half_difference], axis=-1)
+
+    def _unit_normal(self, uv: Array, S: Array) -> Array:
+        normal = np.cross(S[..., 1, 0, :], S[..., 0, 1, :])
+        area = np.linalg.norm(normal, axis=-1, keepdims=True)
+        degenerate = ~(area[..., 0] > self._smallest_area)  # catches nan too
+        if degenerate.any():
+            first = np.unravel_index(np.argmax(degenerate), degenerate.shape)
+            raise DegenerateNormalError(np.asarray(uv)[first], S[..., 0, 0, :][first])
+        return normal / area
+
+
+def _check_knots(axis: str, degree: int, knots: Array, n_points: int) -> None:
+    if not 1 <= degree < n_points:
+        raise ValueError(
+            f"degree_{axis}: must lie between 1 and {n_points - 1}, one less than the number of "
+            f"control points along {axis}, got {degree}"
+        )
+    if knots.shape != (n_points + degree + 1,):
+        raise ValueError(
+            f"knots_{axis}: must be {n_points + degree + 1} values (control points + degree + 1), "
+            f"got {knots.size}"
+        )
+    if (np.diff(knots) < 0.0).any():
+        raise ValueError(f"knots_{axis}: must not decrease")
+    domain = knots[degree : n_points + 1]
+    if domain[0] == domain[-1]:
+        raise ValueError(f"knots_{axis}: the domain from {domain[0]:g} to {domain[-1]:g} is empty")
+    inner, multiplicity = np.unique(
+        knots[(knots > domain[0]) & (knots < domain[-1])], return_counts=True
+    )
+    if (multiplicity > degree).any():
+        raise ValueError(
+            f"knots_{axis}: inner knots may occur at most {degree} times or the surface tears, got "
+            f"{inner[multiplicity > degree][0]:g} more often"
+        )
+
+
+_Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+_Row = Annotated[list[_Point], Field(min_length=1)]
+
+
+class _SurfaceFile(documents.Document):
+    """A surface as it is written in a file."""
+
+    degree_u: int
+    degree_v: int
+    knots_u: list[float]
+    knots_v: list[float]
+    control_points_mm: Annotated[list[_Row], Field(min_length=1)]
+    weights: list[list[float]]
+
+
+def load_surface(path: Path) -> NurbsSurface:
+    """Read a surface from a JSON or YAML file.
+
+    Its keys are the attributes of `NurbsSurface`, with ``control_points_mm`` in millimetres for
+    ``control_points``: a list along u of lists along v of [x, y, z].
+
+    Raises:
+        InputError: If the file cannot be read or does not hold a surface.
+    """
+    content = documents.read(path, _SurfaceFile)
+    for key in ("control_points_mm", "weights"):
+        lengths = [len(row) for row in getattr(content, key)]
+        if len(set(lengths)) > 1:
+            raise InputError(str(path), f"{key}: must be rows of one length, got {lengths}")
+    try:
+        return NurbsSurface(
+            degree_u=content.degree_u,
+            degree_v=content.degree_v,
+            knots_u=np.array(content.knots_u),
+            knots_v=np.array(content.knots_v),
+            control_points=1e-3 * np.array(content.control_points_mm),
+            weights=np.array(content.weights),
+        )
+    except ValueError as error:
+        raise InputError(str(path), str(error)) from error
