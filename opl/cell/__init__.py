@@ -1,0 +1,1 @@
+"""The robot and what stands around it."""
