@@ -1,0 +1,130 @@
+"""Whether robot, held part or fixture touch anything at a posture, by pinocchio and coal.
+
+Part against wheel is not asked here: that pair may touch, and has a closed form in
+`opl.cell.clearance`. A collision is a yes or a no, never a cost.
+"""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from opl.cell.workcell import PART, WHEEL, WorkCell
+from opl.geometry.frames import Array
+from opl.geometry.mesh import TriangleMesh
+from opl.geometry.shapes import Body, Box
+
+Pair = tuple[str, str]
+
+
+class CollisionScene:
+    """The cell as geometry, ready to be asked.
+
+    Asked for collision is every pair that could meet: links that are not neighbours, held bodies
+    against all links but the flange's, and links and held bodies against wheel and obstacles. Pairs
+    with something that is not the robot must stay apart by the clearance of the cell; links of the
+    robot must not touch each other (their primitives already enclose the real castings).
+    """
+
+    def __init__(self, cell: WorkCell) -> None:
+        self._model = pin.buildModelFromUrdf(str(cell.robot.urdf))
+        self._geometry = pin.buildGeomFromUrdf(
+            self._model, str(cell.robot.urdf), pin.GeometryType.COLLISION
+        )
+        self._n_links = self._geometry.ngeoms
+        self._add_bodies(cell)
+        self._pairs: list[Pair] = []
+        margins = self._choose_pairs(cell.clearance)
+        self._data = self._model.createData()
+        self._geometry_data = self._geometry.createData()
+        for request, margin in zip(self._geometry_data.collisionRequests, margins, strict=True):
+            request.security_margin = margin
+            request.enable_contact = False
+            # the default of 1 mm goes on to measure distances of pairs nearly in contact
+            request.break_distance = 0.0
+        # asks a pair only where the bounding boxes, widened by its margin, overlap; measured
+        # faster here than the managers that sort or nest the boxes
+        self._manager = pin.BroadPhaseManager_NaiveCollisionManager(
+            self._model, self._geometry, self._geometry_data
+        )
+
+    def collides(self, q: Array) -> np.ndarray:
+        """Return which postures collide.
+
+        Args:
+            q: Joint positions in [rad], shape (n, 6).
+
+        Returns:
+            Shape (n,) of bool.
+        """
+        return np.array([self._ask(posture, True) for posture in q], dtype=bool)
+
+    def colliding_pairs(self, q: Array) -> list[Pair]:
+        """Return the names of every pair in collision at one posture, shape (6,)."""
+        self._ask(q, False)
+        results = self._geometry_data.collisionResults
+        hits = [pair for pair, hit in zip(self._pairs, results, strict=True) if hit.isCollision()]
+        return list(dict.fromkeys(hits))
+
+    def _ask(self, q: Array, stop_at_first: bool) -> bool:
+        return bool(pin.computeCollisions(self._model, self._data, self._manager, q, stop_at_first))
+
+    def _add_bodies(self, cell: WorkCell) -> None:
+        """Add held bodies at the flange, wheel and obstacles at the base frame."""
+        flange = self._model.frames[self._model.getFrameId("tool0")]
+        base = self._model.frames[self._model.getFrameId("base")]
+        self._add(PART, _mesh(cell.part), flange, cell.T_flange_workpiece)
+        for body in cell.fixture:
+            self._add(body.name, _primitive(body), flange, body.T_parent_body)
+        for body in (cell.wheel_body(), *cell.obstacles):
+            self._add(body.name, _primitive(body), base, body.T_parent_body)
+
+    def _add(
+        self, name: str, shape: coal.CollisionGeometry, frame: pin.Frame, T_frame_body: Array
+    ) -> None:
+        placement = frame.placement * pin.SE3(T_frame_body)
+        self._geometry.addGeometryObject(
+            pin.GeometryObject(name, frame.parentJoint, placement, shape)
+        )
+
+    def _choose_pairs(self, clearance: float) -> list[float]:
+        """Enter the pairs to be asked and return the margin of each in [m]."""
+        joints = [geometry.parentJoint for geometry in self._geometry.geometryObjects]
+        margins = []
+        for second in range(len(joints)):
+            for first in range(second):
+                both_links = second < self._n_links
+                apart = abs(joints[first] - joints[second])
+                pair = (self._name(first), self._name(second))
+                # nothing moves within one joint; neighbouring links share a bearing
+                if apart == 0 or (both_links and apart == 1) or pair == (PART, WHEEL):
+                    continue
+                self._geometry.addCollisionPair(pin.CollisionPair(first, second))
+                self._pairs.append(pair)
+                # joint 0 is what does not move: next to the first link, but not its neighbour
+                held_at_wrist = apart == 1 and min(joints[first], joints[second]) > 0
+                margins.append(0.0 if both_links or held_at_wrist else clearance)
+        return margins
+
+    def _name(self, index: int) -> str:
+        """Return the link's name for a piece of the robot, else the body's own name."""
+        geometry = self._geometry.geometryObjects[index]
+        if index < self._n_links:
+            return str(self._model.frames[geometry.parentFrame].name)
+        return str(geometry.name)
+
+
+def _primitive(body: Body) -> coal.CollisionGeometry:
+    if isinstance(body.shape, Box):
+        return coal.Box(*body.shape.size)
+    return coal.Cylinder(body.shape.radius, body.shape.length)
+
+
+def _mesh(mesh: TriangleMesh) -> coal.CollisionGeometry:
+    model = coal.BVHModelOBBRSS()
+    model.beginModel(len(mesh.faces), len(mesh.vertices))
+    model.addVertices(np.asarray(mesh.vertices))
+    model.addTriangles(np.asarray(mesh.faces, dtype=np.int32))
+    model.endModel()
+    return model

@@ -1,0 +1,68 @@
+"""The cell as a value: robot, wheel, held part and everything that stands around."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.cell.robot import Robot
+from opl.geometry.frames import Array, inverse, pose
+from opl.geometry.mesh import TriangleMesh
+from opl.geometry.shapes import Body, Cylinder
+from opl.geometry.wheel import ContactWheel
+
+WHEEL = "wheel"
+PART = "part"
+
+
+@dataclass(frozen=True)
+class WorkCell:
+    """One robot with a part in its gripper in front of one belt wheel.
+
+    Attributes:
+        robot: The arm; its base frame is the frame of the cell.
+        wheel: The belt wheel.
+        obstacles: Bodies fixed in the cell, given in the base frame.
+        part: The held part, in the workpiece frame.
+        fixture: Bodies between flange and part, given in the flange frame.
+        T_flange_workpiece: How the fixture holds the part, shape (4, 4).
+        contact_allowance: How deep the part may sink into the belt in [m].
+        clearance: Distance to keep from everything else in [m].
+    """
+
+    robot: Robot
+    wheel: ContactWheel
+    obstacles: tuple[Body, ...]
+    part: TriangleMesh
+    fixture: tuple[Body, ...]
+    T_flange_workpiece: Array
+    contact_allowance: float
+    clearance: float
+
+    def Ts_base_flange(self, t: Array | float, Ts_workpiece_cutter: Array) -> Array:
+        """Return the flange poses that bring cutter points onto contact positions.
+
+        Cutter and contact coincide, so the neighbouring names cancel (equations 2 and 3 of the
+        paper, in column-vector order).
+
+        Args:
+            t: Contact positions, shape (...).
+            Ts_workpiece_cutter: Cutter frames, shape (..., 4, 4).
+        """
+        Ts_base_contact = self.wheel.T_base_contact(t)
+        return Ts_base_contact @ inverse(Ts_workpiece_cutter) @ inverse(self.T_flange_workpiece)
+
+    def Ts_contact0_workpiece(self, Ts_base_flange: Array) -> Array:
+        """Return where the part is, seen from contact frame 0 of the wheel, shape (..., 4, 4)."""
+        return inverse(self.wheel.T_base_contact0) @ Ts_base_flange @ self.T_flange_workpiece
+
+    def wheel_body(self) -> Body:
+        """Return the wheel as a solid in the base frame: its axis is x of contact frame 0."""
+        axis_z_is_contact0_x = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+        T_contact0_axle = pose(axis_z_is_contact0_x, np.array([0.0, 0.0, self.wheel.radius]))
+        return Body(
+            WHEEL,
+            Cylinder(self.wheel.radius, self.wheel.width),
+            self.wheel.T_base_contact0 @ T_contact0_axle,
+        )
