@@ -1,0 +1,1 @@
+"""From cutter points to a motion."""

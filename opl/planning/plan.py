@@ -1,0 +1,135 @@
+"""Search and check in turn: the best track whose whole motion is free of collision.
+
+Robot collisions cost far more than nodes, so they are asked only about tracks that a search
+proposes. What a proposed motion collides with is taken out of the ladder, and the search goes on;
+it ends with the track it would have found had all collisions been known before.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.cell.workcell import PART, WHEEL
+from opl.errors import NoPathError
+from opl.planning.air import UnreachableApproachError, whole_motion
+from opl.planning.branch import Branch, Track, branches_of, twins
+from opl.planning.check import Fault, find_faults
+from opl.planning.motion import Motion, Stretch
+from opl.planning.path import BrokenStepError, GrindingPath, fill_in
+from opl.planning.problem import GrindingProblem
+from opl.planning.reasons import explain
+from opl.planning.starts import Start, tracks_from_best_start, tracks_from_nearest_start
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A track and the motion it became.
+
+    Attributes:
+        path: Postures on the wheel.
+        motion: The whole motion, free of collision as far as the planner can tell.
+        checks: How many motions were checked, this one included.
+    """
+
+    path: GrindingPath
+    motion: Motion
+    checks: int
+
+
+def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
+    """Find a collision-free motion by the recursive search of the paper.
+
+    Args:
+        problem: What is to be planned.
+        start: Which start nodes to try.
+
+    Raises:
+        NoPathError: If there is none; says where it ends and why.
+    """
+    branches = branches_of(problem)
+    robot = problem.cell.robot
+    tracks: Iterator[Track]
+    if start is Start.NEAREST:
+        tracks = tracks_from_nearest_start(branches, problem.pace.home)
+    else:
+        tracks = (
+            twin
+            for track in tracks_from_best_start(branches)
+            for twin in twins(branches, track, robot.lower, robot.upper)
+        )
+    return _first_free(problem, branches, tracks)
+
+
+def _first_free(problem: GrindingProblem, branches: list[Branch], tracks: Iterator[Track]) -> Plan:
+    """Return the first of the tracks whose motion is free, blocking what is not on the way."""
+    for checks, track in enumerate(tracks, start=1):
+        plan = _check(problem, branches[track.branch], track.rows, checks)
+        if plan is not None:
+            return plan
+    raise _no_path(problem, branches)
+
+
+def _check(problem: GrindingProblem, branch: Branch, rows: np.ndarray, checks: int) -> Plan | None:
+    """Return the plan if the track's whole motion is free, else block what is not."""
+    try:
+        path = fill_in(problem.cell, problem.points, branch.nodes, rows, problem.interpolation)
+    except BrokenStepError as error:
+        branch.block_step(error.column, rows, error.cause)
+        return None
+    try:
+        motion = whole_motion(problem.cell, problem.points, path, problem.pace)
+    except UnreachableApproachError as error:
+        branch.block_node(error.column, int(rows[error.column]), f"approach: {error.cause}")
+        return None
+    faults = find_faults(problem.cell, problem.scene, problem.samples, motion)
+    for fault in faults:
+        _block(problem, branch, rows, motion, fault)
+    return None if faults else Plan(path, motion, checks)
+
+
+def _block(
+    problem: GrindingProblem, branch: Branch, rows: np.ndarray, motion: Motion, fault: Fault
+) -> None:
+    """Take out of the ladder what a fault rules out: a node or a step."""
+    cause = " and ".join(fault.pair)
+    stretch, index = motion.stretch[fault.move], int(motion.pass_index[fault.move])
+    on_pass = np.flatnonzero(problem.points.pass_index == index)
+    if stretch in (Stretch.GRIND, Stretch.BETWEEN):
+        point = motion.cutter_point[fault.move]
+        end = int(np.ceil(point))
+        if point == end and fault.at_end and fault.pair != (PART, WHEEL):
+            branch.sweep(problem.scene, end, cause)
+        if end == on_pass[0]:
+            branch.block_node(end, int(rows[end]), cause)
+        elif branch.free[end, rows[end]]:
+            branch.block_step(end - 1, rows, cause)
+    elif stretch is Stretch.APPROACH:
+        branch.block_node(int(on_pass[0]), int(rows[on_pass[0]]), f"approach: {cause}")
+    elif stretch is Stretch.RETRACT:
+        branch.block_node(int(on_pass[-1]), int(rows[on_pass[-1]]), f"retract: {cause}")
+    elif stretch is Stretch.LINK:
+        branch.block_step(int(on_pass[0]) - 1, rows, f"link: {cause}")
+    elif index == 0:
+        branch.block_node(0, int(rows[0]), f"way from home: {cause}")
+    else:
+        branch.block_node(len(rows) - 1, int(rows[-1]), f"way home: {cause}")
+
+
+def _no_path(problem: GrindingProblem, branches: list[Branch]) -> NoPathError:
+    reached = max((branch.reached for branch in branches), default=0)
+    causes: Counter[tuple[int, str]] = Counter()
+    for branch in branches:
+        causes.update(branch.causes)
+    n = len(problem.points)
+    reasons = explain(problem, reached, causes)
+    if reached == 0:
+        return NoPathError(
+            f"no path: no free posture at cutter point 0 (0 of {n} reached)", reasons
+        )
+    return NoPathError(
+        f"no path beyond cutter point {reached - 1} ({reached} of {n} reached)", reasons
+    )

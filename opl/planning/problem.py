@@ -1,0 +1,63 @@
+"""What is to be planned: the cell, the points and the free nodes, as one value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.cell.clearance import PartSamples
+from opl.cell.collision import CollisionScene
+from opl.cell.workcell import WorkCell
+from opl.geometry.frames import Array
+from opl.geometry.toolpath import CutterPoints
+from opl.planning.nodes import NodeField, NodeMatrix
+from opl.planning.path import Interpolation
+from opl.planning.recursive import Ladder
+from opl.planning.timing import Pace
+
+
+@dataclass(frozen=True)
+class GrindingProblem:
+    """Everything a search needs.
+
+    Attributes:
+        cell: The cell.
+        scene: Its collision geometry.
+        samples: Surface samples of the part.
+        points: N cutter points.
+        field: The nodes of every branch.
+        wheel_clearance: Signed distance of the part to the wheel in [m], shape (N, M).
+        interpolation: How the path between nodes is filled in.
+        pace: Speeds, approach and home.
+    """
+
+    cell: WorkCell
+    scene: CollisionScene
+    samples: PartSamples
+    points: CutterPoints
+    field: NodeField
+    wheel_clearance: Array
+    interpolation: Interpolation
+    pace: Pace
+
+    @property
+    def off_wheel(self) -> np.ndarray:
+        """Which steps from a cutter point to the next leave the wheel, shape (N - 1,)."""
+        return np.diff(self.points.pass_index) != 0
+
+    def free_nodes(self, nodes: NodeMatrix) -> np.ndarray:
+        """Return which nodes exist and do not cut into the wheel, shape (N, n_rows)."""
+        free = self.wheel_clearance >= -self.cell.contact_allowance
+        return nodes.exists & free[:, nodes.position_index]
+
+    def ladder(self, nodes: NodeMatrix, free: np.ndarray) -> Ladder:
+        """Return a branch as the search sees it."""
+        return Ladder(
+            nodes.q,
+            free,
+            nodes.contact_position,
+            self.off_wheel,
+            self.interpolation.max_contact_step,
+            self.interpolation.max_joint_step,
+        )

@@ -1,0 +1,112 @@
+"""Why nothing is free: the cutter points that stop a path, and what stops them."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from opl.cell.inverse import turns
+from opl.cell.workcell import PART, WHEEL
+from opl.planning.problem import GrindingProblem
+
+
+def unreachable_points(problem: GrindingProblem) -> np.ndarray:
+    """Return the cutter points that the arm reaches at no contact position at all."""
+    return np.flatnonzero(np.isnan(problem.field.q[..., 0]).all(axis=(1, 2)))
+
+
+MOST_RUNS = 8  # of cutter points told one by one; a hundred lines would hide the first
+
+
+def explain(problem: GrindingProblem, reached: int, causes: Counter[tuple[int, str]]) -> list[str]:
+    """Say at which cutter points nothing is free, and why.
+
+    Args:
+        problem: What was to be planned.
+        reached: Number of cutter points the search came through.
+        causes: How often the search met each cause, by cutter point.
+
+    Returns:
+        One line for each run of cutter points where no posture is free; if there is none, lines on
+        the cutter points where the search ended.
+    """
+    shut = np.array([not _free_at(problem, column) for column in range(len(problem.points))])
+    if not shut.any():
+        return _where_it_ended(problem, reached, causes)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], shut, [False]]).astype(int)))
+    runs = list(zip(edges[::2], edges[1::2] - 1, strict=True))
+    lines = [_describe_run(problem, int(first), int(last)) for first, last in runs[:MOST_RUNS]]
+    if len(runs) > MOST_RUNS:
+        lines.append(f"and {len(runs) - MOST_RUNS} more runs of cutter points")
+    return lines
+
+
+def _free_at(problem: GrindingProblem, column: int) -> bool:
+    """Return whether any node of a column is free of limits, wheel and robot collisions."""
+    for nodes in problem.field.branches:
+        free = problem.free_nodes(nodes)[column]
+        if any(not problem.scene.collides(q[None])[0] for q in nodes.q[column, free]):
+            return True
+    return False
+
+
+def _describe_run(problem: GrindingProblem, first: int, last: int) -> str:
+    counts: Counter[str] = Counter()
+    deepest_free = -np.inf
+    for column in range(first, last + 1):
+        counts.update(_causes_at(problem, column))
+        deepest_free = max(deepest_free, float(problem.wheel_clearance[column].max()))
+    total = sum(counts.values())
+    parts = [f"{100 * count / total:.0f} % {cause}" for cause, count in counts.most_common()]
+    where = f"cutter point {first}" if first == last else f"cutter points {first} to {last}"
+    pass_index = int(problem.points.pass_index[first])
+    line = f"{where} (pass {pass_index + 1}): nothing is free: {', '.join(parts)}"
+    if deepest_free < -problem.cell.contact_allowance:
+        line += f"; the part cuts {-1e3 * deepest_free:.2f} mm into the wheel at best"
+    return line
+
+
+def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
+    """Count, over the contact positions of a column, what rules each out."""
+    robot = problem.cell.robot
+    allowed = problem.wheel_clearance[column] >= -problem.cell.contact_allowance
+    counts: Counter[str] = Counter()
+    for position in range(len(problem.field.contact_positions)):
+        q = problem.field.q[column, position]
+        q = q[~np.isnan(q[:, 0])]
+        turned = (q[:, None] + turns(robot.lower, robot.upper)).reshape(-1, 6)
+        outside = (turned < robot.lower) | (turned > robot.upper)
+        within = turned[~outside.any(axis=1)]
+        if not len(q):
+            counts["out of reach"] += 1
+        elif not len(within):
+            nearest = outside[np.argmin(outside.sum(axis=1))]
+            joints = " ".join(np.array(robot.joint_names)[nearest])
+            counts[f"beyond the limits of {joints}"] += 1
+        elif not allowed[position]:
+            counts[f"{PART} cuts into {WHEEL}"] += 1
+        else:
+            pairs = problem.scene.colliding_pairs(within[0])
+            counts[" hits ".join(pairs[0]) if pairs else "free"] += 1
+    return counts
+
+
+def _where_it_ended(
+    problem: GrindingProblem, reached: int, causes: Counter[tuple[int, str]]
+) -> list[str]:
+    """Every cutter point has a free posture: say what stopped the steps between them."""
+    lines = []
+    near = range(max(reached - 2, 0), min(reached + 1, len(problem.points)))
+    for column in near:
+        met = [(cause, count) for (where, cause), count in causes.items() if where == column]
+        met.sort(key=lambda item: (-item[1], item[0]))
+        if met:
+            told = ", ".join(f"{cause} ({count} times)" for cause, count in met[:4])
+            lines.append(f"cutter point {column}: steps refused: {told}")
+    if not lines:
+        lines.append(
+            "no continuous step leads on: the arm would have to change its branch or jump; "
+            "a wider range of contact positions or a turned fixture may help"
+        )
+    return lines
