@@ -1,0 +1,1 @@
+"""A second opinion on a motion, which shares no code with what planned it."""

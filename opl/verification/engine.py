@@ -1,0 +1,44 @@
+"""PyBullet, started without its banners.
+
+Its C code prints the build time when it is imported and its arguments when a server starts,
+straight to the file descriptors: in front of the JSON that a caller reads from standard output.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def _no_banners() -> Iterator[None]:
+    """Send what C code prints to nowhere."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = [os.dup(descriptor) for descriptor in (1, 2)]
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        for descriptor in (1, 2):
+            os.dup2(nowhere, descriptor)
+        yield
+    finally:
+        os.close(nowhere)
+        for descriptor, original in zip((1, 2), kept, strict=True):
+            os.dup2(original, descriptor)
+            os.close(original)
+
+
+with _no_banners():
+    import pybullet
+    from pybullet_utils.bullet_client import BulletClient
+
+
+def start() -> BulletClient:
+    """Return a new physics server in this process, without a window."""
+    with _no_banners():
+        return BulletClient(pybullet.DIRECT)
+
+
+__all__ = ["BulletClient", "pybullet", "start"]

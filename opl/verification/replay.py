@@ -1,0 +1,278 @@
+"""Replay of a motion in PyBullet: a second opinion that shares no code with the planner.
+
+The controller moves all joints linearly between the postures of the program, so that is what is
+replayed, densely: between two checked poses no corner of the held part's box moves more than `STEP`
+and no joint turns more than `TURN`.
+
+A pair of solids is measured only when it could have come too near: since it was last measured its
+distance cannot have shrunk by more than its joints moved times their levers. That leaves out
+nothing; it covers the moves between the checked poses as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from opl.cell.workcell import PART, WHEEL, WorkCell
+from opl.findings import Finding, Level
+from opl.geometry.frames import Array, transform
+from opl.geometry.toolpath import CutterPoints
+from opl.planning.motion import Motion, Stretch, VerifiedMotion
+from opl.verification.world import World
+
+STEP = 1e-3  # [m]
+TURN = np.deg2rad(0.5)
+HORIZON = 0.1  # [m] distances beyond this are not measured, only known to be more
+FARTHEST_GAP = 0.005  # [m] between part and wheel that is measured while grinding
+SPEED_TOLERANCE = 1.001  # programmed speeds have four digits
+
+ON_WHEEL = (Stretch.GRIND, Stretch.BETWEEN)
+ALONG_NORMAL = (Stretch.APPROACH, Stretch.RETRACT)
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What a replay found.
+
+    Attributes:
+        engine: The software that replayed the motion.
+        poses: Number of poses checked.
+        collisions: Number of poses in which some pair was too near.
+        min_clearance: Smallest distance of any pair that needs clearance in [m], part on wheel
+            aside; `HORIZON` if nothing came nearer than that.
+        max_contact_error: Largest distance between part and wheel while grinding in [m].
+        limit_violations: Number of postures beyond a joint limit or moves beyond a joint speed.
+        findings: What is wrong, worst of each kind and place.
+        verified: The motion with its clearances, or None if anything is wrong.
+    """
+
+    engine: str
+    poses: int
+    collisions: int
+    min_clearance: float
+    max_contact_error: float
+    limit_violations: int
+    findings: tuple[Finding, ...]
+    verified: VerifiedMotion | None
+
+
+def replay(
+    cell: WorkCell,
+    points: CutterPoints,
+    motion: Motion,
+    max_contact_error: float,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> Verification:
+    """Replay a motion and check collisions, contact, limits, speeds and completeness.
+
+    Args:
+        cell: The cell.
+        points: The cutter points that are to be ground.
+        motion: The motion.
+        max_contact_error: Largest distance of part and wheel allowed while grinding in [m].
+        progress: Told the part of the motion that is done, 0 to 1.
+    """
+    with World(cell) as world:
+        run = _Run(cell, world, motion, max_contact_error)
+        for move in range(len(motion)):
+            run.make_move(move)
+            if move % 50 == 0:
+                progress(move / len(motion))
+        version = world.version
+    findings = run.findings.worst()
+    limits = _limit_findings(cell, motion)
+    missing = _missing_points(points, motion)
+    findings = (*findings, *limits, *missing)
+    motion = replace(motion, clearance=run.clearance)
+    return Verification(
+        engine=f"PyBullet {version}",
+        poses=run.poses,
+        collisions=run.collisions,
+        min_clearance=float(min(HORIZON, np.min(run.clearance))),
+        max_contact_error=run.max_contact_error,
+        limit_violations=len(limits),
+        findings=findings,
+        verified=None if findings else VerifiedMotion(motion),
+    )
+
+
+class _Worst:
+    """Findings, of which only the worst of each kind, place and subject is kept."""
+
+    def __init__(self) -> None:
+        self._worst: dict[tuple[str, str, str], tuple[float, Finding]] = {}
+
+    def add(
+        self, kind: str, place: str, where: str, subject: str, amount: float, told: str
+    ) -> None:
+        key = (kind, place, subject)
+        if key not in self._worst or amount > self._worst[key][0]:
+            self._worst[key] = (amount, Finding(Level.ERROR, kind, where, f"{subject}: {told}"))
+
+    def worst(self) -> tuple[Finding, ...]:
+        return tuple(finding for _, finding in self._worst.values())
+
+
+class _Run:
+    """One motion being replayed."""
+
+    def __init__(
+        self, cell: WorkCell, world: World, motion: Motion, max_contact_error: float
+    ) -> None:
+        self.poses = 0
+        self.collisions = 0
+        self.max_contact_error = 0.0
+        self.findings = _Worst()
+        self.clearance = np.full(len(motion), HORIZON)  # of the move that ends at each posture
+        self._cell = cell
+        self._world = world
+        self._motion = motion
+        self._allowed_error = max_contact_error
+        self._pairs = world.pairs()
+        self._needed = np.array([pair.clearance for pair in self._pairs])
+        self._levers = world.levers()
+        # what each pair is at least apart, as far as known, in [m]
+        self._apart = np.full(len(self._pairs), -np.inf)
+        low, high = cell.part.vertices.min(axis=0), cell.part.vertices.max(axis=0)
+        self._corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+        self._q = motion.q[0]
+        self._at = self._corners_at(self._q)
+
+    def make_move(self, move: int) -> None:
+        """Go on to a posture, checking on the way."""
+        start, target = self._q, self._motion.q[move]
+        done = 0.0
+        stride = 1.0 / max(np.abs(target - start).max() / TURN, 1.0)
+        while done < 1.0:
+            # a stride that proves too long is shortened, one that proves short is lengthened
+            ahead = min(done + stride, 1.0)
+            if 1.0 - ahead < 1e-6:
+                ahead = 1.0
+            q = start + ahead * (target - start)
+            corners = self._corners_at(q)
+            way = np.sqrt(np.square(corners - self._at).sum(axis=1).max()) / STEP
+            turn = np.abs(q - self._q).max() / TURN
+            longest = max(way, turn)
+            stride = (ahead - done) * 0.95 / max(longest, 0.1)
+            if longest > 1.0:
+                continue
+            done = ahead
+            self._at = corners
+            self._check(move, q)
+
+    def _corners_at(self, q: Array) -> Array:
+        return transform(self._world.move_to(q), self._corners)
+
+    def _check(self, move: int, q: Array) -> None:
+        """Check the pose that the world is in."""
+        self.poses += 1
+        moved = float(np.abs(q - self._q) @ self._levers)
+        self._q = q
+        self._apart -= moved
+        hit = False
+        # near pairs are measured at every pose, so that the smallest clearance is found too
+        for k in np.flatnonzero(self._apart < np.maximum(self._needed, self.clearance[move])):
+            pair = self._pairs[k]
+            distance = self._world.distance(pair.first, pair.second, HORIZON)
+            self._apart[k] = min(distance, HORIZON)
+            if pair.clearance > 0.0:
+                self.clearance[move] = min(self.clearance[move], distance)
+            if distance < pair.clearance or distance <= 0.0:
+                hit = True
+                self._too_near(move, pair.first.name, pair.second.name, distance, pair.clearance)
+        hit |= self._check_contact(move)
+        self.collisions += hit
+
+    def _check_contact(self, move: int) -> bool:
+        """Check part against wheel; return whether they collide."""
+        motion, cell = self._motion, self._cell
+        grinding = motion.stretch[move] in ON_WHEEL
+        touching_down = grinding and motion.stretch[move - 1] is Stretch.APPROACH
+        free = not grinding and motion.stretch[move] not in ALONG_NORMAL
+        horizon = max(cell.clearance, FARTHEST_GAP)
+        gap = min(self._world.gap(horizon), horizon)
+        needed = cell.clearance if free else -cell.contact_allowance
+        if gap < needed:
+            self._too_near(move, PART, WHEEL, gap, needed)
+            return True
+        if grinding and not touching_down:
+            self.max_contact_error = max(self.max_contact_error, abs(gap))
+            if abs(gap) > self._allowed_error:
+                self.findings.add(
+                    "contact",
+                    self._place(move),
+                    self._where(move),
+                    f"{PART} and {WHEEL}",
+                    abs(gap),
+                    f"{1e3 * gap:.3f} mm from touching, {1e3 * self._allowed_error:g} mm allowed",
+                )
+        return False
+
+    def _too_near(self, move: int, first: str, second: str, distance: float, needed: float) -> None:
+        told = (
+            f"{1e3 * distance:.2f} mm apart, {1e3 * needed:g} mm needed"
+            if distance > 0.0
+            else f"{-1e3 * distance:.2f} mm into each other"
+        )
+        self.findings.add(
+            "collision",
+            self._place(move),
+            self._where(move),
+            f"{first} and {second}",
+            needed - distance,
+            told,
+        )
+
+    def _place(self, move: int) -> str:
+        return f"{self._motion.stretch[move].value} {self._motion.pass_index[move]}"
+
+    def _where(self, move: int) -> str:
+        return where(self._motion, move)
+
+
+def where(motion: Motion, move: int) -> str:
+    """Say which part of a motion a move is, as a person would look for it."""
+    index = motion.pass_index[move] + 1  # people count passes from 1
+    stretch = motion.stretch[move]
+    if stretch in ON_WHEEL:
+        return f"pass {index}, cutter point {motion.cutter_point[move]:.4g}"
+    if stretch is Stretch.HOME:
+        return "way home" if index == 0 and move > 0 else "way from home"
+    return f"{stretch.value} of pass {index}"
+
+
+def _limit_findings(cell: WorkCell, motion: Motion) -> list[Finding]:
+    robot, found = cell.robot, []
+    beyond = np.maximum(robot.lower - motion.q, motion.q - robot.upper)
+    for move, joint in np.argwhere(beyond > 1e-9):
+        amount = f"{np.rad2deg(beyond[move, joint]):.3f} deg beyond its limit"
+        place, name = where(motion, move), robot.joint_names[joint]
+        found.append(Finding(Level.ERROR, "limit", place, f"joint {name}: {amount}"))
+    for move in range(1, len(motion)):
+        turned = np.abs(motion.q[move] - motion.q[move - 1])
+        allowed = robot.max_speed * motion.duration[move] * SPEED_TOLERANCE
+        for joint in np.flatnonzero(turned > allowed + 1e-12):
+            speed = np.rad2deg(turned[joint]) / max(motion.duration[move], 1e-12)
+            most = np.rad2deg(robot.max_speed[joint])
+            told = f"joint {robot.joint_names[joint]}: {speed:.1f} deg/s, {most:.1f} allowed"
+            found.append(Finding(Level.ERROR, "speed", where(motion, move), told))
+    return found
+
+
+def _missing_points(points: CutterPoints, motion: Motion) -> list[Finding]:
+    """Check that every cutter point is ground, once and in order."""
+    ground = [
+        int(point)
+        for point, stretch in zip(motion.cutter_point, motion.stretch, strict=True)
+        if stretch is Stretch.GRIND
+    ]
+    if ground == list(range(len(points))):
+        return []
+    expected = next(
+        (k for k, point in enumerate(ground) if point != k), min(len(ground), len(points) - 1)
+    )
+    told = f"{len(points)} cutter points expected in order, {len(ground)} ground"
+    return [Finding(Level.ERROR, "order", f"cutter point {expected}", told)]

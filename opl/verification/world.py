@@ -1,0 +1,196 @@
+"""The cell in PyBullet: robot, part, fixture, wheel and obstacles as bodies that can be posed.
+
+Nothing here is shared with `opl.cell.collision`: PyBullet reads the URDF itself, poses the links
+itself and measures distances itself. The part is a concave triangle mesh, not its convex hull,
+which Bullet allows only for bodies without mass that are placed by pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from opl.cell.workcell import PART, WorkCell
+from opl.geometry.frames import Array, pose
+from opl.geometry.shapes import Body, Box
+from opl.verification.engine import pybullet, start
+
+BASE_LINK = -1  # Bullet's number of the link that does not move
+# Bullet rounds the edges of cylinders by their margin and blows up meshes by it: the default of
+# 1 mm is as much as the contact itself
+MARGIN = 1e-5  # [m]
+
+
+@dataclass(frozen=True)
+class Solid:
+    """One thing that can be touched: a body, or a link of the robot."""
+
+    name: str
+    body: int
+    link: int
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two solids that must stay apart, by at least ``clearance`` in [m]."""
+
+    first: Solid
+    second: Solid
+    clearance: float
+
+
+class World:
+    """A physics server with the cell in it; use as a context manager."""
+
+    def __init__(self, cell: WorkCell) -> None:
+        self._cell = cell
+        self._client = start()
+        self._robot = self._client.loadURDF(
+            str(cell.robot.urdf),
+            basePosition=[0.0, 0.0, -cell.robot.base_height],
+            useFixedBase=True,
+            # else Bullet inscribes prisms of 32 sides in cylinders
+            flags=pybullet.URDF_USE_IMPLICIT_CYLINDER,
+        )
+        self._joints: list[int] = []
+        self._links = [Solid(self._link_name(BASE_LINK), self._robot, BASE_LINK)]
+        self._flange = BASE_LINK
+        for index in range(self._client.getNumJoints(self._robot)):
+            info = self._client.getJointInfo(self._robot, index)
+            if info[2] == pybullet.JOINT_REVOLUTE:
+                self._joints.append(index)
+                self._links.append(Solid(self._link_name(index), self._robot, index))
+            if info[12].decode() == "tool0":
+                self._flange = index
+        # the part is the first of the held bodies
+        self._held = [(self._add_part(), _position_quaternion(cell.T_flange_workpiece))]
+        self._held += [
+            (self._add(body), _position_quaternion(body.T_parent_body)) for body in cell.fixture
+        ]
+        wheel = cell.wheel_body()
+        self._wheel = self._add(wheel, wheel.T_parent_body)
+        self._obstacles = [self._add(body, body.T_parent_body) for body in cell.obstacles]
+
+    def __enter__(self) -> World:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._client.disconnect()
+
+    def pairs(self) -> list[Pair]:
+        """Return every pair that must stay apart; part and wheel may touch and are not in it."""
+        return list(self._pairs())
+
+    def _pairs(self) -> Iterator[Pair]:
+        links, clearance = self._links, self._cell.clearance
+        for k, link in enumerate(links):
+            # neighbouring links share a bearing
+            yield from (Pair(link, other, 0.0) for other in links[k + 2 :])
+            if k > 0:  # the base does not move, nor does what stands around it
+                for other in (self._wheel, *self._obstacles):
+                    yield Pair(link, other, clearance)
+            if k < len(links) - 1:  # the fixture is bolted to the last link
+                # and turns close in front of the last but one
+                needed = 0.0 if k == len(links) - 2 else clearance
+                yield from (Pair(link, held, needed) for held, _ in self._held)
+        for held, _ in self._held:
+            yield from (Pair(held, other, clearance) for other in self._obstacles)
+            if held.name != PART:
+                yield Pair(held, self._wheel, clearance)
+
+    def move_to(self, q: Array) -> Array:
+        """Pose robot, part and fixture; return T_base_workpiece as PyBullet sees it, (4, 4)."""
+        client = self._client
+        for joint, value in zip(self._joints, q, strict=True):
+            client.resetJointState(self._robot, joint, value)
+        state = client.getLinkState(self._robot, self._flange, computeForwardKinematics=True)
+        placed = [
+            (held, client.multiplyTransforms(state[4], state[5], *in_flange))
+            for held, in_flange in self._held
+        ]
+        for held, (position, quaternion) in placed:
+            client.resetBasePositionAndOrientation(held.body, position, quaternion)
+        _, (position, quaternion) = placed[0]
+        R = np.array(client.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
+        return pose(R, np.array(position))
+
+    def distance(self, first: Solid, second: Solid, within: float) -> float:
+        """Return the distance in [m], negative in penetration, inf beyond ``within``."""
+        contacts = self._client.getClosestPoints(
+            first.body, second.body, within, first.link, second.link
+        )
+        return min((contact[8] for contact in contacts), default=np.inf)
+
+    def gap(self, within: float) -> float:
+        """Return the distance of the part from the wheel in [m], as `distance`."""
+        return self.distance(self._held[0][0], self._wheel, within)
+
+    @property
+    def version(self) -> str:
+        """Version of the engine."""
+        return str(pybullet.getAPIVersion())
+
+    def levers(self) -> Array:
+        """Return how far from each joint's axis anything that it moves can ever be, in [m], (6,).
+
+        A bound for all postures: the arm stretched out from the joint on, then the largest link or
+        held body all the way out.
+        """
+        self.move_to(np.zeros(len(self._joints)))
+        origins = [
+            np.array(self._client.getLinkState(self._robot, joint)[4]) for joint in self._joints
+        ]
+        solids = [*self._links[1:], *(held for held, _ in self._held)]
+        origins_of_solids = [*origins, *([origins[-1]] * len(self._held))]
+        radii = []
+        for solid, origin in zip(solids, origins_of_solids, strict=True):
+            low, high = self._client.getAABB(solid.body, solid.link)
+            away = np.maximum(np.abs(np.array(low) - origin), np.abs(np.array(high) - origin))
+            radii.append(float(np.linalg.norm(away)))
+        lengths = np.linalg.norm(np.diff(origins, axis=0), axis=1)
+        beyond = np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
+        return beyond + max(radii)
+
+    def _link_name(self, index: int) -> str:
+        if index == BASE_LINK:
+            return str(self._client.getBodyInfo(self._robot)[0].decode())
+        return str(self._client.getJointInfo(self._robot, index)[12].decode())
+
+    def _add_part(self) -> Solid:
+        mesh = self._cell.part
+        shape = self._client.createCollisionShape(
+            pybullet.GEOM_MESH,
+            vertices=mesh.vertices.tolist(),
+            indices=mesh.faces.ravel().tolist(),
+            flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
+        )
+        return self._body(PART, shape)
+
+    def _add(self, body: Body, T_base_body: Array | None = None) -> Solid:
+        if isinstance(body.shape, Box):
+            half = [edge / 2.0 for edge in body.shape.size]
+            shape = self._client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half)
+        else:
+            shape = self._client.createCollisionShape(
+                pybullet.GEOM_CYLINDER, radius=body.shape.radius, height=body.shape.length
+            )
+        solid = self._body(body.name, shape)
+        if T_base_body is not None:
+            self._place(solid, T_base_body)
+        return solid
+
+    def _body(self, name: str, shape: int) -> Solid:
+        body = self._client.createMultiBody(baseMass=0.0, baseCollisionShapeIndex=shape)
+        self._client.changeDynamics(body, BASE_LINK, collisionMargin=MARGIN)
+        return Solid(name, body, BASE_LINK)
+
+    def _place(self, solid: Solid, T_base_body: Array) -> None:
+        self._client.resetBasePositionAndOrientation(solid.body, *_position_quaternion(T_base_body))
+
+
+def _position_quaternion(T: Array) -> tuple[list[float], list[float]]:
+    """Return a pose as Bullet takes it: position in [m], quaternion x y z w."""
+    return T[:3, 3].tolist(), Rotation.from_matrix(T[:3, :3]).as_quat().tolist()
