@@ -1,0 +1,24 @@
+"""Yaskawa INFORM jobs (.JBI): written from a program, read from any controller.
+
+INFORM calls the frame at the end of the arm TOOL; here that is the workpiece, which the robot holds
+while the wheel stands still. Joint moves between pulse positions do not depend on it.
+"""
+
+from opl.program.inform.check import find_faults
+from opl.program.inform.job import Header, InformJob, Instruction, Position
+from opl.program.inform.parse import parse, unparse
+from opl.program.inform.render import FILE_SUFFIX, TEMPLATE, render, render_jobs
+
+__all__ = [
+    "FILE_SUFFIX",
+    "TEMPLATE",
+    "Header",
+    "InformJob",
+    "Instruction",
+    "Position",
+    "find_faults",
+    "parse",
+    "render",
+    "render_jobs",
+    "unparse",
+]

@@ -1,0 +1,172 @@
+"""A robot program that belongs to no maker yet: moves with speeds, stops and comments.
+
+Every move is a joint move. Between two postures the controller then does what the verification
+replayed: all joints run linearly, in step with the slowest. A straight-line move would lead the
+hand's tool point along a line instead, and the contact, which is fixed to the wheel while the part
+moves, away from where it was proven.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opl.errors import UnsafeError
+from opl.planning.motion import Motion, Stretch, VerifiedMotion
+
+Array = NDArray[np.float64]
+
+# Speed of the move to the first posture. Nothing is known of where the robot starts from, so that
+# move is proven by nobody but the person who watches it.
+START_SPEED = 0.05
+# Postures nearer to each other than this in every joint [rad] are one: a micrometre at the end of
+# the arm, a tenth of an encoder pulse.
+SAME_POSTURE = 1e-6
+# What a move may ask above a joint's top speed before it is refused: the last digit a controller
+# can be told.
+OVERSPEED = 1e-4
+# Sharpest turn in joint space [rad] that a move off the wheel goes through without a stop. Rounding
+# a corner leaves the proven path by more, the sharper it is.
+MAX_BLENDED_TURN = np.deg2rad(10.0)
+
+_ON_WHEEL = (Stretch.GRIND, Stretch.BETWEEN)
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """A joint move.
+
+    Attributes:
+        q: Where it ends, joint positions in [rad], shape (6,).
+        speed: Speed as a fraction of the top speed of the joint that takes longest, in (0, 1].
+        exact_stop: Whether the robot comes to rest there; if not, the next move may round the
+            corner.
+        on_wheel: Whether the part touches the wheel there.
+        posture: Index of that posture in the motion.
+        comment: What a person reads before the move.
+    """
+
+    q: Array
+    speed: float
+    exact_stop: bool
+    on_wheel: bool
+    posture: int
+    comment: str | None = None
+
+    def __post_init__(self) -> None:
+        q = np.array(self.q, dtype=float)
+        q.setflags(write=False)
+        object.__setattr__(self, "q", q)
+
+
+@dataclass(frozen=True)
+class Program:
+    """Moves in order, or calls of other programs in order.
+
+    Attributes:
+        name: Its name on the controller.
+        comments: Lines at its top.
+        moves: What the robot does; the first brings it to where the rest is proven from.
+        calls: Names of the programs it runs after its moves.
+    """
+
+    name: str
+    comments: tuple[str, ...] = ()
+    moves: tuple[Move, ...] = ()
+    calls: tuple[str, ...] = ()
+
+
+def plan_moves(
+    verified: VerifiedMotion,
+    name: str,
+    max_speed: Array,
+    comments: Sequence[str] = (),
+    joint_names: Sequence[str] = ("1", "2", "3", "4", "5", "6"),
+) -> Program:
+    """Turn a verified motion into moves.
+
+    A posture that repeats the one before needs no move; its time goes to the move that follows,
+    which so gets slower, never faster. The robot stops at home, where it enters and leaves the
+    wheel, where a stretch ends, and at sharp corners off the wheel; it never stops within a pass.
+
+    Args:
+        verified: What the program shall do.
+        name: The program's name.
+        max_speed: Top speeds of the joints in [rad/s], shape (6,).
+        comments: Lines at its top.
+        joint_names: For messages.
+
+    Raises:
+        TypeError: If the motion was not verified.
+        UnsafeError: If a move would need more than a joint's top speed.
+    """
+    if not isinstance(verified, VerifiedMotion):
+        raise TypeError(f"a program is made of a VerifiedMotion, got {type(verified).__name__}")
+    motion = verified.motion
+    kept = _distinct_postures(motion.q)
+    speeds = _speeds(motion, kept, np.asarray(max_speed), joint_names)
+    # reduceat: a kept posture also stands for the repeated ones that follow it
+    on_wheel = np.logical_or.reduceat([s in _ON_WHEEL for s in motion.stretch], kept)
+    stops = _stops(motion, kept, on_wheel)
+    moves = []
+    pass_before = None
+    for m, posture in enumerate(kept):
+        pass_here = int(motion.pass_index[posture])
+        comment = "HOME" if pass_here < 0 else f"PASS {pass_here + 1}"
+        moves.append(
+            Move(
+                q=motion.q[posture],
+                speed=float(speeds[m]),
+                exact_stop=bool(stops[m]),
+                on_wheel=bool(on_wheel[m]),
+                posture=int(posture),
+                comment=comment if pass_here != pass_before else None,
+            )
+        )
+        pass_before = pass_here
+    return Program(name=name, comments=tuple(comments), moves=tuple(moves))
+
+
+def _distinct_postures(q: Array) -> NDArray[np.intp]:
+    """Return the indices of the postures that differ from the last one kept."""
+    kept = [0]
+    for i in range(1, len(q)):
+        if np.abs(q[i] - q[kept[-1]]).max() > SAME_POSTURE:
+            kept.append(i)
+    return np.array(kept)
+
+
+def _speeds(
+    motion: Motion, kept: NDArray[np.intp], max_speed: Array, joint_names: Sequence[str]
+) -> Array:
+    """Return the speed of the move to each kept posture, shape (len(kept),)."""
+    times = np.diff(np.cumsum(motion.duration)[kept])
+    joint_times = np.abs(np.diff(motion.q[kept], axis=0)) / max_speed  # at top speed, [s]
+    with np.errstate(divide="ignore"):
+        speeds = np.concatenate([[START_SPEED], joint_times.max(axis=1) / times])
+    m = int(np.argmax(speeds))
+    if speeds[m] > 1.0 + OVERSPEED:
+        joint = joint_names[int(np.argmax(joint_times[m - 1]))]
+        raise UnsafeError(
+            f"posture {kept[m]} ({motion.stretch[kept[m]].value}): joint {joint} would need "
+            f"{100.0 * speeds[m]:.1f} % of its top speed"
+        )
+    return np.minimum(speeds, 1.0)
+
+
+def _stops(motion: Motion, kept: NDArray[np.intp], on_wheel: NDArray[np.bool_]) -> list[bool]:
+    """Say at which kept postures the robot comes to rest."""
+    stretch = [Stretch.GRIND if s in _ON_WHEEL else s for s in motion.stretch]
+    ends = [here is not after for here, after in pairwise(stretch)] + [True]
+    stops = np.logical_or.reduceat(ends, kept)
+    stops[0] = True
+    stops[1:] |= on_wheel[1:] & ~on_wheel[:-1]
+    steps = np.diff(motion.q[kept], axis=0)
+    directions = steps / np.linalg.norm(steps, axis=1, keepdims=True)
+    cos_turn = np.sum(directions[:-1] * directions[1:], axis=1)
+    stops[1:-1] |= ~on_wheel[1:-1] & (cos_turn < np.cos(MAX_BLENDED_TURN))
+    return stops.tolist()

@@ -1,0 +1,90 @@
+"""Joint angles to encoder pulses and back, within the controller's soft limits.
+
+A Yaskawa job counts each joint in pulses from its calibrated zero. In jobs of serial arms the count
+of a joint depends on that joint alone: the controller itself corrects the mechanical coupling of
+the wrist. Its sign is the joint's own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opl.errors import UnsafeError
+
+Array = NDArray[np.float64]
+Pulses = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class PulseScale:
+    """How a controller counts the joints of its robot.
+
+    Attributes:
+        joint_names: As people at the pendant call them.
+        pulses_per_radian: Ratio of each joint in [1/rad], shape (6,).
+        lower: Lower joint limits in [rad], shape (6,).
+        upper: Upper joint limits in [rad], shape (6,).
+        unverified: Names of the joints whose ratio nobody has confirmed on a controller.
+    """
+
+    joint_names: tuple[str, ...]
+    pulses_per_radian: Array
+    lower: Array
+    upper: Array
+    unverified: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("pulses_per_radian", "lower", "upper"):
+            value = np.array(getattr(self, name), dtype=float)
+            if value.shape != (len(self.joint_names),):
+                raise ValueError(
+                    f"{name} has shape {value.shape} for {len(self.joint_names)} joints"
+                )
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        if not np.all((self.pulses_per_radian > 0.0) & np.isfinite(self.pulses_per_radian)):
+            raise ValueError(f"pulses per radian must be positive, got {self.pulses_per_radian}")
+        if unknown := set(self.unverified) - set(self.joint_names):
+            raise ValueError(f"no such joints: {sorted(unknown)}; have: {self.joint_names}")
+
+    @property
+    def soft_limits(self) -> tuple[Pulses, Pulses]:
+        """Lower and upper limits in pulses, as the controller keeps them, shapes (6,)."""
+        return self._nearest(self.lower), self._nearest(self.upper)
+
+    def to_pulses(self, q: Array) -> Pulses:
+        """Return the pulses nearest to joint positions.
+
+        Args:
+            q: Joint positions in [rad], shape (..., 6).
+
+        Returns:
+            Pulses, shape (..., 6).
+
+        Raises:
+            UnsafeError: If a joint is beyond its soft limit; the first such posture is named.
+        """
+        postures = np.atleast_2d(q)
+        if not np.all(np.isfinite(postures)):
+            raise UnsafeError("a joint position is not a number")
+        pulses = self._nearest(postures)
+        lower, upper = self.soft_limits
+        beyond = np.argwhere((pulses < lower) | (pulses > upper))
+        if len(beyond):
+            *_, joint = place = tuple(beyond[0])
+            raise UnsafeError(
+                f"posture {place[-2]}: joint {self.joint_names[joint]} at "
+                f"{np.rad2deg(postures[place]):.3f} deg is {pulses[place]} pulses, the soft limits "
+                f"are {lower[joint]} and {upper[joint]}"
+            )
+        return pulses.reshape(np.shape(q))
+
+    def to_angles(self, pulses: NDArray[np.generic]) -> Array:
+        """Return the joint positions [rad] of pulses, both of shape (..., 6)."""
+        return np.asarray(pulses, dtype=float) / self.pulses_per_radian
+
+    def _nearest(self, q: Array) -> Pulses:
+        return np.rint(q * self.pulses_per_radian).astype(np.int64)

@@ -1,0 +1,65 @@
+"""Programs that a controller cannot hold in one piece."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from opl.errors import OplError
+from opl.program.moves import START_SPEED, Move, Program
+
+
+def split(program: Program, step_limit: int) -> tuple[Program, ...]:
+    """Cut a program into numbered parts and a master that calls them.
+
+    A cut lies only where the robot stands still off the wheel: between two jobs a controller may
+    pause. Every part after the first begins with a slow move to where the part before it ended.
+    Called by the master the robot is there already; started by hand it does not come rushing from
+    elsewhere.
+
+    Args:
+        program: Moves without calls.
+        step_limit: Most moves of a part.
+
+    Returns:
+        The program alone if it fits, else the master and then its parts in order.
+
+    Raises:
+        OplError: If there are more moves than the limit between two places to cut.
+    """
+    if len(program.moves) <= step_limit:
+        return (program,)
+    pieces = _pieces(program.moves, step_limit)
+    digits = max(2, len(str(len(pieces))))
+    names = [f"{program.name}{number:0{digits}d}" for number in range(1, len(pieces) + 1)]
+    parts = [
+        Program(name, (*program.comments, f"PART {k} OF {len(pieces)}"), piece)
+        for k, (name, piece) in enumerate(zip(names, pieces, strict=True), start=1)
+    ]
+    return (Program(program.name, program.comments, calls=tuple(names)), *parts)
+
+
+def _pieces(moves: tuple[Move, ...], step_limit: int) -> list[tuple[Move, ...]]:
+    """Fill one piece after the other as far as the places to cut allow."""
+    cuts = [k for k, move in enumerate(moves, 1) if move.exact_stop and not move.on_wheel]
+    pieces: list[tuple[Move, ...]] = []
+    start = 0
+    while start < len(moves):
+        entry = (_entry(moves[start - 1]),) if start else ()
+        room = start + step_limit - len(entry)
+        # the end of the program needs no cut, wherever it lies
+        end = max((k for k in (*cuts, len(moves)) if start < k <= room), default=None)
+        if end is None:
+            nearest = min((k for k in cuts if k > start), default=len(moves))
+            raise OplError(
+                f"postures {moves[start].posture} to {moves[nearest - 1].posture} take "
+                f"{nearest - start} moves between two places off the wheel where a job may be cut; "
+                f"a job holds {step_limit}"
+            )
+        pieces.append((*entry, *moves[start:end]))
+        start = end
+    return pieces
+
+
+def _entry(move: Move) -> Move:
+    """Return the move to where the part before ended."""
+    return replace(move, speed=START_SPEED, exact_stop=True, comment="START OF PART")

@@ -1,0 +1,96 @@
+"""The table of a motion (CSV): what the robot does, posture by posture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opl import resources
+from opl.geometry.frames import roll_pitch_yaw
+from opl.planning.motion import VerifiedMotion
+from opl.program.controller import DX200, ControllerProfile
+from opl.program.layout import fill
+from opl.program.moves import Program
+from opl.program.pulses import PulseScale
+
+Array = NDArray[np.float64]
+
+TEMPLATE = resources.folder("templates") / "csv" / "table.csv.j2"
+
+
+def render_table(
+    verified: VerifiedMotion,
+    program: Program,
+    scale: PulseScale,
+    Ts_base_flange: Array,
+    *,
+    profile: ControllerProfile = DX200,
+    template: Path | None = None,
+) -> str:
+    """Return the table, one row for each posture of the motion.
+
+    Passes count from 1 as in the job's comments, cutter points from 0. A cell is empty where a
+    quantity is not defined: pass at home, cutter point and t off the wheel, clearance where none
+    was computed. Speed is VJ as the job writes it; it is empty for a posture that repeats the one
+    before and so has no move of its own (the time of that row is in the move that follows).
+
+    Args:
+        verified: The motion.
+        program: The moves planned from it, not split.
+        scale: Pulses of the robot.
+        Ts_base_flange: Pose of the flange at each posture, origin in [m], shape (n, 4, 4).
+        profile: The controller.
+        template: Layout of the table; None for the one that comes with opl.
+
+    Raises:
+        UnsafeError: If a posture is beyond the soft limits.
+        InputError: If the template is unusable.
+    """
+    motion = verified.motion
+    speeds = {move.posture: profile.joint_speed_text(move.speed) for move in program.moves}
+    pulses = scale.to_pulses(motion.q).tolist()
+    angles = np.rad2deg(motion.q)
+    positions = Ts_base_flange[:, :3, 3] * 1e3
+    rotations = np.rad2deg(roll_pitch_yaw(Ts_base_flange))
+    columns = _columns(scale.joint_names)
+    rows = [
+        (
+            str(motion.pass_index[i] + 1) if motion.pass_index[i] >= 0 else "",
+            _fixed(motion.cutter_point[i], 4),
+            motion.stretch[i].value,
+            _fixed(motion.contact_position[i], 4),
+            *(_fixed(angle, 4) for angle in angles[i]),
+            *map(str, pulses[i]),
+            *(_fixed(length, 3) for length in positions[i]),
+            *(_fixed(angle, 4) for angle in rotations[i]),
+            _fixed(motion.duration[i], 4),
+            speeds.get(i, ""),
+            _fixed(motion.clearance[i] * 1e3, 3),
+        )
+        for i in range(len(motion))
+    ]
+    values = {
+        "columns": columns,
+        "rows": [dict(zip(columns, row, strict=True)) for row in rows],
+    }
+    return fill(TEMPLATE if template is None else template, values)
+
+
+def _columns(joint_names: Sequence[str]) -> tuple[str, ...]:
+    return (
+        *("pass", "cutter_point", "kind", "t"),
+        *(f"{name}_deg" for name in joint_names),
+        *(f"{name}_pulses" for name in joint_names),
+        *("x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"),
+        *("time_s", "speed_percent", "clearance_mm"),
+    )
+
+
+def _fixed(value: float, decimals: int) -> str:
+    """Return a number with fixed decimals, never -0; empty for NaN."""
+    if np.isnan(value):
+        return ""
+    return f"{round(float(value), decimals) + 0.0:.{decimals}f}"

@@ -1,0 +1,62 @@
+"""A small made-up motion and robot, shared by the tests of opl.program."""
+
+from datetime import datetime
+
+import numpy as np
+
+from opl.planning.motion import Motion, Stretch, VerifiedMotion
+from opl.program.pulses import PulseScale
+
+JOINT_NAMES = ("S", "L", "U", "R", "B", "T")
+DATE = datetime(2024, 3, 5, 7, 9)
+MAX_SPEED = np.deg2rad([197.0, 190.0, 210.0, 410.0, 410.0, 620.0])
+SCALE = PulseScale(
+    joint_names=JOINT_NAMES,
+    pulses_per_radian=np.rad2deg([1300.0, 1900.0, 1600.0, 1000.0, 980.0, 450.0]),
+    lower=np.deg2rad([-180.0, -105.0, -86.0, -200.0, -150.0, -455.0]),
+    upper=np.deg2rad([180.0, 155.0, 160.0, 200.0, 150.0, 455.0]),
+)
+HOME = np.deg2rad([0.0, -20.0, 10.0, 0.0, -60.0, 0.0])
+
+
+def verified_motion(n_passes=2, n_points=4):
+    """Passes of n_points cutter points with one node between the first two of them.
+
+    The approach ends where the grinding begins, so that posture is given twice.
+    """
+    q, rows = [HOME], [(0.0, Stretch.HOME, np.nan, np.nan, -1, 0.5)]
+
+    def go(posture, *row):
+        q.append(posture)
+        rows.append(row)
+
+    for k in range(n_passes):
+        start = np.deg2rad([30.0, 10.0 + k % 7, 0.0, 20.0, -80.0, 40.0])
+        before = start + np.deg2rad([0.0, -3.0, 0.0, 0.0, 1.0, 0.0])
+        free = Stretch.LINK if k else Stretch.HOME
+        go(before, 1.0, free, np.nan, np.nan, k, 0.08)
+        go((before + start) / 2, 0.1, Stretch.APPROACH, np.nan, np.nan, k, 0.03)
+        go(start, 0.1, Stretch.APPROACH, np.nan, np.nan, k, 0.001)
+        places = sorted([0.5, *range(n_points)])
+        for place in places:
+            posture = start + place * np.deg2rad([0.11, 0.05, -0.07, 0.3, 0.02, -0.4])
+            kind = Stretch.BETWEEN if place == 0.5 else Stretch.GRIND
+            step = 0.0 if place == 0 else 0.05 if place in (0.5, 1) else 0.1
+            go(posture, step, kind, place - 1.0, k * n_points + place, k, 0.002)
+        end = q[-1]
+        for share in (0.5, 1.0):
+            away = end + share * (before - start)
+            go(away, 0.1, Stretch.RETRACT, np.nan, np.nan, k, np.nan)
+    go(HOME, 1.5, Stretch.HOME, np.nan, np.nan, -1, 0.5)
+    duration, stretch, contact, cutter, pass_index, clearance = zip(*rows, strict=True)
+    return VerifiedMotion(
+        Motion(
+            q=np.array(q),
+            duration=np.array(duration),
+            stretch=stretch,
+            contact_position=np.array(contact),
+            cutter_point=np.array(cutter),
+            pass_index=np.array(pass_index),
+            clearance=np.array(clearance),
+        )
+    )
