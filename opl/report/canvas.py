@@ -1,0 +1,109 @@
+"""What the pictures are drawn on: one style, one way to show passes, SVG that repeats to the byte.
+
+Whatever the user's matplotlib is set to does not matter. Text stays text, so a picture can be
+searched and read aloud.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from opl.geometry.frames import Array
+
+SIZE = (11.0, 6.0)  # [inch], fills a landscape page
+INK, FAINT, RULE = "#22303c", "#5b6670", "#9aa5ae"
+STYLE: dict[Any, Any] = {
+    "svg.hashsalt": "opl",
+    "svg.fonttype": "none",
+    "text.parse_math": False,
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial"],  # the first comes with matplotlib
+    "font.size": 11.0,
+    "text.color": INK,
+    "axes.edgecolor": RULE,
+    "axes.labelcolor": INK,
+    "axes.labelsize": 12.0,
+    "xtick.color": RULE,
+    "xtick.labelcolor": INK,
+    "ytick.color": RULE,
+    "ytick.labelcolor": INK,
+    "lines.solid_capstyle": "round",
+    "lines.solid_joinstyle": "round",
+    "lines.dash_capstyle": "round",
+    "legend.frameon": False,
+}
+GAP = np.array([np.nan])
+LONE_STROKE = np.array([-0.25, 0.25])  # in cutter points
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Let matplotlib draw in our style, and only ours, for as long as the context lasts."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(STYLE)
+        yield
+
+
+def blank_figure(title: str) -> Figure:
+    """Return an empty figure with its title."""
+    layout = ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, wspace=0.03, hspace=0.04)
+    figure = Figure(figsize=SIZE, layout=layout, facecolor="white")
+    figure.suptitle(title, x=0.012, ha="left", fontsize=16, fontweight="bold")
+    return figure
+
+
+def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
+    """Explain the handles under the axes."""
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=2 if len(handles) == 4 else 3,
+        fontsize=11.5,
+        columnspacing=2.4,
+        handlelength=1.8,
+    )
+
+
+def broken(pass_index: np.ndarray, x: Array, y: Array) -> tuple[Array, Array]:
+    """Return a line that is not drawn where the pass changes.
+
+    Args:
+        pass_index: Pass of each posture, shape (n,).
+        x: Across, shape (n,).
+        y: Up, shape (n,).
+
+    Returns:
+        The line with NaN between passes. A posture alone in its pass becomes a short stroke.
+    """
+    across: list[Array] = []
+    up: list[Array] = []
+    for one in np.split(np.arange(len(x)), np.flatnonzero(np.diff(pass_index)) + 1):
+        alone = len(one) == 1
+        across += [x[one] + LONE_STROKE if alone else x[one], GAP]
+        up += [np.repeat(y[one], 2) if alone else y[one], GAP]
+    return np.concatenate(across[:-1]), np.concatenate(up[:-1])
+
+
+def draw_pass_borders(axes: Axes, pass_index: np.ndarray) -> None:
+    """Draw a thin vertical line wherever a pass ends and the next begins."""
+    for border in np.flatnonzero(np.diff(pass_index)):
+        axes.axvline(border + 0.5, color=RULE, linewidth=0.8, zorder=1.5)
+
+
+def svg(figure: Figure, title: str) -> str:
+    """Return the figure as SVG text without date, version or random names."""
+    text = io.StringIO()
+    metadata = {"Title": title, "Creator": "opl", "Date": None}
+    figure.savefig(text, format="svg", metadata=metadata)
+    return text.getvalue()

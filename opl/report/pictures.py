@@ -1,0 +1,240 @@
+"""Two pictures of a planned path: where the part touches the wheel, and what each joint does.
+
+Passes are counted from 1, as people do; cutter points from 0, as in messages and tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from opl.geometry.frames import Array
+from opl.report.canvas import (
+    FAINT,
+    INK,
+    RULE,
+    blank_figure,
+    broken,
+    draw_pass_borders,
+    house_style,
+    legend_below,
+    svg,
+)
+
+# one per state, free first; they differ in lightness too, for colour-blind eyes and grey printers
+STATE_COLOURS = ("#edf4ee", "#aeb5bb", "#f0da85", "#e2825c", "#8a5f9e", "#5fa3a3", "#3f4a54")
+FOUND: dict[str, Any] = {"color": "#0b4f8a", "linewidth": 2.4, "label": "found path"}
+FIXED: dict[str, Any] = {
+    "color": FAINT,
+    "linewidth": 1.6,
+    "dashes": (2.8, 2.8),
+    "label": "contact kept at t = 0",
+}
+LIMIT: dict[str, Any] = {"color": "#c8102e", "linewidth": 1.4, "label": "joint limit"}
+LEAST_SPAN = 10.0  # [deg] shown of a joint, lest one that hardly moves look busy
+NEAR = 0.1  # of the span shown: a limit farther away than this is left out
+ZONES = ("left edge", "flat", "right edge")  # of the wheel, from small t to large
+LEAST_PIXELS = (1800, 840)  # of the state image, across and up
+LABEL_WIDTH, NUMBER_WIDTH = 0.075, 0.03  # of "pass 12" and "12", as parts of the chart's width
+
+
+@house_style()
+def contact_chart(
+    *,
+    title: str,
+    contact_positions: Array,
+    states: np.ndarray,
+    state_names: Sequence[str],
+    pass_index: np.ndarray,
+    flat_end: float,
+    path_cutter_point: Array,
+    path_contact_position: Array,
+    path_pass: np.ndarray,
+) -> str:
+    """Draw what is free at every cutter point and contact position, and the path through it.
+
+    Args:
+        title: What the picture is called.
+        contact_positions: M evenly spaced values of t in belt units, increasing, shape (M,).
+        states: Code of each node, 0 is free, shape (N, M) of uint8.
+        state_names: What the codes mean.
+        pass_index: Pass of each cutter point, 0, 1, ..., shape (N,).
+        flat_end: Contact position in belt units where the flat ends.
+        path_cutter_point: Cutter point of each posture, fractional in between, shape (n,).
+        path_contact_position: t of each posture, shape (n,). If n is 0 no path is drawn.
+        path_pass: Pass of each posture, shape (n,).
+
+    Returns:
+        The picture as SVG text.
+    """
+    figure = blank_figure(title)
+    axes = figure.subplots()
+    step = np.ptp(contact_positions) / max(len(contact_positions) - 1, 1) or 1.0
+    bottom, top = contact_positions[0] - step / 2.0, contact_positions[-1] + step / 2.0
+    palette = np.array([_state_colour(code) for code in range(len(state_names))])
+    # one embedded image is ever so much smaller than rectangles; several pixels a node, as many
+    # viewers smooth images whatever the file says
+    across, up = (-(-least // n) for least, n in zip(LEAST_PIXELS, states.shape, strict=True))
+    pixels = np.kron(states.T, np.ones((up, across), dtype=np.uint8))
+    axes.imshow(
+        np.uint8(np.rint(255.0 * palette))[pixels],
+        extent=(-0.5, len(states) - 0.5, bottom, top),
+        origin="lower",
+        aspect="auto",
+        interpolation="none",
+    )
+    _mark_zones(axes, flat_end, bottom, top)
+    draw_pass_borders(axes, pass_index)
+    _number_passes(axes, pass_index)
+    counts = np.bincount(states.ravel())
+    handles: list[Patch | Line2D] = [
+        Patch(
+            facecolor=_state_colour(code),
+            edgecolor=RULE,
+            linewidth=0.8,
+            label=f"{state_names[code]} {_percent(counts[code] / states.size)}",
+        )
+        for code in np.flatnonzero(counts).tolist()
+    ]
+    if len(path_pass):
+        line = broken(path_pass, path_cutter_point, path_contact_position)
+        axes.plot(*line, color="white", linewidth=2.0 * FOUND["linewidth"])
+        axes.plot(*line, **FOUND, gid="found")
+        handles.append(Line2D([], [], **FOUND))
+    axes.set_ylim(bottom, top)
+    axes.xaxis.set_major_locator(MaxNLocator(12, integer=True, min_n_ticks=1))
+    axes.yaxis.set_major_locator(MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]))
+    axes.set_xlabel("cutter point")
+    axes.set_ylabel("contact position t\n(mm on the flat, degrees on the edges)")
+    legend_below(figure, handles)
+    return svg(figure, title)
+
+
+@house_style()
+def joint_chart(
+    *,
+    title: str,
+    joint_names: Sequence[str],
+    lower: Array,
+    upper: Array,
+    found_cutter_point: Array,
+    found_q: Array,
+    found_pass: np.ndarray,
+    fixed_q: Array | None,
+    pass_index: np.ndarray,
+) -> str:
+    """Draw the joint angles along the found path beside those with the contact kept at t = 0.
+
+    Args:
+        title: What the picture is called.
+        joint_names: The six joints.
+        lower: Lower limits in [rad], shape (6,).
+        upper: Upper limits in [rad], shape (6,).
+        found_cutter_point: Cutter point of each posture, fractional in between, shape (n,).
+        found_q: The postures in [rad], shape (n, 6).
+        found_pass: Pass of each posture, shape (n,).
+        fixed_q: The contact-fixed posture at each cutter point in [rad], shape (N, 6), or None.
+        pass_index: Pass of each cutter point, 0, 1, ..., shape (N,).
+
+    Returns:
+        The picture as SVG text.
+    """
+    figure = blank_figure(title)
+    panels = figure.subplots(2, 3, sharex=True)
+    points = np.arange(len(pass_index), dtype=float)
+    limits = np.rad2deg(np.stack([lower, upper], axis=-1))
+    limit_seen = False
+    for joint, axes in enumerate(panels.flat):
+        shown = found = np.rad2deg(found_q[:, joint])
+        heading = f"range {np.ptp(found):.1f} deg"
+        if fixed_q is not None:
+            fixed = np.rad2deg(fixed_q[:, joint])
+            shown = np.append(found, fixed)
+            heading += f" (fixed {np.ptp(fixed):.1f} deg)"
+            axes.plot(*broken(pass_index, points, fixed), **FIXED, gid=f"fixed_{joint}")
+        line = broken(found_pass, found_cutter_point, found)
+        axes.plot(*line, **FOUND, gid=f"found_{joint}")
+        limit_seen |= _frame_angles(axes, shown, limits[joint])
+        draw_pass_borders(axes, pass_index)
+        axes.set_title(joint_names[joint], loc="left", fontsize=13, fontweight="bold")
+        axes.set_title(heading, loc="right", fontsize=10.5)
+        axes.set_xlim(-0.5, len(points) - 0.5)
+        axes.xaxis.set_major_locator(MaxNLocator(6, integer=True, min_n_ticks=1))
+        axes.spines[["top", "right"]].set_visible(False)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("joint angle (deg)")
+    for axes in panels[-1]:
+        axes.set_xlabel("cutter point")
+    styles = [FOUND, *([FIXED] if fixed_q is not None else []), *([LIMIT] if limit_seen else [])]
+    legend_below(figure, [Line2D([], [], **style) for style in styles])
+    return svg(figure, title)
+
+
+def _state_colour(code: int) -> tuple[float, float, float]:
+    return to_rgb(STATE_COLOURS[code % len(STATE_COLOURS)])
+
+
+def _percent(share: float) -> str:
+    """Return a share that neither hides a few nodes nor claims all of them."""
+    if 0.0 < share < 0.01:
+        return "< 1 %"
+    return "> 99 %" if 0.99 < share < 1.0 else f"{100.0 * share:.0f} %"
+
+
+def _mark_zones(axes: Axes, flat_end: float, bottom: float, top: float) -> None:
+    """Draw where the flat ends, and name the zones beside the chart."""
+    borders = np.clip([bottom, -flat_end, flat_end, top], bottom, top)
+    beside = axes.get_yaxis_transform()
+    for name, start, end in zip(ZONES, borders[:-1], borders[1:], strict=True):
+        if end > start:
+            axes.text(1.012, (start + end) / 2.0, name, transform=beside, va="center")
+    for end in (-flat_end, flat_end):
+        if bottom < end < top:
+            axes.axhline(end, color=INK, linewidth=1.0, dashes=(5.0, 4.0), zorder=1.6)
+
+
+def _number_passes(axes: Axes, pass_index: np.ndarray) -> None:
+    """Write ``pass 1``, ``pass 2``, ... over the passes, less of it where there is no room."""
+    last = pass_index[-1] + 1
+    middles = np.array([np.flatnonzero(pass_index == k).mean() for k in range(last)])
+    places = (middles + 0.5) / len(pass_index)
+    roomy = np.diff(places, prepend=-1.0).min() >= LABEL_WIDTH
+    above = axes.get_xaxis_transform()
+    taken = -1.0
+    for k, place in enumerate(places):
+        if k == 0 or place - taken >= (LABEL_WIDTH if roomy else NUMBER_WIDTH):
+            text = f"pass {k + 1}" if roomy or k == 0 else f"{k + 1}"
+            axes.text(middles[k], 1.012, text, transform=above, ha="center", va="bottom")
+            taken = place
+
+
+def _frame_angles(axes: Axes, angles: Array, limits: Array) -> bool:
+    """Choose what a panel shows of the angle axis; draw limits that are in it or near.
+
+    Args:
+        axes: The panel.
+        angles: All angles drawn in [deg], shape (n,).
+        limits: Lower and upper limit in [deg], shape (2,).
+
+    Returns:
+        Whether a limit was drawn.
+    """
+    middle = (angles.min() + angles.max()) / 2.0
+    half = max(np.ptp(angles), LEAST_SPAN) / 2.0
+    near = limits[np.abs(limits - middle) <= half * (1.0 + 2.0 * NEAR)]
+    for limit in near:
+        axes.axhline(limit, **LIMIT)
+    ends = np.append(near, [middle - half, middle + half])
+    margin = 0.06 * np.ptp(ends)
+    axes.set_ylim(ends.min() - margin, ends.max() + margin)
+    axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 3, 5, 10]))
+    axes.grid(axis="y", color="#e6eaed", linewidth=0.8)
+    axes.set_axisbelow(True)
+    return bool(len(near))
