@@ -1,0 +1,3 @@
+"""Offline programming for robotic belt grinding."""
+
+__version__ = "0.1.0"

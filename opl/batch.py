@@ -1,0 +1,154 @@
+"""Many jobs in worker processes: one that fails leaves the others alone."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections import Counter
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from opl import documents
+from opl.cell.clearance import use_threads
+from opl.deliver import deliver
+from opl.errors import InputError, NoPathError, OplError, UnsafeError
+from opl.job import load
+from opl.pipeline import run
+from opl.result import reasons, result
+
+BUG = 1  # exit status of a job that ended with an error that is not opl's own
+
+
+@dataclass(frozen=True)
+class Row:
+    """What became of one job of a batch.
+
+    Attributes:
+        job: The job file.
+        status: ``ok``, ``no_path``, ``unsafe``, ``bad input`` or ``error``.
+        exit_status: What ``opl run`` would have ended with.
+        message: Why there is no program; empty if there is one.
+        folder: Where the files lie, None if there are none.
+        result: As in ``result.json``, None if the job was not run to its end.
+    """
+
+    job: Path
+    status: str
+    exit_status: int
+    message: str
+    folder: Path | None
+    result: dict[str, Any] | None
+
+
+def find_jobs(paths: Sequence[Path]) -> list[Path]:
+    """Return the job files named, and for a folder every job file in and below it, sorted.
+
+    In a folder every YAML file counts that speaks of a workpiece, or cannot be read at all.
+
+    Raises:
+        InputError: If a path does not exist or a folder holds no job.
+    """
+    jobs: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(file for file in path.rglob("*") if file.suffix in (".yaml", ".yml"))
+            found = [file for file in inside if _is_job(file)]
+            if not found:
+                raise InputError(str(path), "holds no job file (*.yaml)")
+            jobs += found
+        elif path.exists():
+            jobs.append(path)
+        else:
+            raise InputError(str(path), "no such file or folder")
+    return list(dict.fromkeys(jobs))
+
+
+def _is_job(path: Path) -> bool:
+    try:
+        return "workpiece" in documents.keys(path)
+    except InputError:
+        return True  # it will be told what is wrong with it
+
+
+def run_batch(
+    jobs: Sequence[Path],
+    out: Path,
+    workers: int,
+    done: Callable[[Row], None] = lambda row: None,
+) -> list[Row]:
+    """Run jobs in worker processes.
+
+    Args:
+        jobs: The job files.
+        out: Each job's files go to the folder of its name in here.
+        workers: Number of processes.
+        done: Told each job as it ends.
+
+    Returns:
+        One row per job, in the order of ``jobs``.
+    """
+    rows: dict[Path, Row] = {}
+    clashes = _clashes(jobs)
+    for job in clashes:
+        rows[job] = clashes[job]
+        done(clashes[job])
+    # spawned, not forked: the children of a process with threads would inherit their locks
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_one_thread) as pool:
+        waiting = {pool.submit(_run_one, job, out): job for job in jobs if job not in clashes}
+        for future in as_completed(waiting):
+            job = waiting[future]
+            try:
+                row = future.result()
+            except BrokenProcessPool:
+                row = Row(job, "error", BUG, "a worker process died", None, None)
+            rows[job] = row
+            done(row)
+    return [rows[job] for job in jobs]
+
+
+def _clashes(jobs: Sequence[Path]) -> dict[Path, Row]:
+    """Refuse jobs of one name: each would overwrite the files of the other."""
+    names = {}
+    for job in jobs:
+        try:
+            names[job] = documents.keys(job).get("name")
+        except InputError:
+            continue  # told when it is run
+    counts = Counter(name for name in names.values() if isinstance(name, str))
+    return {
+        job: Row(
+            job, "bad input", InputError.exit_status,
+            f"{job}: name: {name} is the name of {counts[name]} jobs of this batch", None, None,
+        )
+        for job, name in names.items()
+        if isinstance(name, str) and counts[name] > 1
+    }  # fmt: skip
+
+
+def _one_thread() -> None:
+    use_threads(1)  # the processes share the cores
+
+
+def _run_one(path: Path, out: Path) -> Row:
+    try:
+        job = load(path)
+        outcome = run(job)
+        folder = out / job.name
+        deliver(outcome, folder)
+    except OplError as error:
+        status = "bad input" if isinstance(error, InputError) else "error"
+        return Row(path, status, error.exit_status, str(error), None, None)
+    except Exception as error:  # a bug in one job must not take the night's other jobs with it
+        message = f"{type(error).__name__}: {error} (a bug: run it alone to see where)"
+        return Row(path, "error", BUG, message, None, None)
+    exit_status = {
+        "ok": 0,
+        "no_path": NoPathError.exit_status,
+        "unsafe": UnsafeError.exit_status,
+    }[outcome.status]
+    message = "\n".join(reasons(outcome))
+    return Row(path, outcome.status, exit_status, message, folder, result(outcome))

@@ -1,0 +1,193 @@
+"""The command line: arguments, printing, files and exit statuses."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from opl import __version__
+from opl import batch as batch_jobs
+from opl.cell.robot import known_robots, load_robot
+from opl.console import progress_bar, show_batch, show_check, show_outcome, show_robots
+from opl.deliver import deliver
+from opl.errors import InputError, OplError, UnsafeError
+from opl.job import JobFile, Method, load
+from opl.pipeline import Outcome, cutter_points, run
+from opl.resources import folder as resource
+from opl.result import reasons, render
+
+FILE = click.Path(dir_okay=False, path_type=Path)
+ANY = click.Path(path_type=Path)
+
+
+class _Group(click.Group):
+    """Shows opl's own errors as one message and ends with their exit status."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except OplError as error:
+            click.echo(f"error: {error}", err=True)
+            sys.exit(error.exit_status)
+
+
+@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="opl")
+def main() -> None:
+    """Offline programming for robotic belt grinding.
+
+    A job in YAML becomes a robot program that is proven free of collision, or the reason why it
+    cannot be.
+
+    Example: opl run workpieces/v_shape/job.yaml
+    """
+
+
+@main.command("run")
+@click.argument("job", type=FILE)
+@click.option("--out", type=ANY, help="Folder for the files; default ./out/<job name>.")
+@click.option(
+    "--method",
+    type=click.Choice([method.value for method in Method]),
+    help="Search; default as in the job.",
+)
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@click.option("-v", "--verbose", is_flag=True, help="Print the time of each stage too.")
+@click.option("--json", "as_json", is_flag=True, help="Print result.json instead of tables.")
+def run_job(
+    job: Path, out: Path | None, method: str | None, quiet: bool, verbose: bool, as_json: bool
+) -> None:
+    """Plan, prove and write the program of one job.
+
+    Example: opl run workpieces/v_shape/job.yaml --out programs
+    """
+    loaded = load(job, method)
+    with progress_bar(quiet or as_json) as watch:
+        outcome = run(loaded, watch)
+    written = deliver(outcome, out or Path("out") / loaded.name)
+    if as_json:
+        click.echo(render(outcome), nl=False)
+    elif not quiet:
+        show_outcome(outcome, written, verbose)
+    if outcome.status != "ok":
+        raise _refusal(outcome)
+
+
+def _refusal(outcome: Outcome) -> OplError:
+    """Return the error that a run without a program ends with."""
+    if outcome.refusal is not None:
+        return outcome.refusal
+    lines = ["planned, but not proven safe; no program was written", *reasons(outcome)]
+    return UnsafeError("\n".join(lines))
+
+
+@main.command()
+@click.argument("job", type=FILE)
+@click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
+def check(job: Path, as_json: bool) -> None:
+    """Validate a job and print what would be done, without planning.
+
+    Example: opl check workpieces/v_shape/job.yaml
+    """
+    loaded = load(job)
+    points = cutter_points(loaded)
+    if as_json:
+        figures = {
+            "job": loaded.name,
+            "robot": loaded.cell.robot.name,
+            "cutter_points": len(points),
+            "passes": points.n_passes,
+            "contact_positions": loaded.n_contact_positions,
+        }
+        click.echo(json.dumps(figures, indent=2))
+    else:
+        show_check(loaded, len(points), points.n_passes)
+
+
+@main.command()
+@click.argument("paths", type=ANY, nargs=-1, required=True)
+@click.option("--out", type=ANY, default=Path("out"), help="Folder for the jobs' folders.")
+@click.option("--workers", type=click.IntRange(min=1), help="Processes; default one per core.")
+@click.option("-q", "--quiet", is_flag=True, help="Print the last table only.")
+@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON.")
+def batch(
+    paths: tuple[Path, ...], out: Path, workers: int | None, quiet: bool, as_json: bool
+) -> None:
+    """Run many jobs in worker processes; a folder means every job file in it.
+
+    Ends with a table, and with a status other than 0 if any job failed.
+
+    Example: opl batch workpieces --out programs --workers 2
+    """
+    jobs = batch_jobs.find_jobs(paths)
+    count = min(workers or os.cpu_count() or 1, len(jobs))
+
+    def done(row: batch_jobs.Row) -> None:
+        if not (quiet or as_json):
+            click.echo(f"{row.status}: {row.job}", err=True)
+
+    rows = batch_jobs.run_batch(jobs, out, count, done)
+    if as_json:
+        told = [
+            {
+                "job": str(row.job),
+                "status": row.status,
+                "message": row.message,
+                "result": row.result,
+            }
+            for row in rows
+        ]
+        click.echo(json.dumps(told, indent=2))
+    else:
+        show_batch(rows)
+    sys.exit(max(row.exit_status for row in rows))
+
+
+@main.command()
+@click.argument("directory", type=ANY)
+def init(directory: Path) -> None:
+    """Start a job: copy the V-shaped example to a new folder, to be changed.
+
+    Example: opl init my_part
+    """
+    if directory.exists():
+        raise InputError(str(directory), "exists already; name a new folder")
+    shutil.copytree(resource("workpieces") / "v_shape", directory)
+    click.echo(f"wrote {directory / 'job.yaml'} and the files it names; next: opl check")
+
+
+@main.command()
+def schema() -> None:
+    """Print the JSON schema of job files, for editors that check YAML while one types.
+
+    Example: opl schema > job.schema.json
+    """
+    click.echo(json.dumps(JobFile.model_json_schema(), indent=2))
+
+
+@main.command()
+@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
+def robots(as_json: bool) -> None:
+    """List the robots that come with opl.
+
+    Example: opl robots
+    """
+    known = [load_robot(name) for name in known_robots()]
+    if as_json:
+        told = [
+            {
+                "name": robot.name,
+                "title": robot.title,
+                "unverified_pulse_ratios": list(robot.unverified_pulses),
+            }
+            for robot in known
+        ]
+        click.echo(json.dumps(told, indent=2))
+    else:
+        show_robots(known)

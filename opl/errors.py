@@ -1,0 +1,53 @@
+"""Everything opl refuses to do, as one small tree of exceptions.
+
+The command line prints ``str(error)`` on one line and ends with ``error.exit_status``; no other
+module knows of exit statuses. Anything that is not an `OplError` is a bug and shows its traceback.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class OplError(Exception):
+    """Root of all errors that a user can cause or has to be told of."""
+
+    exit_status = 1
+
+
+class InputError(OplError):
+    """An input file or value is unusable.
+
+    Args:
+        where: File, and the key path in it where there is one, e.g. ``job.yaml: wheel.width_mm``.
+        message: The value seen and the values allowed.
+    """
+
+    exit_status = 2
+
+    def __init__(self, where: str, message: str) -> None:
+        super().__init__(f"{where}: {message}" if where else message)
+        self.where = where
+        self.message = message
+
+
+class NoPathError(OplError):
+    """No track satisfies reach, limits, continuity and freedom from collision.
+
+    Args:
+        message: What stops the path, and where.
+        reasons: One line for each run of cutter points that cannot be passed.
+    """
+
+    exit_status = 3
+
+    def __init__(self, message: str, reasons: Sequence[str] = ()) -> None:
+        super().__init__("\n".join([message, *reasons]))
+        self.message = message
+        self.reasons = tuple(reasons)
+
+
+class UnsafeError(OplError):
+    """A motion was planned but could not be proven safe, so no program was written."""
+
+    exit_status = 4

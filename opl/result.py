@@ -1,0 +1,117 @@
+"""``result.json``: what became of a job, for other programs. Its keys are stable."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from opl.cell.inverse import branch_name
+from opl.pipeline import Outcome
+from opl.planning.plan import Plan
+
+MM = 1e3
+
+
+def result(outcome: Outcome) -> dict[str, Any]:
+    """Return the result of a run; null stands for what was not computed."""
+    points, robot = outcome.points, outcome.job.cell.robot
+    return {
+        "status": outcome.status,
+        "job": outcome.job.name,
+        "robot": {"name": robot.name, "unverified_pulse_ratios": list(robot.unverified_pulses)},
+        "cutter_points": None if points is None else len(points),
+        "passes": None if points is None else points.n_passes,
+        "reasons": reasons(outcome),
+        "fixed": _fixed(outcome),
+        "path": _path(outcome, outcome.plan),
+        "paper_start": _path(outcome, outcome.paper_start),
+        "verification": _verification(outcome),
+        "program": _program(outcome),
+        "seconds": {stage: round(spent, 4) for stage, spent in _seconds(outcome).items()},
+    }
+
+
+def render(outcome: Outcome) -> str:
+    """Return the text of ``result.json``."""
+    return json.dumps(result(outcome), indent=2) + "\n"
+
+
+def reasons(outcome: Outcome) -> list[str]:
+    """Return why there is no program, one line each; empty if there is one."""
+    if outcome.refusal is not None:
+        return [outcome.refusal.message, *outcome.refusal.reasons]
+    if outcome.verification is not None:
+        return [str(finding) for finding in outcome.verification.findings]
+    return []
+
+
+def search_seconds(outcome: Outcome) -> float:
+    """Return the time of the search with its collision checks, clearance layer included, in [s]."""
+    return outcome.seconds.get("clearance", 0.0) + outcome.seconds.get("search", 0.0)
+
+
+def _seconds(outcome: Outcome) -> dict[str, float]:
+    return {**outcome.seconds, "total": sum(outcome.seconds.values())}
+
+
+def _fixed(outcome: Outcome) -> dict[str, Any] | None:
+    fixed = outcome.fixed
+    if fixed is None:
+        return None
+    ranges = fixed.joint_ranges
+    return {
+        "joint_ranges_rad": None if ranges is None else _rounded(ranges),
+        "joint_range_sum_rad": None if ranges is None else _rounded(ranges.sum()),
+        "feasible": fixed.feasible,
+        "reason": fixed.reason,
+    }
+
+
+def _path(outcome: Outcome, plan: Plan | None) -> dict[str, Any] | None:
+    if plan is None:
+        return None
+    path = plan.path
+    return {
+        "method": outcome.job.method.value,
+        "branch": branch_name(path.branch),
+        "joint_ranges_rad": _rounded(path.joint_ranges),
+        "joint_range_sum_rad": _rounded(path.joint_range_sum),
+        "joint_travel_rad": _rounded(path.joint_travel),
+        "contact_travel": _rounded(path.contact_travel),
+        "nodes": len(path.q) - path.n_intermediate,
+        "intermediate_nodes": path.n_intermediate,
+        "lower_bound_rad": None,
+        "gap": None,
+    }
+
+
+def _verification(outcome: Outcome) -> dict[str, Any] | None:
+    found = outcome.verification
+    if found is None:
+        return None
+    return {
+        "engine": found.engine,
+        "poses": found.poses,
+        "collisions": found.collisions,
+        "min_clearance_mm": round(found.min_clearance * MM, 3),
+        "max_contact_error_mm": round(found.max_contact_error * MM, 4),
+        "limit_violations": found.limit_violations,
+    }
+
+
+def _program(outcome: Outcome) -> dict[str, Any] | None:
+    if outcome.program is None or outcome.verification is None:
+        return None
+    verified = outcome.verification.verified
+    assert verified is not None
+    return {
+        "files": list(outcome.files),
+        "moves": len(outcome.program.moves),
+        "duration_s": round(float(verified.motion.duration.sum()), 3),
+    }
+
+
+def _rounded(value: Any) -> Any:
+    return np.round(value, 6).tolist()
