@@ -5,7 +5,7 @@ import pytest
 from surfaces import cylinder_patch, graph, plane_patch, sphere_patch
 
 from opl.geometry.frames import inverse, rotation_angle
-from opl.geometry.nurbs import DegenerateNormalError, load_surface
+from opl.geometry.nurbs import DegenerateNormalError, NurbsSurface, load_surface
 from opl.geometry.toolpath import CutterPoints, equal_section_passes
 from opl.resources import folder
 
@@ -72,7 +72,10 @@ def test_the_v_part_is_travelled_towards_plus_y_with_the_frames_of_its_profile()
     turn = rotation_angle(Ts[first][:1], Ts[first][-1:])
     np.testing.assert_allclose(turn, 2.0 * 1.132, atol=1e-9)
     length = 2.0 * (46.843 + 1.132 * 61.774)
-    assert 1e3 * points.arc_length.max() == pytest.approx(length, abs=1e-6)
+    for row in range(5):
+        arc_length = points.arc_length[points.pass_index == row]
+        assert arc_length[0] == 0.0
+        assert 1e3 * arc_length[-1] == pytest.approx(length, abs=1e-6)
 
 
 def test_five_rows_of_the_v_part_take_well_under_half_a_second():
@@ -114,6 +117,8 @@ def test_a_flat_part_takes_the_largest_step():
     points = passes(surface, Y, pitch=10e-3, margin=5e-3, largest_step=4e-3)
     assert points.n_passes == 3
     np.testing.assert_allclose(points.arc_length[:11], np.arange(11) * 4e-3, atol=1e-9)
+    for n in range(1, 30):  # no sliver of a step where rounding leaves one
+        assert len(passes(surface, Y, rows=1, largest_step=0.04 / n)) == n + 1
     points = passes(surface, Y, rows=1, largest_step=1.0)
     np.testing.assert_allclose(points.arc_length, [0.0, 0.04], atol=1e-12)
 
@@ -312,3 +317,38 @@ def test_cutter_points_refuse_passes_that_do_not_count_up(pass_index):
 def test_cutter_points_refuse_arrays_of_different_length():
     with pytest.raises(ValueError, match="shapes must be"):
         CutterPoints(np.tile(np.eye(4), (3, 1, 1)), [0, 0], np.zeros(3))
+
+
+def test_a_folded_surface_is_refused_and_the_place_named():
+    net = np.array(
+        [
+            [[0.0, y, z], [0.06, y, z], [-0.03, y, 2 * z], [0.03, y, z]]
+            for y, z in ((0.0, 0.0), (0.03, 0.01))
+        ]
+    ).transpose(1, 0, 2)
+    knots = np.repeat([0.0, 1.0], [4, 4])
+    folded = NurbsSurface(3, 1, knots, np.array([0.0, 0.0, 1.0, 1.0]), net, np.ones((4, 2)))
+    with pytest.raises(ValueError, match=r"cannot be followed near \(|no normal at"):
+        passes(folded, Y, rows=1)
+
+
+def test_a_pass_round_a_closed_cylinder_ends_where_it_began():
+    weights = np.array([1.0, np.sqrt(0.5)] * 4 + [1.0])
+    angles = 0.25 * np.pi * np.arange(9)
+    circle = 0.03 * np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], 1) / weights[:, None]
+    knots = np.array([0.0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4])
+    surface = NurbsSurface(
+        2,
+        1,
+        knots,
+        np.array([0.0, 0.0, 1.0, 1.0]),
+        np.stack([circle, circle + 0.05 * Z], axis=1),
+        np.stack([weights, weights], axis=1),
+    )
+    points = passes(surface, Z, pitch=20e-3, margin=5e-3)
+    assert points.n_passes == 3
+    for row in range(3):
+        here = points.pass_index == row
+        first, last = points.Ts_workpiece_cutter[here][[0, -1]]
+        np.testing.assert_allclose(first, last, atol=1e-9)
+        assert points.arc_length[here][-1] == pytest.approx(2.0 * np.pi * 0.03, abs=1e-9)

@@ -11,8 +11,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from opl.errors import InputError
-
-Array = NDArray[np.float64]
+from opl.geometry.frames import Array
 
 _METRES = {"mm": 1e-3, "m": 1.0}
 _SUFFIXES = (".stl", ".ply", ".obj")

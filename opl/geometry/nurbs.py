@@ -11,14 +11,12 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 from scipy.interpolate import NdBSpline
 
 from opl import documents
 from opl.errors import InputError
-
-Array = NDArray[np.float64]
+from opl.geometry.frames import Array
 
 # du x dv below this fraction of its average over the surface is taken for zero
 _DEGENERATE_AREA = 1e-9

@@ -12,22 +12,17 @@ from typing import cast
 
 import numpy as np
 from contourpy import LineType, contour_generator
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
-from scipy.optimize import minimize
 
-from opl.geometry.frames import from_axes
+from opl.geometry.frames import Array, from_axes
 from opl.geometry.nurbs import NurbsSurface
+from opl.geometry.surface_grid import SurfaceGrid
 
-Array = NDArray[np.float64]
-
-# points of a curve lie this near to their plane [m]; on the surface they lie exactly
+# points of a curve lie this near to their plane [m], on the surface they lie exactly; the search
+# for them ends well below
 _ON_PLANE = 1e-9
+_CONVERGED = 1e-12
 _MAX_NEWTON_STEPS = 60
-
-# lines of the parameter grid in each knot span, and about how many there may be in all
-_LINES_PER_SPAN = 16
-_MAX_LINES = 256
 
 # sine of the angle between surface and plane below which they touch rather than cut
 _TOUCHING = 1e-6
@@ -104,7 +99,7 @@ class Section:
             # the pseudo-inverse, as the matrix may be singular at a guess
             step = np.linalg.pinv(jacobian) @ residuals[..., None]
             previous, uv = uv, np.clip(uv - step[..., 0], lower, upper)
-            if np.all(np.abs(uv - previous) <= 1e-14 * (upper - lower)):
+            if np.all(np.abs(uv - previous) <= _CONVERGED * (upper - lower)):
                 break
         distance = np.abs(self.surface.point(uv) @ self.plane_normal - self.offset)
         if (distance > _ON_PLANE).any():
@@ -149,65 +144,6 @@ class SectionCurve:
         targets, tangents = self.positions(arc_length), self.positions(arc_length, nu=1)
         uv[inner] = self.section.closest(uv[inner], targets[inner], tangents[inner])
         return self.section.frames(uv)
-
-
-@dataclass(frozen=True, eq=False)
-class SurfaceGrid:
-    """Points of a surface on lines of its parameters, all knots among them.
-
-    Attributes:
-        u: Parameters of the lines, shape (n,).
-        v: Parameters of the lines, shape (m,).
-        points: Points in [m], shape (n, m, 3).
-    """
-
-    u: Array
-    v: Array
-    points: Array
-
-
-def sample_grid(surface: NurbsSurface) -> SurfaceGrid:
-    """Return a grid fine enough to tell the curves of a plane apart on any ordinary surface."""
-    (u0, v0), (u1, v1) = surface.domain
-    u = _lines(np.clip(surface.knots_u, u0, u1), surface.degree_u)
-    v = _lines(np.clip(surface.knots_v, v0, v1), surface.degree_v)
-    return SurfaceGrid(u, v, surface.point(np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1)))
-
-
-def _lines(knots: Array, degree: int) -> Array:
-    knots = np.unique(knots)
-    n_spans = len(knots) - 1
-    n = max(2 * degree, min(_LINES_PER_SPAN, _MAX_LINES // n_spans))
-    inner = knots[:-1, None] + np.diff(knots)[:, None] * np.arange(n) / n
-    return np.append(inner.ravel(), knots[-1])
-
-
-def extent_along(surface: NurbsSurface, grid: SurfaceGrid, direction: Array) -> tuple[float, float]:
-    """Return the least and the largest d . S(u, v) in [m] over a surface.
-
-    Args:
-        surface: The surface.
-        grid: Its grid, where the search starts.
-        direction: Unit direction d, shape (3,).
-    """
-    lower, upper = surface.domain
-
-    def extreme(sign: float) -> float:
-        heights = sign * (grid.points @ direction)
-        i, j = np.unravel_index(np.argmin(heights), heights.shape)
-        scale = float(np.ptp(heights)) or 1.0
-
-        def height(uv: Array) -> tuple[float, Array]:
-            S = surface.derivatives(np.clip(uv, lower, upper), 1)
-            value = S @ direction * (sign / scale)
-            return value[0, 0], np.array([value[1, 0], value[0, 1]])
-
-        start = np.array([grid.u[i], grid.v[j]])
-        bounds = list(zip(lower, upper, strict=True))
-        best = minimize(height, start, jac=True, bounds=bounds, tol=1e-15)
-        return sign * min(float(heights[i, j]), scale * float(best.fun))
-
-    return extreme(1.0), extreme(-1.0)
 
 
 def section_curves(section: Section, grid: SurfaceGrid, tolerance: float) -> list[SectionCurve]:
@@ -266,22 +202,22 @@ def _crossings(section: Section, grid: SurfaceGrid, line: Array) -> Array:
         return S[:, 0, 0] @ section.plane_normal - section.offset, slopes
 
     x, left, right = uv[each, free], low[each, free], high[each, free]
-    left_height, right_height = height(left)[0], height(right)[0]
-    # a crossing of two grid lines may be the root but for a rounding error: no change of sign
-    for end, end_height in ((left, left_height), (right, right_height)):
-        x = np.where(np.abs(end_height) <= _ON_PLANE, end, x)
-    at_end = np.minimum(np.abs(left_height), np.abs(right_height)) <= _ON_PLANE
-    left, right = np.where(at_end, x, left), np.where(at_end, x, right)
+    left_height = height(left)[0]
+    # where two grid lines meet may be the root but for a rounding error: no change of sign
+    end = np.where(x - left < right - x, left, right)
+    at_end = np.abs(height(end)[0]) <= _ON_PLANE
+    x, left, right = (np.where(at_end, end, values) for values in (x, left, right))
     for _ in range(_MAX_NEWTON_STEPS):
         heights, slopes = height(x)
+        searching = np.abs(heights) > _CONVERGED
+        if not searching.any():
+            break
         on_left = heights * left_height > 0.0
         left, right = np.where(on_left, x, left), np.where(on_left, right, x)
         with np.errstate(divide="ignore", invalid="ignore"):
             newton = x - heights / slopes
         inside = (newton > left) & (newton < right)
-        previous, x = x, np.where(inside, newton, 0.5 * (left + right))
-        if np.all(np.abs(x - previous) <= 1e-15 * np.abs(x)):
-            break
+        x = np.where(searching, np.where(inside, newton, 0.5 * (left + right)), x)
     # a plane sought just inside the border may not cross it at all
     uv = uv[np.abs(height(x)[0]) <= _ON_PLANE]
     chords = np.linalg.norm(np.diff(section.surface.point(uv), axis=0), axis=1)

@@ -1,8 +1,6 @@
 """Cutter points of a surface by the equal-section method.
 
-Parallel planes one row pitch apart cut the surface into curves; along each curve the step follows
-the curvature so that the bow height, the largest distance of the curve from its chord, stays within
-a tolerance.
+Parallel planes one row pitch apart cut the surface into curves; each curve is a pass.
 """
 
 from __future__ import annotations
@@ -12,22 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from opl.geometry.frames import Array
 from opl.geometry.nurbs import NurbsSurface
-from opl.geometry.sections import Section, SectionCurve, extent_along, sample_grid, section_curves
-
-Array = NDArray[np.float64]
-
-# a bow is measured at its curve's own nodes and at this many more points; the largest distance may
-# lie between two of them and be larger by the fraction 1 / n^2 of a parabola
-_BOW_SAMPLES = 32
-_BOW_FRACTIONS = np.linspace(0.0, 1.0, _BOW_SAMPLES + 1)
-_MEASURED = 1.0 - 1.0 / _BOW_SAMPLES**2
+from opl.geometry.sections import Section, section_curves
+from opl.geometry.steps import balanced_steps
+from opl.geometry.surface_grid import extent_along, sample_grid
 
 # error of the interpolated curve as a fraction of the bow height
 _CURVE_ERROR = 1e-3
-
-# halvings of the interval in which the least size of n steps is sought
-_BALANCING_ROUNDS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +130,7 @@ def equal_section_passes(
             )
         backwards = zigzag and row % 2 == 1
         for curve in reversed(curves) if backwards else curves:
-            nodes = _balanced_steps(curve, max_bow_height, largest_step)
+            nodes = balanced_steps(curve, max_bow_height, largest_step)
             Ts_pass = curve.frames(nodes)
             Ts.append(Ts_pass[::-1] if backwards else Ts_pass)
             arc_lengths.append((curve.length - nodes)[::-1] if backwards else nodes)
@@ -164,72 +154,3 @@ def _row_offsets(low: float, high: float, pitch: float, margin: float, rows: int
         )
     n = n_fitting if rows is None else rows
     return 0.5 * (low + high) + pitch * (np.arange(n, dtype=np.float64) - 0.5 * (n - 1))
-
-
-def _balanced_steps(curve: SectionCurve, max_bow_height: float, largest_step: float) -> Array:
-    """Return the arc lengths of the fewest points that keep both limits, shape (k,).
-
-    The longest possible steps give the number; then the least scale of the two limits that still
-    gives this number spreads what would be left over evenly.
-    """
-    best = _longest_steps(curve, max_bow_height, largest_step)
-    n = len(best) - 1
-    # n - 1 steps of full length fall short of the end, so n steps this much shorter do as well
-    low, high = (n - 1) / n, 1.0
-    for _ in range(_BALANCING_ROUNDS):
-        scale = 0.5 * (low + high)
-        nodes = _longest_steps(curve, scale**2 * max_bow_height, scale * largest_step)
-        if len(nodes) <= len(best):
-            best, high = nodes, scale
-        else:
-            low = scale
-    return best
-
-
-def _longest_steps(curve: SectionCurve, max_bow_height: float, largest_step: float) -> Array:
-    """Return the arc lengths of points along a curve, each as far from the last as it may be."""
-    nodes = [0.0]
-    while nodes[-1] < curve.length:
-        start = nodes[-1]
-        end = min(start + largest_step, curve.length)
-        nodes.append(_farthest(curve, start, end, _MEASURED * max_bow_height))
-    return np.array(nodes)
-
-
-def _farthest(curve: SectionCurve, start: float, end: float, max_bow_height: float) -> float:
-    """Return the end of a step from ``start``, at ``end`` or where the bow height is reached.
-
-    The bow grows as the square of the step, so its root is sought: a line on a circle. The bracket
-    is kept by halving where the line does not narrow it.
-    """
-    size = np.sqrt(_bow_height(curve, start, end) / max_bow_height)
-    if size <= 1.0:
-        return end
-    near, far = start, end
-    near_size, far_size = 0.0, size
-    for attempt in range(60):
-        # aim a hair below: a step that comes this near needs no better one
-        fraction = (0.9998 - near_size) / (far_size - near_size) if attempt % 3 < 2 else 0.5
-        middle = near + fraction * (far - near)
-        size = np.sqrt(_bow_height(curve, start, middle) / max_bow_height)
-        if size <= 1.0:
-            near, near_size = middle, size
-            if size >= 0.9995:
-                break
-        else:
-            far, far_size = middle, size
-    return near
-
-
-def _bow_height(curve: SectionCurve, start: float, end: float) -> float:
-    """Return the largest distance in [m] of a curve from its chord, measured."""
-    nodes = curve.arc_length
-    inside = nodes[nodes.searchsorted(start) : nodes.searchsorted(end)]
-    points = curve.positions(np.concatenate([start + (end - start) * _BOW_FRACTIONS, inside]))
-    points -= points[0]
-    chord = points[_BOW_SAMPLES]
-    # a closed curve may come back to where it started: no chord to divide by
-    square = max(float(chord @ chord), np.finfo(float).tiny)
-    fraction = np.minimum(np.maximum(points @ chord / square, 0.0), 1.0)
-    away = points - fraction[:, None] * chord
-    return float(np.sqrt(np.einsum("ij,ij->i", away, away).max()))
