@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from opl.job import load
 from opl.pipeline import run
 from opl.result import reasons, result
 
+JOB_KEYS = {"workpiece", "wheel", "passes"}  # a YAML file that speaks of one of these is a job
 BUG = 1  # exit status of a job that ended with an error that is not opl's own
 
 
@@ -46,7 +46,8 @@ class Row:
 def find_jobs(paths: Sequence[Path]) -> list[Path]:
     """Return the job files named, and for a folder every job file in and below it, sorted.
 
-    In a folder every YAML file counts that speaks of a workpiece, or cannot be read at all.
+    In a folder every YAML file counts that has a key of `JOB_KEYS`, or cannot be read at all;
+    hidden files and folders do not. A file that is named twice counts once.
 
     Raises:
         InputError: If a path does not exist or a folder holds no job.
@@ -54,8 +55,7 @@ def find_jobs(paths: Sequence[Path]) -> list[Path]:
     jobs: list[Path] = []
     for path in paths:
         if path.is_dir():
-            inside = sorted(file for file in path.rglob("*") if file.suffix in (".yaml", ".yml"))
-            found = [file for file in inside if _is_job(file)]
+            found = [file for file in sorted(path.rglob("*.y*ml")) if _is_job(file, path)]
             if not found:
                 raise InputError(str(path), "holds no job file (*.yaml)")
             jobs += found
@@ -63,12 +63,18 @@ def find_jobs(paths: Sequence[Path]) -> list[Path]:
             jobs.append(path)
         else:
             raise InputError(str(path), "no such file or folder")
-    return list(dict.fromkeys(jobs))
+    unique: dict[Path, Path] = {}
+    for job in jobs:
+        unique.setdefault(job.resolve(), job)
+    return list(unique.values())
 
 
-def _is_job(path: Path) -> bool:
+def _is_job(path: Path, folder: Path) -> bool:
+    hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
+    if hidden or path.suffix not in (".yaml", ".yml") or not path.is_file():
+        return False
     try:
-        return "workpiece" in documents.keys(path)
+        return not JOB_KEYS.isdisjoint(documents.keys(path))
     except InputError:
         return True  # it will be told what is wrong with it
 
@@ -90,43 +96,55 @@ def run_batch(
     Returns:
         One row per job, in the order of ``jobs``.
     """
-    rows: dict[Path, Row] = {}
-    clashes = _clashes(jobs)
-    for job in clashes:
-        rows[job] = clashes[job]
-        done(clashes[job])
+    rows = _clashes(jobs)
+    for row in rows.values():
+        done(row)
+    for row in _rows([job for job in jobs if job not in rows], out, workers):
+        rows[row.job] = row
+        done(row)
+    return [rows[job] for job in jobs]
+
+
+def _rows(jobs: Sequence[Path], out: Path, workers: int) -> Iterator[Row]:
+    """Yield the row of each job as it ends."""
+    bereft = []
+    with _pool(workers) as pool:
+        waiting = {pool.submit(_run_one, job, out): job for job in jobs}
+        for future in as_completed(waiting):
+            try:
+                yield future.result()
+            except BrokenProcessPool:
+                bereft.append(waiting[future])
+    # a worker that dies takes the pool with it; whose fault it was shows when each has its own
+    for job in bereft:
+        with _pool(1) as pool:
+            try:
+                yield pool.submit(_run_one, job, out).result()
+            except BrokenProcessPool:
+                yield Row(job, "error", BUG, f"{job}: its worker process died", None, None)
+
+
+def _pool(workers: int) -> ProcessPoolExecutor:
     # spawned, not forked: the children of a process with threads would inherit their locks
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_one_thread) as pool:
-        waiting = {pool.submit(_run_one, job, out): job for job in jobs if job not in clashes}
-        for future in as_completed(waiting):
-            job = waiting[future]
-            try:
-                row = future.result()
-            except BrokenProcessPool:
-                row = Row(job, "error", BUG, "a worker process died", None, None)
-            rows[job] = row
-            done(row)
-    return [rows[job] for job in jobs]
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_one_thread)
 
 
 def _clashes(jobs: Sequence[Path]) -> dict[Path, Row]:
     """Refuse jobs of one name: each would overwrite the files of the other."""
-    names = {}
+    by_name: dict[str, list[Path]] = {}
     for job in jobs:
         try:
-            names[job] = documents.keys(job).get("name")
-        except InputError:
+            by_name.setdefault(str(documents.keys(job)["name"]), []).append(job)
+        except (InputError, KeyError):
             continue  # told when it is run
-    counts = Counter(name for name in names.values() if isinstance(name, str))
-    return {
-        job: Row(
-            job, "bad input", InputError.exit_status,
-            f"{job}: name: {name} is the name of {counts[name]} jobs of this batch", None, None,
-        )
-        for job, name in names.items()
-        if isinstance(name, str) and counts[name] > 1
-    }  # fmt: skip
+    rows = {}
+    for name, sharers in by_name.items():
+        for job in sharers if len(sharers) > 1 else ():
+            others = ", ".join(str(other) for other in sharers if other is not job)
+            message = f"{job}: name: must be another for each job, {name} is also that of {others}"
+            rows[job] = Row(job, "bad input", InputError.exit_status, message, None, None)
+    return rows
 
 
 def _one_thread() -> None:

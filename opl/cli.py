@@ -13,17 +13,19 @@ import click
 
 from opl import __version__
 from opl import batch as batch_jobs
-from opl.cell.robot import known_robots, load_robot
-from opl.console import progress_bar, show_batch, show_check, show_outcome, show_robots
-from opl.deliver import deliver
+from opl.cli_programs import robots, show, templates
+from opl.console import progress_bar, show_batch, show_check, show_outcome
+from opl.deliver import check_folder, deliver
 from opl.errors import InputError, OplError, UnsafeError
-from opl.job import JobFile, Method, load
-from opl.pipeline import Outcome, cutter_points, run
+from opl.job import JobFile, load
+from opl.job_search import Method
+from opl.outcome import Outcome
+from opl.pipeline import cutter_points, run
 from opl.resources import folder as resource
 from opl.result import reasons, render
 
-FILE = click.Path(dir_okay=False, path_type=Path)
-ANY = click.Path(path_type=Path)
+# what cannot be read is told in one voice, by those who read it
+ANY = click.Path(path_type=Path, readable=False)
 
 
 class _Group(click.Group):
@@ -33,7 +35,7 @@ class _Group(click.Group):
         try:
             return super().invoke(ctx)
         except OplError as error:
-            click.echo(f"error: {error}", err=True)
+            click.echo("error: " + str(error).replace("\n", "\n  "), err=True)
             sys.exit(error.exit_status)
 
 
@@ -50,7 +52,7 @@ def main() -> None:
 
 
 @main.command("run")
-@click.argument("job", type=FILE)
+@click.argument("job", type=ANY)
 @click.option("--out", type=ANY, help="Folder for the files; default ./out/<job name>.")
 @click.option(
     "--method",
@@ -68,9 +70,11 @@ def run_job(
     Example: opl run workpieces/v_shape/job.yaml --out programs
     """
     loaded = load(job, method)
+    folder = out or Path("out") / loaded.name
+    check_folder(folder)
     with progress_bar(quiet or as_json) as watch:
         outcome = run(loaded, watch)
-    written = deliver(outcome, out or Path("out") / loaded.name)
+    written = deliver(outcome, folder)
     if as_json:
         click.echo(render(outcome), nl=False)
     elif not quiet:
@@ -88,7 +92,7 @@ def _refusal(outcome: Outcome) -> OplError:
 
 
 @main.command()
-@click.argument("job", type=FILE)
+@click.argument("job", type=ANY)
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def check(job: Path, as_json: bool) -> None:
     """Validate a job and print what would be done, without planning.
@@ -103,7 +107,7 @@ def check(job: Path, as_json: bool) -> None:
             "robot": loaded.cell.robot.name,
             "cutter_points": len(points),
             "passes": points.n_passes,
-            "contact_positions": loaded.n_contact_positions,
+            "contact_positions": loaded.search.n_contact_positions,
         }
         click.echo(json.dumps(figures, indent=2))
     else:
@@ -126,6 +130,7 @@ def batch(
     Example: opl batch workpieces --out programs --workers 2
     """
     jobs = batch_jobs.find_jobs(paths)
+    check_folder(out)
     count = min(workers or os.cpu_count() or 1, len(jobs))
 
     def done(row: batch_jobs.Row) -> None:
@@ -138,6 +143,8 @@ def batch(
             {
                 "job": str(row.job),
                 "status": row.status,
+                "exit_status": row.exit_status,
+                "folder": None if row.folder is None else str(row.folder),
                 "message": row.message,
                 "result": row.result,
             }
@@ -158,8 +165,12 @@ def init(directory: Path) -> None:
     """
     if directory.exists():
         raise InputError(str(directory), "exists already; name a new folder")
-    shutil.copytree(resource("workpieces") / "v_shape", directory)
-    click.echo(f"wrote {directory / 'job.yaml'} and the files it names; next: opl check")
+    check_folder(directory)
+    shutil.copytree(
+        resource("workpieces") / "v_shape", directory, ignore=shutil.ignore_patterns("__pycache__")
+    )
+    job = directory / "job.yaml"
+    click.echo(f"wrote {job} and the files it names; next: opl check {job}")
 
 
 @main.command()
@@ -171,23 +182,5 @@ def schema() -> None:
     click.echo(json.dumps(JobFile.model_json_schema(), indent=2))
 
 
-@main.command()
-@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
-def robots(as_json: bool) -> None:
-    """List the robots that come with opl.
-
-    Example: opl robots
-    """
-    known = [load_robot(name) for name in known_robots()]
-    if as_json:
-        told = [
-            {
-                "name": robot.name,
-                "title": robot.title,
-                "unverified_pulse_ratios": list(robot.unverified_pulses),
-            }
-            for robot in known
-        ]
-        click.echo(json.dumps(told, indent=2))
-    else:
-        show_robots(known)
+for _command in (robots, show, templates):
+    main.add_command(_command)

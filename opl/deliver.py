@@ -9,10 +9,25 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from opl.errors import InputError
-from opl.pipeline import Outcome
+from opl.outcome import Outcome
 from opl.result import render
 
 RESULT = "result.json"
+
+
+def check_folder(folder: Path) -> None:
+    """See before the work whether its files can be written; makes nothing.
+
+    Raises:
+        InputError: If the folder is something else, or cannot be made or written to.
+    """
+    existing = folder.absolute()
+    while not os.path.lexists(existing):
+        existing = existing.parent
+    if not existing.is_dir():
+        raise InputError(str(existing), "must be a folder for the files, is something else")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise InputError(str(existing), "is a folder that cannot be written to")
 
 
 def deliver(outcome: Outcome, folder: Path) -> list[Path]:
@@ -26,10 +41,10 @@ def deliver(outcome: Outcome, folder: Path) -> list[Path]:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        earlier = _files_of_earlier_run(folder)
-        (folder / RESULT).unlink(missing_ok=True)
-        for name in earlier - outcome.files.keys():
+        for name in _files_of_earlier_run(folder) - outcome.files.keys():
             (folder / name).unlink(missing_ok=True)
+        # only now: if this run is cut short, the next one still knows what the earlier one left
+        (folder / RESULT).unlink(missing_ok=True)
         # the result last: it vouches for the others
         return _write(folder, {**outcome.files, RESULT: render(outcome)})
     except OSError as error:

@@ -6,8 +6,9 @@ that names the file, the key path, the value seen and the values allowed.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -30,13 +31,22 @@ class _Loader(yaml.CSafeLoader if hasattr(yaml, "CSafeLoader") else yaml.SafeLoa
     """Safe loader that refuses a key given twice, where YAML would silently keep the last."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [self.construct_object(key, deep=deep) for key, _ in node.value]
-        for key in keys:
-            if keys.count(key) > 1:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"key {key!r} is given twice", node.start_mark
-                )
+        seen: list[Any] = []
+        for node_of_key, _ in node.value:
+            if node_of_key.tag == "tag:yaml.org,2002:merge":
+                continue
+            key = self.construct_object(node_of_key, deep=deep)
+            if key in seen:
+                message = f"key {key!r} is given twice"
+                raise yaml.constructor.ConstructorError(None, None, message, node_of_key.start_mark)
+            seen.append(key)
         return super().construct_mapping(node, deep)
+
+
+# YAML 1.1 takes 1e-05 for text, which is how JSON writes 0.00001
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9]+[eE][-+]?[0-9]+$"), list("-+0123456789")
+)
 
 
 def read(path: Path, model: type[Model]) -> Model:
@@ -69,12 +79,16 @@ def check(content: object, model: type[Model], path: Path) -> Model:
     Raises:
         InputError: If it does not fit the model.
     """
+    if content is None:
+        raise InputError(str(path), "is empty")
     if not isinstance(content, dict):
         raise InputError(str(path), f"must hold keys and values, holds {_seen(content)}")
     try:
         return model.model_validate(content)
     except ValidationError as error:
         lines = [_fault(fault, model) for fault in error.errors(include_url=False)]
+        if len(lines) > 1:
+            lines = [f"{len(lines)} faults", *lines]
         raise InputError(str(path), "\n".join(lines)) from error
 
 
@@ -90,32 +104,75 @@ def _content(path: Path) -> Any:
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-        problem = getattr(error, "problem", None) or "is not YAML"
+        told = [getattr(error, name, None) for name in ("context", "problem")]
+        problem = ", ".join(text for text in told if text) or "is not YAML"
         raise InputError(str(path), f"{place}{problem}") from error
+    except (ValueError, RecursionError) as error:  # a date such as 2024-13-01, a list in itself
+        raise InputError(str(path), f"is not YAML: {error}") from error
+
+
+# pydantic's kinds of fault in the words of this program
+_RULES = {
+    "greater_than": "must be more than {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "finite_number": "must be finite",
+    "float_type": "must be a number, without its unit",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "bool_type": "must be true or false",
+    "string_type": "must be text",
+    "string_too_short": "must not be empty",
+    "list_type": "must be a list",
+    "model_type": "must hold keys and values",
+    "literal_error": "must be {expected}",
+}
 
 
 def _fault(fault: Any, model: type[BaseModel]) -> str:
     """Describe one fault as ``key.path: what is wrong, got the value seen``."""
     place = ".".join(str(part) for part in fault["loc"])
-    kind = fault["type"]
+    kind, values = fault["type"], fault.get("ctx", {})
     if kind == "missing":
         return f"{place}: is missing"
     if kind == "extra_forbidden":
         known = _keys_beside(fault["loc"], model)
         return f"{place}: unknown key" + (f"; known here: {', '.join(known)}" if known else "")
+    if kind in ("too_short", "too_long"):
+        few = kind == "too_short"
+        wanted = f"at least {values['min_length']}" if few else f"at most {values['max_length']}"
+        return f"{place}: must have {wanted} values, got {values['actual_length']}"
+    if kind in _RULES:
+        return f"{place}: {_RULES[kind].format_map(values)}, got {_seen(fault['input'])}"
     message = fault["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
     message = message[:1].lower() + message[1:]
-    return f"{place}: {message}, got {_seen(fault['input'])}" if place else message
+    if isinstance(fault["input"], (dict, list)):  # the message tells what matters of it
+        return f"{place}: {message}"
+    return f"{place}: {message}, got {_seen(fault['input'])}"
 
 
 def _keys_beside(loc: tuple[Any, ...], model: Any) -> list[str]:
     """Return the keys allowed where an unknown one stood, [] where that cannot be told."""
     for part in loc[:-1]:
-        field = getattr(model, "model_fields", {}).get(part)
-        model = getattr(field, "annotation", None)
+        if isinstance(part, str):  # a number counts within a list of what its key holds
+            field = getattr(model, "model_fields", {}).get(part)
+            model = _model_in(getattr(field, "annotation", None))
     return sorted(getattr(model, "model_fields", {}))
 
 
+def _model_in(annotation: Any) -> Any:
+    """Return the model in ``list[Model]`` or ``Model | None``, None if there is none."""
+    if hasattr(annotation, "model_fields"):
+        return annotation
+    inside = (_model_in(argument) for argument in get_args(annotation))
+    return next((model for model in inside if model is not None), None)
+
+
 def _seen(value: object) -> str:
-    text = repr(value)
+    """Return a value as it stands in the file, as far as one line can tell."""
+    if value is None or isinstance(value, (bool, float)):
+        text = yaml.safe_dump(value).splitlines()[0]
+    else:
+        text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

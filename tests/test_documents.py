@@ -1,0 +1,130 @@
+"""YAML and JSON as people write them, right and wrong."""
+
+import json
+
+import pytest
+
+from opl import documents
+from opl.documents import Document
+from opl.errors import InputError
+
+
+class Part(Document):
+    size_mm: float
+    count: int = 1
+
+
+class Sample(Document):
+    name: str = "x"
+    ratio: float = 0.0
+    sharp: bool = False
+    part: Part | None = None
+    parts: list[Part] = []  # noqa: RUF012, pydantic copies it
+    numbers: list[float] = []  # noqa: RUF012
+
+
+def read(tmp_path, text):
+    path = tmp_path / "sample.yaml"
+    path.write_text(text, encoding="utf-8")
+    return documents.read(path, Sample)
+
+
+def refusal(tmp_path, text):
+    """Return what is said of a file, without the folder that it lies in."""
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, text)
+    assert str(caught.value).startswith(str(tmp_path / "sample.yaml"))
+    return str(caught.value).removeprefix(f"{tmp_path / 'sample.yaml'}: ")
+
+
+def test_a_number_may_be_written_without_its_point(tmp_path):
+    assert read(tmp_path, "ratio: 3").ratio == 3.0
+
+
+@pytest.mark.parametrize("text", ["1e-05", "1E3", "-2e4", "1.5e-7", "6.1e-17"])
+def test_numbers_are_read_as_json_writes_them(tmp_path, text):
+    assert read(tmp_path, f"ratio: {text}").ratio == float(text)
+
+
+def test_every_float_survives_json(tmp_path):
+    numbers = [1e-05, 1e16, -1e-300, 0.1, 5.0, 1.7976931348623157e308]
+    assert read(tmp_path, json.dumps({"numbers": numbers})).numbers == numbers
+
+
+def test_anchors_and_merges_of_yaml_work(tmp_path):
+    text = "part: &a {size_mm: 2, count: 3}\nparts:\n- {<<: *a, count: 5}\n"
+    sample = read(tmp_path, text)
+    assert (sample.parts[0].size_mm, sample.parts[0].count) == (2.0, 5)
+
+
+def test_a_mark_at_the_start_of_the_file_is_passed_over(tmp_path):
+    assert read(tmp_path, "\ufeffname: y\n").name == "y"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "is empty"),
+        ("# nothing but a remark\n", "is empty"),
+        ("hello", "must hold keys and values, holds 'hello'"),
+        ("- 1\n- 2\n", "must hold keys and values, holds [1, 2]"),
+        ("name: a: b\n", "line 1, column 8: mapping values are not allowed in this context"),
+        ("part: {size_mm: 1\n", "line 2, column 1: while parsing a flow mapping, did not find"),
+        ("name: a\nratio: 1\nname: b\n", "line 3, column 1: key 'name' is given twice"),
+        ("part:\n  count: 1\n  count: 1\n", "line 3, column 3: key 'count' is given twice"),
+        ("name: a\n---\nname: b\n", "line 2, column 1: expected a single document"),
+        ("name: 2024-13-45\n", "is not YAML: month must be in 1..12"),
+        ("name: !!python/name:os.system\n", "line 1, column 7: could not determine a constructor"),
+        ("? [a]\n: 1\n", "line 1, column 3: while constructing a mapping, found unhashable key"),
+        ("name: \0\n", "is not YAML"),
+        ("name: 7\n", "name: must be text, got 7"),
+        ("name: null\n", "name: must be text, got null"),
+        ("ratio: 5 mm\n", "ratio: must be a number, without its unit, got '5 mm'"),
+        ("ratio: true\n", "ratio: must be a number, without its unit, got true"),
+        ("ratio: .nan\n", "ratio: must be finite, got .nan"),
+        ("ratio: -.inf\n", "ratio: must be finite, got -.inf"),
+        ("numbers: [1, .inf]\n", "numbers.1: must be finite, got .inf"),
+        ("numbers: 1\n", "numbers: must be a list, got 1"),
+        ("sharp: 1\n", "sharp: must be true or false, got 1"),
+        ("part: 3\n", "part: must hold keys and values, got 3"),
+        ("part: {}\n", "part.size_mm: is missing"),
+        ("part: {size_mm: 1, count: 1.5}\n", "part.count: must be a whole number, got 1.5"),
+        ("part: {size_mm: 1, size_cm: 1}\n", "part.size_cm: unknown key; known here: count, size"),
+        (
+            "parts: [{size_mm: 1, colour: red}]\n",
+            "parts.0.colour: unknown key; known here: count, size_mm",
+        ),
+        ("colour: red\n", "colour: unknown key; known here: name, numbers, part, parts, ratio, sh"),
+    ],
+)
+def test_a_fault_is_told_with_its_place(tmp_path, text, told):
+    message = refusal(tmp_path, text)
+    assert message.startswith(told)
+    assert "\n" not in message
+
+
+def test_all_faults_are_told_at_once_one_a_line(tmp_path):
+    assert refusal(tmp_path, "name: 1\npart: {count: x}\n").split("\n") == [
+        "3 faults",
+        "name: must be text, got 1",
+        "part.size_mm: is missing",
+        "part.count: must be a whole number, got 'x'",
+    ]
+
+
+def test_a_long_value_is_cut_short(tmp_path):
+    assert refusal(tmp_path, f"ratio: {'x' * 500}\n").endswith("xxx...")
+
+
+def test_a_file_that_is_not_text_is_refused(tmp_path):
+    path = tmp_path / "sample.yaml"
+    path.write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(InputError, match=r"sample\.yaml: is not text in UTF-8"):
+        documents.read(path, Sample)
+
+
+def test_a_missing_file_and_a_folder_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"none\.yaml: cannot be read: No such file"):
+        documents.read(tmp_path / "none.yaml", Sample)
+    with pytest.raises(InputError, match="cannot be read: Is a directory"):
+        documents.read(tmp_path, Sample)
