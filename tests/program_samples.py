@@ -1,21 +1,25 @@
 """A small made-up motion and robot, shared by the tests of opl.program."""
 
+from dataclasses import replace
 from datetime import datetime
 
 import numpy as np
 
+from opl.cell.robot import load_robot
 from opl.planning.motion import Motion, Stretch, VerifiedMotion
 from opl.program.pulses import PulseScale
 
 JOINT_NAMES = ("S", "L", "U", "R", "B", "T")
 DATE = datetime(2024, 3, 5, 7, 9)
 MAX_SPEED = np.deg2rad([197.0, 190.0, 210.0, 410.0, 410.0, 620.0])
-SCALE = PulseScale(
-    joint_names=JOINT_NAMES,
+# An MH24 with made-up pulses, all of them verified.
+ROBOT = replace(
+    load_robot("mh24"),
     pulses_per_radian=np.rad2deg([1300.0, 1900.0, 1600.0, 1000.0, 980.0, 450.0]),
-    lower=np.deg2rad([-180.0, -105.0, -86.0, -200.0, -150.0, -455.0]),
-    upper=np.deg2rad([180.0, 155.0, 160.0, 200.0, 150.0, 455.0]),
+    unverified_pulses=(),
 )
+UNVERIFIED = replace(ROBOT, unverified_pulses=("R", "B", "T"))
+SCALE = PulseScale.of(ROBOT)
 HOME = np.deg2rad([0.0, -20.0, 10.0, 0.0, -60.0, 0.0])
 
 

@@ -215,9 +215,9 @@ def test_an_unknown_robot_names_the_known_ones(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("c2_mm: 760", "c2_mm: -760", r"arm\.c2_mm: .*greater than 0, got -760"),
+        ("c2_mm: 760", "c2_mm: -760", r"arm\.c2_mm: .*more than 0, got -760"),
         ("c2_mm: 760", "c2: 760", r"arm\.c2: unknown key; known here: .*c2_mm"),
-        ("signs: [1, 1, -1, -1, -1, -1]", "signs: [1, 1, -1]", r"arm\.signs: .*6 items"),
+        ("signs: [1, 1, -1, -1, -1, -1]", "signs: [1, 1, -1]", r"arm\.signs: .*6 values"),
         ("signs: [1, 1,", "signs: [1, 2,", r"arm\.signs\.1: .*got 2"),
         ("lower_deg: -105", "lower_deg: 170", r"joints\.1\.limits: lower_deg must be below .*155"),
         ("verified: true", "verified: perhaps", r"joints\.0\.pulses\.verified: .*got 'perhaps'"),

@@ -3,12 +3,14 @@ import io
 
 import numpy as np
 import pytest
-from program_samples import DATE, JOINT_NAMES, MAX_SPEED, SCALE, verified_motion
+from program_samples import DATE, JOINT_NAMES, MAX_SPEED, ROBOT, SCALE, verified_motion
 
 from opl.errors import InputError
 from opl.geometry.frames import pose
-from opl.program.inform import parse, render
+from opl.program.inform import parse, write_jobs
 from opl.program.moves import plan_moves
+from opl.program.profiles import DX200
+from opl.program.settings import ProgramSettings
 from opl.program.table import render_table
 
 
@@ -20,11 +22,15 @@ def flange_poses(n):
     return pose(R, np.stack([1.2 - 0.01 * turn, -1e-9 + o, 0.4 + turn], axis=-1))
 
 
+def written():
+    program = plan_moves(verified_motion(), "SAMPLE", MAX_SPEED)
+    return write_jobs(program, ROBOT, ProgramSettings(), DX200, DATE)
+
+
 def table(**options):
     verified = verified_motion()
-    program = plan_moves(verified, "SAMPLE", MAX_SPEED)
     poses = flange_poses(len(verified.motion))
-    return render_table(verified, program, SCALE, poses, **options)
+    return render_table(verified, written(), SCALE, poses, **options)
 
 
 def rows():
@@ -44,14 +50,12 @@ def test_every_posture_has_a_row_and_every_row_every_column():
 
 
 def test_pulses_and_speeds_are_those_of_the_job():
-    verified = verified_motion()
-    program = plan_moves(verified, "SAMPLE", MAX_SPEED)
-    job = parse(render(program, SCALE, DATE))
-    of_moves = [row for row in rows() if row["speed_percent"]]
+    job = parse(written().files["SAMPLE.JBI"])
+    of_moves = [row for row in rows() if row["speed"]]
     assert len(of_moves) == len(job.positions) == len(rows()) - 2
     for row, position, move in zip(of_moves, job.positions, job.moves, strict=True):
         assert [float(row[f"{name}_pulses"]) for name in JOINT_NAMES] == list(position.values)
-        assert row["speed_percent"] == move.tag("VJ")
+        assert row["speed"] == f"VJ={move.tag('VJ')}"
 
 
 def test_angles_lengths_and_times_are_in_the_units_of_their_columns():

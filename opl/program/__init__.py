@@ -1,10 +1,10 @@
 """What the controller reads.
 
-A verified motion becomes a maker-neutral `moves.Program`, is cut into parts a controller can hold
-(`split`), and is written in the controller's own language (`inform`) and as a table (`table`).
+A verified motion becomes a maker-neutral `moves.Program`. The post that the job names writes it in
+the language of the controller (`posts`, `inform`, `makers`), a table tells it posture by posture
+(`table`). Every post reads back what it wrote before it returns it.
 
 To add a controller of a known maker: a `controller.ControllerProfile` with the source of every
-limit, and a golden program. To add a maker: one module beside `inform` that turns a `Program` into
-text and reads that text back before it returns it, one template under ``templates/``, and a golden
-program.
+limit, a line in ``pyproject.toml`` and golden programs. To add a maker: see `makers`. To add a post
+of your own without touching opl: see `posts`, and ``tests/example_post`` for a whole package.
 """

@@ -1,9 +1,14 @@
-"""What a controller accepts: every limit of a program file, with its source."""
+"""What a Yaskawa controller accepts: the limits of a program file, one profile per generation.
+
+The profiles themselves, with the source of every number, are in `opl.program.profiles`.
+"""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+
+from opl.program.speeds import SpeedRange
 
 _NAME = re.compile(r"[A-Z0-9_-]+")
 _COMMENT = re.compile(r"[ -~]*")
@@ -16,28 +21,46 @@ class ControllerProfile:
     Attributes:
         name: What people call it.
         name_length: Most characters of a job name.
-        comment_length: Most characters of a comment, the mark that opens it not counted.
+        comment_length: Most characters of a comment or message, the mark that opens it left out.
+        label_length: Most characters of a jump label after its ``*``.
         step_limit: Most positions in one job; longer programs are split.
+        line_limit: Most instructions in one job.
         label_digits: Digits of a position label in the list of positions.
-        joint_speed: Lowest and highest VJ in percent of the joints' own top speeds.
-        joint_speed_decimals: Decimals VJ is written with.
-        linear_speed: Lowest and highest V in [mm/s].
-        linear_speed_decimals: Decimals V is written with.
+        configuration_fields: Numbers in ///RCONF.
+        length_decimals: Decimals of x, y, z in [mm].
+        angle_decimals: Decimals of rx, ry, rz in [deg].
+        joint_speed: VJ in percent of the joints' own top speeds.
+        linear_speed: V in [mm/s].
+        angular_speed: VR in [deg/s].
+        timer: Times in [s].
+        ramp_percent: Smallest and largest ACC and DEC.
         position_levels: Highest PL.
         highest_tool: Highest tool number; the lowest is 0.
+        highest_user_frame: Highest number of a user frame; the lowest is 1.
+        highest_signal: Highest number of an input or output; the lowest is 1.
+        instructions: Words an instruction may begin with.
     """
 
     name: str
     name_length: int
     comment_length: int
+    label_length: int
     step_limit: int
+    line_limit: int
     label_digits: int
-    joint_speed: tuple[float, float]
-    joint_speed_decimals: int
-    linear_speed: tuple[float, float]
-    linear_speed_decimals: int
+    configuration_fields: int
+    length_decimals: int
+    angle_decimals: int
+    joint_speed: SpeedRange
+    linear_speed: SpeedRange
+    angular_speed: SpeedRange
+    timer: SpeedRange
+    ramp_percent: tuple[int, int]
     position_levels: int
     highest_tool: int
+    highest_user_frame: int
+    highest_signal: int
+    instructions: frozenset[str]
 
     def name_fault(self, name: str) -> str | None:
         """Say what is wrong with a job name, None if nothing is.
@@ -61,37 +84,3 @@ class ControllerProfile:
                 f"{comment!r}"
             )
         return None
-
-    def joint_speed_text(self, fraction: float) -> str:
-        """Return VJ as written, for a fraction of the joints' top speeds.
-
-        A move slower than the controller can be asked for gets the slowest VJ there is.
-        """
-        lowest, highest = self.joint_speed
-        percent = min(max(100.0 * fraction, lowest), highest)
-        return f"{percent:.{self.joint_speed_decimals}f}"
-
-
-DX200 = ControllerProfile(
-    name="DX200",
-    # the manuals of DX100 and later give 32 for names and comments; longest seen in jobs saved by
-    # controllers: 27 and 32
-    name_length=32,
-    comment_length=32,
-    # a job holds fewer than 10,000 lines (the controllers' remote commands count them with four
-    # digits); other post-processors split at 2000, and no saved job seen had half of that
-    step_limit=2000,
-    # C00000 in every job saved by a DX100 or later
-    label_digits=5,
-    # all of some 480 saved VJ have two decimals; the pendant offers 0.01 to 100.00
-    joint_speed=(0.01, 100.0),
-    joint_speed_decimals=2,
-    # all of some 2200 saved V have one decimal; 1500 mm/s is the documented span, not seen in a
-    # manual of this controller
-    linear_speed=(0.1, 1500.0),
-    linear_speed_decimals=1,
-    # PL=0 (stop in position) to PL=8
-    position_levels=8,
-    # 64 tools in the controllers of DX generation and later, 24 before
-    highest_tool=63,
-)

@@ -1,22 +1,24 @@
 """A robot program that belongs to no maker yet: moves with speeds, stops and comments.
 
-Every move is a joint move. Between two postures the controller then does what the verification
-replayed: all joints run linearly, in step with the slowest. A straight-line move would lead the
-hand's tool point along a line instead, and the contact, which is fixed to the wheel while the part
-moves, away from where it was proven.
+Every move is planned as a joint move. Between two postures the controller then does what the
+verification replayed: all joints run linearly, in step with the slowest. A straight-line move leads
+the hand's tool point along a line instead, away from where the contact was proven;
+`opl.program.lines` makes one only where it stays near enough.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from opl.errors import UnsafeError
 from opl.planning.motion import Motion, Stretch, VerifiedMotion
+from opl.program.actions import NO_ACTIONS, Action, Actions
+from opl.program.stops import ON_WHEEL, actions_at, stops_at
 
 Array = NDArray[np.float64]
 
@@ -29,25 +31,33 @@ SAME_POSTURE = 1e-6
 # What a move may ask above a joint's top speed before it is refused: the last digit a controller
 # can be told.
 OVERSPEED = 1e-4
-# Sharpest turn in joint space [rad] that a move off the wheel goes through without a stop. Rounding
-# a corner leaves the proven path by more, the sharper it is.
-MAX_BLENDED_TURN = np.deg2rad(10.0)
 
-_ON_WHEEL = (Stretch.GRIND, Stretch.BETWEEN)
+
+class Kind(str, Enum):
+    """What a move is for."""
+
+    WHEEL = "on_wheel"  # grinding
+    LEAD = "lead"  # along the contact normal, to or from the wheel
+    AIR = "air"  # from and to home, and between passes
 
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A joint move.
+    """A move.
 
     Attributes:
         q: Where it ends, joint positions in [rad], shape (6,).
         speed: Speed as a fraction of the top speed of the joint that takes longest, in (0, 1].
+        duration: Time it shall take in [s]; None where the speed alone is set.
         exact_stop: Whether the robot comes to rest there; if not, the next move may round the
             corner.
         on_wheel: Whether the part touches the wheel there.
         posture: Index of that posture in the motion.
+        kind: What it is for.
+        ground_pass: The pass ground during the whole move, counted from 0, None off the wheel.
+        straight: Whether the tool point runs on a straight line instead of the joints.
         comment: What a person reads before the move.
+        actions: What is done once the robot has come to rest there.
     """
 
     q: Array
@@ -55,12 +65,35 @@ class Move:
     exact_stop: bool
     on_wheel: bool
     posture: int
+    duration: float | None = None
+    kind: Kind = Kind.AIR
+    ground_pass: int | None = None
+    straight: bool = False
     comment: str | None = None
+    actions: tuple[Action, ...] = ()
 
     def __post_init__(self) -> None:
         q = np.array(self.q, dtype=float)
         q.setflags(write=False)
         object.__setattr__(self, "q", q)
+
+
+@dataclass(frozen=True)
+class PassTime:
+    """How long a pass takes.
+
+    Attributes:
+        wanted: At constant feed in [s].
+        written: As the controller will play the written speeds, ramps left out, in [s].
+    """
+
+    wanted: float
+    written: float
+
+    @property
+    def error(self) -> float:
+        """How much longer than wanted, as a fraction of the wanted time."""
+        return self.written / self.wanted - 1.0
 
 
 @dataclass(frozen=True)
@@ -72,12 +105,14 @@ class Program:
         comments: Lines at its top.
         moves: What the robot does; the first brings it to where the rest is proven from.
         calls: Names of the programs it runs after its moves.
+        pass_times: Of each pass, once it is written for a controller.
     """
 
     name: str
     comments: tuple[str, ...] = ()
     moves: tuple[Move, ...] = ()
     calls: tuple[str, ...] = ()
+    pass_times: tuple[PassTime, ...] = ()
 
 
 def plan_moves(
@@ -86,6 +121,7 @@ def plan_moves(
     max_speed: Array,
     comments: Sequence[str] = (),
     joint_names: Sequence[str] = ("1", "2", "3", "4", "5", "6"),
+    actions: Actions = NO_ACTIONS,
 ) -> Program:
     """Turn a verified motion into moves.
 
@@ -99,6 +135,7 @@ def plan_moves(
         max_speed: Top speeds of the joints in [rad/s], shape (6,).
         comments: Lines at its top.
         joint_names: For messages.
+        actions: What is done around the passes.
 
     Raises:
         TypeError: If the motion was not verified.
@@ -109,14 +146,18 @@ def plan_moves(
     motion = verified.motion
     kept = _distinct_postures(motion.q)
     speeds = _speeds(motion, kept, np.asarray(max_speed), joint_names)
+    times = np.diff(np.cumsum(motion.duration)[kept]).tolist()
     # reduceat: a kept posture also stands for the repeated ones that follow it
-    on_wheel = np.logical_or.reduceat([s in _ON_WHEEL for s in motion.stretch], kept)
-    stops = _stops(motion, kept, on_wheel)
+    on_wheel = np.logical_or.reduceat([s in ON_WHEEL for s in motion.stretch], kept)
+    stops = stops_at(motion, kept, on_wheel)
+    done_there = actions_at(motion, kept, on_wheel, actions)
     moves = []
-    pass_before = None
+    before: int | None = None
     for m, posture in enumerate(kept):
         pass_here = int(motion.pass_index[posture])
+        pass_before = None if before is None else int(motion.pass_index[before])
         comment = "HOME" if pass_here < 0 else f"PASS {pass_here + 1}"
+        grinding = m > 0 and on_wheel[m] and on_wheel[m - 1] and pass_here == pass_before
         moves.append(
             Move(
                 q=motion.q[posture],
@@ -124,11 +165,23 @@ def plan_moves(
                 exact_stop=bool(stops[m]),
                 on_wheel=bool(on_wheel[m]),
                 posture=int(posture),
+                duration=times[m - 1] if m else None,
+                kind=_kind(motion.stretch[posture], grinding, bool(on_wheel[m])),
+                ground_pass=pass_here if grinding else None,
                 comment=comment if pass_here != pass_before else None,
+                actions=done_there.get(m, ()),
             )
         )
-        pass_before = pass_here
+        before = int(posture)
     return Program(name=name, comments=tuple(comments), moves=tuple(moves))
+
+
+def _kind(stretch: Stretch, grinding: bool, on_wheel: bool) -> Kind:
+    if grinding:
+        return Kind.WHEEL
+    if on_wheel or stretch in (Stretch.APPROACH, Stretch.RETRACT):
+        return Kind.LEAD  # the move onto the wheel ends the approach
+    return Kind.AIR
 
 
 def _distinct_postures(q: Array) -> NDArray[np.intp]:
@@ -156,17 +209,3 @@ def _speeds(
             f"{100.0 * speeds[m]:.1f} % of its top speed"
         )
     return np.minimum(speeds, 1.0)
-
-
-def _stops(motion: Motion, kept: NDArray[np.intp], on_wheel: NDArray[np.bool_]) -> list[bool]:
-    """Say at which kept postures the robot comes to rest."""
-    stretch = [Stretch.GRIND if s in _ON_WHEEL else s for s in motion.stretch]
-    ends = [here is not after for here, after in pairwise(stretch)] + [True]
-    stops = np.logical_or.reduceat(ends, kept)
-    stops[0] = True
-    stops[1:] |= on_wheel[1:] & ~on_wheel[:-1]
-    steps = np.diff(motion.q[kept], axis=0)
-    directions = steps / np.linalg.norm(steps, axis=1, keepdims=True)
-    cos_turn = np.sum(directions[:-1] * directions[1:], axis=1)
-    stops[1:-1] |= ~on_wheel[1:-1] & (cos_turn < np.cos(MAX_BLENDED_TURN))
-    return stops.tolist()

@@ -7,12 +7,14 @@ the wrist. Its sign is the joint's own.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.errors import UnsafeError
+from opl.cell.robot import Robot
+from opl.errors import InputError, UnsafeError
 
 Array = NDArray[np.float64]
 Pulses = NDArray[np.int64]
@@ -49,6 +51,17 @@ class PulseScale:
             raise ValueError(f"pulses per radian must be positive, got {self.pulses_per_radian}")
         if unknown := set(self.unverified) - set(self.joint_names):
             raise ValueError(f"no such joints: {sorted(unknown)}; have: {self.joint_names}")
+
+    @classmethod
+    def of(cls, robot: Robot) -> PulseScale:
+        """Return how the controller of a robot counts, as far as is known."""
+        return cls(
+            robot.joint_names,
+            robot.pulses_per_radian,
+            robot.lower,
+            robot.upper,
+            robot.unverified_pulses,
+        )
 
     @property
     def soft_limits(self) -> tuple[Pulses, Pulses]:
@@ -88,3 +101,24 @@ class PulseScale:
 
     def _nearest(self, q: Array) -> Pulses:
         return np.rint(q * self.pulses_per_radian).astype(np.int64)
+
+
+def require_accepted(unverified: Collection[str], accepted: Collection[str], where: str) -> None:
+    """Refuse pulses of joints whose ratio nobody has confirmed and the user has not accepted.
+
+    Args:
+        unverified: Names of the joints whose ratio is not confirmed.
+        accepted: Names of the joints the user accepts all the same.
+        where: File and key that would accept them.
+
+    Raises:
+        InputError: If a joint is missing; tells the ways out.
+    """
+    missing = [name for name in unverified if name not in accepted]
+    if missing:
+        raise InputError(
+            where,
+            f"the pulses per degree of {', '.join(missing)} are not verified, so a pulse program "
+            "may lead anywhere; give the controller's own (opl robots import-params, then "
+            f"program.pulse_ratios), or accept them by name: [{', '.join(missing)}]",
+        )

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from opl.errors import OplError
-from opl.program.moves import START_SPEED, Move, Program
+from opl.program.moves import START_SPEED, Kind, Move, Program
+from opl.program.names import numbered_names
 
 
-def split(program: Program, step_limit: int) -> tuple[Program, ...]:
+def split(program: Program, step_limit: int, name_length: int = 32) -> tuple[Program, ...]:
     """Cut a program into numbered parts and a master that calls them.
 
     A cut lies only where the robot stands still off the wheel: between two jobs a controller may
@@ -19,6 +20,7 @@ def split(program: Program, step_limit: int) -> tuple[Program, ...]:
     Args:
         program: Moves without calls.
         step_limit: Most moves of a part.
+        name_length: Most characters of a part's name.
 
     Returns:
         The program alone if it fits, else the master and then its parts in order.
@@ -29,8 +31,7 @@ def split(program: Program, step_limit: int) -> tuple[Program, ...]:
     if len(program.moves) <= step_limit:
         return (program,)
     pieces = _pieces(program.moves, step_limit)
-    digits = max(2, len(str(len(pieces))))
-    names = [f"{program.name}{number:0{digits}d}" for number in range(1, len(pieces) + 1)]
+    names = numbered_names(program.name, len(pieces), name_length)
     parts = [
         Program(name, (*program.comments, f"PART {k} OF {len(pieces)}"), piece)
         for k, (name, piece) in enumerate(zip(names, pieces, strict=True), start=1)
@@ -62,4 +63,14 @@ def _pieces(moves: tuple[Move, ...], step_limit: int) -> list[tuple[Move, ...]]:
 
 def _entry(move: Move) -> Move:
     """Return the move to where the part before ended."""
-    return replace(move, speed=START_SPEED, exact_stop=True, comment="START OF PART")
+    return replace(
+        move,
+        speed=START_SPEED,
+        exact_stop=True,
+        duration=None,
+        kind=Kind.AIR,
+        ground_pass=None,
+        straight=False,
+        comment="START OF PART",
+        actions=(),
+    )

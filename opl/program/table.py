@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from opl import resources
 from opl.geometry.frames import roll_pitch_yaw
 from opl.planning.motion import VerifiedMotion
-from opl.program.controller import DX200, ControllerProfile
 from opl.program.layout import fill
-from opl.program.moves import Program
+from opl.program.posts import Written
 from opl.program.pulses import PulseScale
 
 Array = NDArray[np.float64]
@@ -23,26 +22,25 @@ TEMPLATE = resources.folder("templates") / "csv" / "table.csv.j2"
 
 def render_table(
     verified: VerifiedMotion,
-    program: Program,
+    written: Written,
     scale: PulseScale,
     Ts_base_flange: Array,
     *,
-    profile: ControllerProfile = DX200,
     template: Path | None = None,
 ) -> str:
     """Return the table, one row for each posture of the motion.
 
     Passes count from 1 as in the job's comments, cutter points from 0. A cell is empty where a
     quantity is not defined: pass at home, cutter point and t off the wheel, clearance where none
-    was computed. Speed is VJ as the job writes it; it is empty for a posture that repeats the one
-    before and so has no move of its own (the time of that row is in the move that follows).
+    was computed. Speed is what the program says, and programmed_s the time of the move at it; both
+    are empty for a posture that repeats the one before and so has no move of its own (the time of
+    that row is in the move that follows), and programmed_s where nobody knows from where it comes.
 
     Args:
         verified: The motion.
-        program: The moves planned from it, not split.
+        written: The program written from it.
         scale: Pulses of the robot.
         Ts_base_flange: Pose of the flange at each posture, origin in [m], shape (n, 4, 4).
-        profile: The controller.
         template: Layout of the table; None for the one that comes with opl.
 
     Raises:
@@ -50,7 +48,6 @@ def render_table(
         InputError: If the template is unusable.
     """
     motion = verified.motion
-    speeds = {move.posture: profile.joint_speed_text(move.speed) for move in program.moves}
     pulses = scale.to_pulses(motion.q).tolist()
     angles = np.rad2deg(motion.q)
     positions = Ts_base_flange[:, :3, 3] * 1e3
@@ -67,7 +64,8 @@ def render_table(
             *(_fixed(length, 3) for length in positions[i]),
             *(_fixed(angle, 4) for angle in rotations[i]),
             _fixed(motion.duration[i], 4),
-            speeds.get(i, ""),
+            _fixed(written.times.get(i, np.nan), 4),
+            written.speeds.get(i, ""),
             _fixed(motion.clearance[i] * 1e3, 3),
         )
         for i in range(len(motion))
@@ -85,7 +83,7 @@ def _columns(joint_names: Sequence[str]) -> tuple[str, ...]:
         *(f"{name}_deg" for name in joint_names),
         *(f"{name}_pulses" for name in joint_names),
         *("x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"),
-        *("time_s", "speed_percent", "clearance_mm"),
+        *("time_s", "programmed_s", "speed", "clearance_mm"),
     )
 
 

@@ -6,8 +6,9 @@ while the wheel stands still. Joint moves between pulse positions do not depend 
 
 from opl.program.inform.check import find_faults
 from opl.program.inform.job import Header, InformJob, Instruction, Position
-from opl.program.inform.parse import parse, unparse
-from opl.program.inform.render import FILE_SUFFIX, TEMPLATE, render, render_jobs
+from opl.program.inform.parse import parse, read_jobs, unparse
+from opl.program.inform.post import write_jobs
+from opl.program.inform.render import FILE_SUFFIX, TEMPLATE, render
 
 __all__ = [
     "FILE_SUFFIX",
@@ -18,7 +19,8 @@ __all__ = [
     "Position",
     "find_faults",
     "parse",
+    "read_jobs",
     "render",
-    "render_jobs",
     "unparse",
+    "write_jobs",
 ]

@@ -36,6 +36,8 @@ _HEADER_ORDER = (
 _REQUIRED_HEADERS = ("//POS", "///NPOS", "//INST", "///DATE", "///ATTR")
 _DATE = re.compile(r"[0-9]{4}/[0-9]{2}/[0-9]{2} [0-9]{2}:[0-9]{2}")
 _NOT_PRINTABLE = re.compile(r"[^\t -~]")
+_DECIMAL = re.compile(r"[0-9]+(?:\.[0-9]+)?")
+_SIGNAL = re.compile(r"\b(IN|OT)#\(([0-9]{1,9})\)")
 _VARIABLE = re.compile(r"[A-Z]+(?:[0-9]+|\[.*\])")
 
 
@@ -100,10 +102,16 @@ def _position_faults(job: InformJob, profile: ControllerProfile) -> Iterator[str
     for position in job.positions:
         if not position.coordinates or position.tool is None:
             yield f"line {position.line}: ///TOOL and ///POSTYPE must come before the positions"
+        elif (
+            position.coordinates == "RECTAN"
+            and position.kind == "C"
+            and (len(position.configuration) != profile.configuration_fields)
+        ):
+            yield f"line {position.line}: RCONF has {profile.configuration_fields} numbers"
         elif not 0 <= position.tool <= profile.highest_tool:
             yield f"line {position.line}: tools are 0 to {profile.highest_tool}"
-        if len(position.label) != len(position.kind) + profile.label_digits:
-            yield f"line {position.line}: labels have {profile.label_digits} digits"
+        if position.kind == "C" and len(position.label) != 1 + profile.label_digits:
+            yield f"line {position.line}: C labels have {profile.label_digits} digits"
     for kind in ("C", "BC", "EC"):
         numbers = [position.number for position in job.positions if position.kind == kind]
         if numbers != list(range(len(numbers))):
@@ -122,29 +130,67 @@ def _position_faults(job: InformJob, profile: ControllerProfile) -> Iterator[str
 
 
 def _instruction_faults(job: InformJob, profile: ControllerProfile) -> Iterator[str]:
+    if len(job.instructions) > profile.line_limit:
+        yield (
+            f"{len(job.instructions)} instructions, {profile.name} takes {profile.line_limit} "
+            "in a job"
+        )
     for step in job.instructions:
+        yield from _word_faults(step, profile)
         if step.comment is not None and (fault := profile.comment_fault(step.comment)):
             yield f"line {step.line}: comment {fault}"
         for move in (step, *step.coupled):
             if "MOV" in move.word:
                 yield from _move_faults(move, profile)
+    for name in job.calls:
+        if fault := profile.name_fault(name):
+            yield f"CALL: job name {fault}"
+
+
+def _word_faults(step: Instruction, profile: ControllerProfile) -> Iterator[str]:
+    if step.word.startswith("*"):
+        if not 1 < len(step.word) <= 1 + profile.label_length:
+            yield f"line {step.line}: labels have 1 to {profile.label_length} characters"
+    elif step.word and step.word not in profile.instructions:
+        yield f"line {step.line}: {step.word} is no instruction of {profile.name} that opl knows"
+    time = step.tag("T")
+    if step.word in ("TIMER", "WAIT", "PULSE") and time and re.fullmatch(r"[0-9.]{1,9}", time):
+        timer = profile.timer
+        if not _DECIMAL.fullmatch(time) or not timer.lowest <= float(time) <= timer.highest:
+            yield f"line {step.line}: T must be {timer.lowest} to {timer.highest}, got {time}"
+    for kind, number in _SIGNAL.findall(" ".join(step.operands + tuple(k for k, _ in step.tags))):
+        if not 1 <= int(number) <= profile.highest_signal:
+            yield (f"line {step.line}: {kind} must be 1 to {profile.highest_signal}, got {number}")
 
 
 def _move_faults(move: Instruction, profile: ControllerProfile) -> Iterator[str]:
     speeds = (
-        ("VJ", *profile.joint_speed, profile.joint_speed_decimals),
-        ("V", *profile.linear_speed, profile.linear_speed_decimals),
+        ("VJ", profile.joint_speed),
+        ("V", profile.linear_speed),
+        ("VR", profile.angular_speed),
     )
-    for name, lowest, highest, decimals in speeds:
+    for name, allowed in speeds:
         text = move.tag(name)
         if text is None or _VARIABLE.fullmatch(text):
             continue
-        if not re.fullmatch(rf"[0-9]{{1,9}}\.[0-9]{{{decimals}}}", text):
-            yield f"line {move.line}: {name} must have {decimals} decimals, got {text}"
-        elif not lowest <= float(text) <= highest:
-            yield f"line {move.line}: {name} must be {lowest} to {highest}, got {text}"
+        if not re.fullmatch(rf"[0-9]{{1,9}}\.[0-9]{{{allowed.decimals}}}", text):
+            yield f"line {move.line}: {name} must have {allowed.decimals} decimals, got {text}"
+        elif not allowed.lowest <= float(text) <= allowed.highest:
+            span = f"{allowed.lowest} to {allowed.highest}"
+            yield f"line {move.line}: {name} must be {span}, got {text}"
+    lowest, highest = profile.ramp_percent
+    for name in ("ACC", "DEC"):
+        percent = move.tag(name)
+        if percent is None or _VARIABLE.fullmatch(percent):
+            continue
+        if percent not in map(str, range(lowest, highest + 1)):
+            yield f"line {move.line}: {name} must be {lowest} to {highest}, got {percent}"
     level = move.tag("PL")
-    if level is not None and level not in map(str, range(profile.position_levels + 1)):
+    if (
+        level is not None
+        and not _VARIABLE.fullmatch(level)
+        and level not in map(str, range(profile.position_levels + 1))
+    ):
         yield f"line {move.line}: PL must be 0 to {profile.position_levels}, got {level}"
 
 

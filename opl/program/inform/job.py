@@ -10,6 +10,7 @@ from dataclasses import dataclass
 # then robot, base and station position variables.
 POSITION_KINDS = ("C", "BC", "EC", "P", "BP", "EX")
 
+_MOVE = re.compile(r"(?:S|I|X|EI)?MOV[A-Z]*")
 _LABEL = re.compile(r"(BC|EC|BP|EX|C|P)([0-9]{1,9})")
 
 
@@ -92,7 +93,7 @@ class Instruction:
     @property
     def moves(self) -> bool:
         """Whether the robot moves: MOVJ, MOVL, MOVC, MOVS and their S, I and EI forms."""
-        return "MOV" in self.word and not self.disabled
+        return _MOVE.fullmatch(self.word) is not None and not self.disabled
 
     @property
     def positions(self) -> tuple[tuple[str, int], ...]:

@@ -11,10 +11,12 @@ import re
 from opl.errors import InputError
 from opl.program.inform.job import Header, InformJob, Instruction, Position, read_label
 
+BYTE_ORDER_MARK = "\ufeff"
+
 _LINE_END = re.compile(r"\r\n?|\n")
 _HEADER = re.compile(r"(/{1,4}[A-Z]+[0-9]*)(?:[ \t]+(.*))?")
 _POSITION = re.compile(r"([A-Z]+[0-9]+)=(.*)")
-_NUMBER = re.compile(r"[+-]?[0-9]{1,12}(?:\.[0-9]*)?")
+_NUMBER = re.compile(r"[+-]?[0-9]{1,12}(?:\.[0-9]*)?|[+-]?\.[0-9]{1,12}")
 _INTEGER = re.compile(r"[+-]?[0-9]{1,12}")
 # a comment opens at the first // outside a quoted text
 _TRAILING_COMMENT = re.compile(r'((?:[^"/]|"[^"]*"|/(?!/))*)//(.*)')
@@ -33,11 +35,11 @@ def parse(text: str, source: str = "job") -> InformJob:
         InputError: If the text is no job; the message names the line.
     """
     lines = tuple(_LINE_END.split(text))
-    if lines[0].rstrip() != "/JOB":
+    if lines[0].lstrip(BYTE_ORDER_MARK).rstrip() != "/JOB":
         raise _error(source, 1, f"a job begins with /JOB, got {_shown(lines[0])}")
     for number, line in enumerate(lines[1:], start=2):
         if line.rstrip() == "/JOB":
-            raise _error(source, number, "a second job begins; only one job a file is read")
+            raise _error(source, number, "a second job begins; read_jobs reads several")
     first, last = _body(lines, source)
     headers, positions = _head(lines[: first - 1], source)
     names = [header for header in headers if header.key == "//NAME"]
@@ -56,6 +58,25 @@ def parse(text: str, source: str = "job") -> InformJob:
     )
 
 
+def read_jobs(text: str, source: str = "job") -> tuple[InformJob, ...]:
+    """Read a file that may hold several jobs, one after the other.
+
+    Args:
+        text: The file, its lines ended by CR LF, LF or CR.
+        source: What messages call it.
+
+    Raises:
+        InputError: If one of them is no job; the message names the line in that job.
+    """
+    lines = _LINE_END.split(text)
+    starts = [k for k, line in enumerate(lines) if k and line.rstrip() == "/JOB"]
+    pieces = [lines[a:b] for a, b in zip([0, *starts], [*starts, len(lines)], strict=True)]
+    sources = (
+        [source] if len(pieces) == 1 else [f"{source} ({k})" for k in range(1, len(pieces) + 1)]
+    )
+    return tuple(parse("\n".join(piece), name) for piece, name in zip(pieces, sources, strict=True))
+
+
 def unparse(job: InformJob) -> str:
     """Return the file of a job, the same as it was read but for line ends, which are CR LF."""
     return "\r\n".join(job.lines)
@@ -63,7 +84,8 @@ def unparse(job: InformJob) -> str:
 
 def _body(lines: tuple[str, ...], source: str) -> tuple[int, int]:
     """Return the line numbers of NOP and END."""
-    words = [line.rstrip() for line in lines]
+    # a comment may follow on the line of NOP or END
+    words = [line.partition("//")[0].rstrip() or line.rstrip() for line in lines]
     places = [0]
     for word in ("//INST", "NOP", "END"):
         try:
@@ -137,6 +159,8 @@ def _instruction(number: int, line: str) -> Instruction:
     body = line.strip(" \t")
     if body.startswith("'"):
         return Instruction(number, "'", comment=body[1:])
+    locked = body.startswith("EDTLCK ")
+    body = body.removeprefix("EDTLCK ").lstrip(" \t") if locked else body
     disabled = body.startswith("COMM ")
     body = body.removeprefix("COMM ")
     comment = None
@@ -160,7 +184,7 @@ def _words(number: int, part: str, disabled: bool) -> Instruction:
 
 
 def _integers(header: Header, source: str) -> tuple[int, ...]:
-    items = header.value.strip(" \t").split(",")
+    items = [item.strip(" \t") for item in header.value.split(",")]
     if not all(_INTEGER.fullmatch(item) for item in items):
         raise _error(
             source, header.line, f"{header.key} takes whole numbers, got {_shown(header.value)}"

@@ -1,210 +1,180 @@
-"""Writing INFORM jobs: pulse positions and joint moves, which every controller plays as it is.
+"""Writing INFORM jobs. Every job is read back before it is returned.
 
 Pulse jobs need no option, no user frame and no arm configuration, and leave the controller no
-choice between postures. Every job is read back before it is returned.
+choice between postures. Cartesian ones need the controller's function for relative jobs.
 """
 
 from __future__ import annotations
 
 import textwrap
-from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import replace
 from datetime import datetime
-from itertools import zip_longest
 from pathlib import Path
 
-import numpy as np
-
 from opl import resources
+from opl.cell.robot import Robot
 from opl.errors import InputError
-from opl.program.controller import DX200, ControllerProfile
+from opl.program.controller import ControllerProfile
 from opl.program.inform.check import find_faults
-from opl.program.inform.job import POSITION_KINDS, InformJob, Instruction
+from opl.program.inform.layout import JobLayout, Step, differences
+from opl.program.inform.motion import write_positions, write_speeds
 from opl.program.inform.parse import parse
+from opl.program.inform.words import ActionWriter
 from opl.program.layout import fill
-from opl.program.moves import Program
-from opl.program.pulses import PulseScale
+from opl.program.moves import Move, Program
+from opl.program.names import short_name
+from opl.program.settings import ByKind, PositionForm, ProgramSettings
 from opl.program.split import split
 
 FILE_SUFFIX = ".JBI"
 TEMPLATE = resources.folder("templates") / "inform" / "job.jbi.j2"
 
 STOP_LEVEL = 0
-# The finest level that does not stop: a pass must not, or the belt digs in. How far a corner is
-# rounded at this level is set in each controller's parameters and not known here; within a pass
-# postures lie close and turn little, so there is little corner to round.
-BLEND_LEVEL = 1
 
 # Of a template that goes wrong on every line, a few faults tell as much as all.
 _FAULTS_SHOWN = 10
 
 
-def render_jobs(
-    program: Program,
-    scale: PulseScale,
-    date: datetime,
-    *,
-    tool: int = 0,
-    profile: ControllerProfile = DX200,
-    template: Path | None = None,
-) -> dict[str, str]:
-    """Return the job files of a program: one, or a master and the parts it calls.
-
-    Args:
-        program: What the robot shall do.
-        scale: Pulses and soft limits of the robot.
-        date: Date of the job; the same arguments give the same bytes.
-        tool: Number of the tool in whose name the positions are kept.
-        profile: The controller.
-        template: Layout of a job; None for the one that comes with opl.
-
-    Returns:
-        Text by file name, line ends CR LF, all ASCII; the first is the job to start.
+def split_for(program: Program, profile: ControllerProfile) -> tuple[Program, ...]:
+    """Return the jobs of a program, their names legal: one, or a master and the parts it calls.
 
     Raises:
-        InputError: If the name, the tool or a comment is not legal on the controller, or the
-            template does not give a job that says what the program says.
-        UnsafeError: If a posture is beyond the soft limits.
+        InputError: If the name is not of legal characters.
         OplError: If a pass has more moves than a job can hold.
     """
-    return {
-        part.name + FILE_SUFFIX: render(
-            part, scale, date, tool=tool, profile=profile, template=template
-        )
-        for part in split(program, profile.step_limit)
-    }
+    program = replace(program, name=short_name(program.name, profile.name_length))
+    return split(program, profile.step_limit, profile.name_length)
 
 
 def render(
-    program: Program,
-    scale: PulseScale,
+    part: Program,
+    robot: Robot,
+    settings: ProgramSettings,
+    profile: ControllerProfile,
     date: datetime,
-    *,
-    tool: int = 0,
-    profile: ControllerProfile = DX200,
-    template: Path | None = None,
 ) -> str:
-    """Return one job; see `render_jobs`, which also splits what is too long for one."""
-    template = TEMPLATE if template is None else template
-    layout = _Layout(
-        name=program.name,
-        tool=str(tool),
-        date=f"{date:%Y/%m/%d %H:%M}",
-        comments=(*program.comments, *_ratio_notes(scale, profile.comment_length)),
-        steps=_steps(program, scale, profile),
-        calls=program.calls,
-    )
-    _require_legal(layout, profile)
+    """Return one job, line ends CR LF, all ASCII; the same arguments give the same bytes.
+
+    Args:
+        part: What the robot shall do, no longer than a job can be.
+        robot: Who shall do it.
+        settings: How the job is written.
+        profile: The controller.
+        date: Date of the job.
+
+    Raises:
+        InputError: If the name, a number or a comment is not legal on the controller, or the
+            template does not give a job that says what the program says.
+        UnsafeError: If a posture is beyond the soft limits.
+    """
+    layout = _layout(part, robot, settings, profile, date)
+    _require_legal(layout, settings, profile)
+    template: Path = settings.template or TEMPLATE
     text = fill(template, layout.values()).replace("\n", "\r\n")
-    faults = find_faults(text, profile) or tuple(_differences(parse(text), layout))
+    faults = find_faults(text, profile) or tuple(differences(parse(text), layout))
     if faults:
         shown = [*faults[:_FAULTS_SHOWN], *(["..."] if len(faults) > _FAULTS_SHOWN else [])]
         raise InputError(str(template), "\n".join(["does not give the job asked for:", *shown]))
     return text
 
 
-@dataclass(frozen=True)
-class _Step:
-    """A position and the move to it, as texts."""
-
-    label: str
-    pulses: str
-    speed: str
-    level: str
-    comment: str | None
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """What a template gets, and what the job that comes out is compared with."""
-
-    name: str
-    tool: str
-    date: str
-    comments: tuple[str, ...]
-    steps: tuple[_Step, ...]
-    calls: tuple[str, ...]
-
-    def values(self) -> dict[str, object]:
-        counts = [len(self.steps)] + [0] * (len(POSITION_KINDS) - 1)
-        own = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {**own, "npos": ",".join(map(str, counts))}
-
-    @property
-    def all_comments(self) -> tuple[str, ...]:
-        return (*self.comments, *(step.comment for step in self.steps if step.comment))
-
-
-def _steps(program: Program, scale: PulseScale, profile: ControllerProfile) -> tuple[_Step, ...]:
-    if not program.moves:
-        return ()
-    pulses = scale.to_pulses(np.array([move.q for move in program.moves]))
-    return tuple(
-        _Step(
-            label=f"C{number:0{profile.label_digits}d}",
-            pulses=",".join(map(str, row)),
-            speed=profile.joint_speed_text(move.speed),
-            level=str(STOP_LEVEL if move.exact_stop else BLEND_LEVEL),
-            comment=move.comment,
-        )
-        for number, (row, move) in enumerate(zip(pulses.tolist(), program.moves, strict=True))
+def _layout(
+    part: Program,
+    robot: Robot,
+    settings: ProgramSettings,
+    profile: ControllerProfile,
+    date: datetime,
+) -> JobLayout:
+    form, frame = settings.positions, settings.user_frame
+    user = str(frame.number) if form is PositionForm.USER and frame is not None else None
+    pulses = form is PositionForm.PULSES
+    postype = "PULSE" if pulses else form.value.upper()
+    notes = _ratio_notes(robot, profile.comment_length) if pulses else _flip_notes(part)
+    return JobLayout(
+        name=part.name,
+        tool=str(settings.tool),
+        user=user,
+        postype=postype,
+        coordinates="PULSE" if pulses else "RECTAN",
+        attributes="SC,RW" if pulses or not part.moves else "SC,RW,RJ",
+        frame=None if pulses or not part.moves else f"USER {user}" if user else postype,
+        date=f"{date:%Y/%m/%d %H:%M}",
+        title=settings.title,
+        comments=(*part.comments, *notes),
+        steps=_steps(part, robot, settings, profile),
+        calls=part.calls,
     )
 
 
-def _ratio_notes(scale: PulseScale, width: int) -> list[str]:
+def _steps(
+    part: Program, robot: Robot, settings: ProgramSettings, profile: ControllerProfile
+) -> tuple[Step, ...]:
+    positions = write_positions(part, robot, settings, profile)
+    speeds = write_speeds(part, positions.q, robot, settings.T_flange_tool, profile)
+    actions = ActionWriter(profile)
+    steps = []
+    configuration_before = None
+    for number, move in enumerate(part.moves):
+        configuration = positions.configurations[number]
+        word, speed = speeds[number]
+        steps.append(
+            Step(
+                label=f"C{number:0{profile.label_digits}d}",
+                values=positions.values[number],
+                configuration=configuration if configuration != configuration_before else None,
+                word=word,
+                speed=speed,
+                level=str(STOP_LEVEL if move.exact_stop else _of_kind(settings.levels, move)),
+                ramps=_ramps(move, settings),
+                comment=move.comment,
+                actions=actions.lines(move.actions),
+            )
+        )
+        configuration_before = configuration
+    return tuple(steps)
+
+
+def _of_kind(numbers: ByKind, move: Move) -> int | None:
+    number: int | None = getattr(numbers, move.kind.value)
+    return number
+
+
+def _ramps(move: Move, settings: ProgramSettings) -> str:
+    pairs = (("ACC", settings.acceleration), ("DEC", settings.deceleration))
+    found = ((word, _of_kind(numbers, move)) for word, numbers in pairs)
+    return "".join(f" {word}={percent}" for word, percent in found if percent is not None)
+
+
+def _ratio_notes(robot: Robot, width: int) -> list[str]:
     """Return the comment lines that warn of ratios nobody has confirmed."""
-    if not scale.unverified:
+    if not robot.unverified_pulses:
         return []
-    return textwrap.wrap(f"PULSE RATIO NOT VERIFIED: {' '.join(scale.unverified)}", width)
+    return textwrap.wrap(f"PULSE RATIO NOT VERIFIED: {' '.join(robot.unverified_pulses)}", width)
 
 
-def _require_legal(layout: _Layout, profile: ControllerProfile) -> None:
+def _flip_notes(part: Program) -> list[str]:
+    """Return the comment line that warns of RCONF where no saved job shows what it means."""
+    bent_up = any(move.q[4] > 0.0 for move in part.moves)
+    return ["RCONF FLIP AT B > 0 NOT VERIFIED"] if bent_up else []
+
+
+def _require_legal(
+    layout: JobLayout, settings: ProgramSettings, profile: ControllerProfile
+) -> None:
     """Refuse what no template can make legal, before one gets the blame."""
-    if not 0 <= int(layout.tool) <= profile.highest_tool:
-        raise InputError("tool", f"must be 0 to {profile.highest_tool}, got {layout.tool}")
+    if not 0 <= settings.tool <= profile.highest_tool:
+        raise InputError(
+            "program.tool", f"must be 0 to {profile.highest_tool}, got {settings.tool}"
+        )
+    frame = settings.user_frame
+    if frame is not None and not 1 <= frame.number <= profile.highest_user_frame:
+        raise InputError(
+            "program.user_frame.number",
+            f"must be 1 to {profile.highest_user_frame}, got {frame.number}",
+        )
     for name in (layout.name, *layout.calls):
         if fault := profile.name_fault(name):
             raise InputError("program name", fault)
-    for comment in layout.all_comments:
+    for comment in (*layout.all_comments, *([layout.title] if layout.title else [])):
         if fault := profile.comment_fault(comment):
             raise InputError("program comment", fault)
-
-
-def _differences(job: InformJob, layout: _Layout) -> Iterator[str]:
-    """Say where a job does not do what was asked; a template may add, but not to the motion."""
-    if job.name != layout.name:
-        yield f"the name is {job.name}, must be {layout.name}"
-    yield from _first_difference(
-        "position",
-        [f"{job.lines[p.line - 1]} ({p.coordinates}, tool {p.tool})" for p in job.positions],
-        [f"{s.label}={s.pulses} (PULSE, tool {layout.tool})" for s in layout.steps],
-    )
-    yield from _first_difference(
-        "move",
-        [_motion_of(move) for move in job.moves],
-        [f"MOVJ {s.label} VJ={s.speed} PL={s.level}" for s in layout.steps],
-    )
-    yield from _first_difference(
-        "call", [name for name in job.calls if name in layout.calls], layout.calls
-    )
-    written = Counter(step.comment for step in job.instructions)
-    for comment, times in Counter(layout.all_comments).items():
-        if written[comment] < times:
-            yield f"comment {comment!r} is missing"
-    if any(step.word == "SFTON" for step in job.instructions):
-        yield "SFTON shifts the positions that follow"
-
-
-def _motion_of(move: Instruction) -> str:
-    """Return what decides where a move leads and how fast."""
-    words = [move.word, *move.operands]
-    words += [f"{name}={move.tag(name)}" for name in ("VJ", "PL")]
-    return " ".join(words + [f"+{coupled.word}" for coupled in move.coupled])
-
-
-def _first_difference(what: str, found: Sequence[str], wanted: Sequence[str]) -> Iterator[str]:
-    for number, (is_there, should_be) in enumerate(zip_longest(found, wanted), start=1):
-        if is_there != should_be:
-            yield f"{what} {number}: must be {should_be or 'none'}, is {is_there or 'missing'}"
-            return

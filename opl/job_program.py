@@ -1,0 +1,213 @@
+"""The section ``program`` of a job file: its keys, units and defaults."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import AfterValidator, Field, model_validator
+
+from opl.cell.robot import Robot
+from opl.documents import Document
+from opl.errors import InputError, OplError
+from opl.geometry.frames import Array, NotARotationError, nearest_pose
+from opl.program.actions import Action, Actions, Call, Dwell, Remark, SetOutput, WaitInput
+from opl.program.posts import Post, find_post
+from opl.program.pulses import require_accepted
+from opl.program.ratios import with_ratios
+from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
+from opl.program.write import try_out
+
+_Row = Annotated[list[float], Field(min_length=4, max_length=4)]
+
+
+def _proper(rows: list[list[float]]) -> list[list[float]]:
+    try:
+        nearest_pose(np.array(rows))
+    except NotARotationError as error:
+        raise ValueError(f"{error}, at most 0.02 is taken for rounding") from error
+    return rows
+
+
+_Matrix = Annotated[list[_Row], Field(min_length=4, max_length=4), AfterValidator(_proper)]
+_Signal = Annotated[int, Field(ge=0)]
+_Seconds = Annotated[float, Field(gt=0.0)]
+_Level = Annotated[int, Field(ge=0, le=8)]
+_Percent = Annotated[int, Field(ge=1, le=100)]
+
+
+class _Action(Document):
+    """One line of a list of actions: exactly one of its main keys."""
+
+    comment: str | None = None
+    output: _Signal | None = None
+    wait_input: _Signal | None = None
+    state: bool | None = None
+    timeout_s: _Seconds | None = None
+    dwell_s: _Seconds | None = None
+    call: str | None = None
+
+    @model_validator(mode="after")
+    def _one_action(self) -> _Action:
+        main = ("comment", "output", "wait_input", "dwell_s", "call")
+        given = [key for key in main if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise ValueError(f"needs exactly one of {', '.join(main)}")
+        signal = given[0] in ("output", "wait_input")
+        if signal != (self.state is not None):
+            raise ValueError("state (on or off) goes with output and wait_input, and only there")
+        if self.timeout_s is not None and given[0] != "wait_input":
+            raise ValueError("timeout_s goes with wait_input only")
+        return self
+
+    def in_si(self) -> Action:
+        if self.comment is not None:
+            return Remark(self.comment)
+        if self.output is not None:
+            return SetOutput(self.output, bool(self.state))
+        if self.wait_input is not None:
+            return WaitInput(self.wait_input, bool(self.state), self.timeout_s)
+        if self.dwell_s is not None:
+            return Dwell(self.dwell_s)
+        return Call(str(self.call))
+
+
+class _Levels(Document):
+    on_wheel: _Level = 1
+    lead: _Level = 1
+    air: _Level = 1
+
+
+class _Percents(Document):
+    on_wheel: _Percent | None = None
+    lead: _Percent | None = None
+    air: _Percent | None = None
+
+    def in_si(self) -> ByKind:
+        return ByKind(self.on_wheel, self.lead, self.air)
+
+
+class _UserFrame(Document):
+    number: Annotated[int, Field(ge=1)]
+    T_base_user_mm: _Matrix
+
+
+class ProgramSection(Document):
+    """The keys of the section ``program``."""
+
+    controller: str = "DX200"
+    tool: Annotated[int, Field(ge=0)] = 0
+    T_flange_tool_mm: _Matrix | None = None
+    motion: Literal["joint", "straight"] = "joint"
+    positions: Literal["pulses", "base", "robot", "user"] = "pulses"
+    user_frame: _UserFrame | None = None
+    pulse_ratios: str | None = None
+    accept_unverified_pulses: list[str] = Field(default=[])
+    levels: _Levels = _Levels()
+    acceleration_percent: _Percents = _Percents()
+    deceleration_percent: _Percents = _Percents()
+    comment: str | None = None
+    at_start: list[_Action] = Field(default=[])
+    before_pass: list[_Action] = Field(default=[])
+    after_pass: list[_Action] = Field(default=[])
+    at_end: list[_Action] = Field(default=[])
+    template: str | None = None
+
+    @model_validator(mode="after")
+    def _fits(self) -> ProgramSection:
+        if (self.positions == "user") != (self.user_frame is not None):
+            raise ValueError("user_frame goes with positions: user, and only there")
+        cartesian = self.positions != "pulses" or self.motion == "straight"
+        if cartesian and self.tool and self.T_flange_tool_mm is None:
+            raise ValueError(
+                "positions in a frame and straight moves need T_flange_tool_mm, the data of tool "
+                f"{self.tool} on the controller"
+            )
+        return self
+
+    def robot_as_counted(self, path: Path, robot: Robot) -> Robot:
+        """Return the robot with the pulse ratios and soft limits that the job names.
+
+        Raises:
+            InputError: If that file is unusable.
+        """
+        if self.pulse_ratios is None:
+            return robot
+        try:
+            return with_ratios(robot, path.parent / self.pulse_ratios)
+        except InputError as error:
+            raise InputError(f"{path}: program.pulse_ratios", str(error)) from error
+
+    def in_si(self, path: Path, name: str, robot: Robot, home: Array) -> ProgramSettings:
+        """Return the settings, tried out on a program that only goes home.
+
+        Args:
+            path: The job file.
+            name: The program's name.
+            robot: Whose program.
+            home: Joint positions in [rad], shape (6,).
+
+        Raises:
+            InputError: If something in it is unknown, or the controller does not take it.
+        """
+        post = find_post(self.controller, f"{path}: program.controller")
+        self._require_possible(path, post)
+        where = f"{path}: program.accept_unverified_pulses"
+        for joint in self.accept_unverified_pulses:
+            if joint not in robot.joint_names:
+                known = ", ".join(robot.joint_names)
+                raise InputError(where, f"no such joint {joint!r}; have: {known}")
+        if post.counts_pulses and self.positions == "pulses":
+            require_accepted(robot.unverified_pulses, self.accept_unverified_pulses, where)
+        settings = self._settings(path)
+        try:
+            try_out(name, home, robot, settings)
+        except OplError as error:
+            raise InputError(str(path), str(error)) from error
+        return settings
+
+    def _settings(self, path: Path) -> ProgramSettings:
+        levels = self.levels
+        frame = self.user_frame
+        return ProgramSettings(
+            controller=self.controller,
+            tool=self.tool,
+            T_flange_tool=_pose(self.T_flange_tool_mm),
+            motion=MotionForm(self.motion),
+            positions=PositionForm(self.positions),
+            user_frame=None
+            if frame is None
+            else UserFrame(frame.number, _pose(frame.T_base_user_mm)),
+            levels=ByKind(levels.on_wheel, levels.lead, levels.air),
+            acceleration=self.acceleration_percent.in_si(),
+            deceleration=self.deceleration_percent.in_si(),
+            actions=Actions(
+                *(
+                    tuple(action.in_si() for action in some)
+                    for some in (self.at_start, self.before_pass, self.after_pass, self.at_end)
+                )
+            ),
+            accepted_pulses=tuple(self.accept_unverified_pulses),
+            title=self.comment,
+            template=None if self.template is None else path.parent / self.template,
+        )
+
+    def _require_possible(self, path: Path, post: Post) -> None:
+        """Refuse keys that the post would pass over in silence."""
+        if post.counts_pulses:
+            return
+        own = ("positions", "user_frame", "levels", "acceleration_percent", "deceleration_percent")
+        for key in own:
+            if key in self.model_fields_set:
+                raise InputError(
+                    f"{path}: program.{key}", f"is for Yaskawa controllers, not for {post.title}"
+                )
+
+
+def _pose(matrix_mm: list[list[float]] | None) -> Array:
+    if matrix_mm is None:
+        return np.eye(4)
+    matrix = np.array(matrix_mm)
+    matrix[:3, 3] *= 1e-3
+    return nearest_pose(matrix)

@@ -1,0 +1,83 @@
+"""The posts of the Yaskawa controllers: what `opl.program.posts` finds under their names."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+import numpy as np
+
+from opl.cell.robot import Robot
+from opl.errors import InputError
+from opl.program.controller import ControllerProfile
+from opl.program.inform.cartesian import frame_pose
+from opl.program.inform.layout import VARIABLES
+from opl.program.inform.parse import parse
+from opl.program.inform.render import FILE_SUFFIX, TEMPLATE, render, split_for
+from opl.program.inform.times import move_times
+from opl.program.moves import Program
+from opl.program.posts import Post, Written, pass_times
+from opl.program.profiles import PROFILES
+from opl.program.pulses import require_accepted
+from opl.program.settings import PositionForm, ProgramSettings
+
+
+def write_jobs(
+    program: Program,
+    robot: Robot,
+    settings: ProgramSettings,
+    profile: ControllerProfile,
+    date: datetime,
+) -> Written:
+    """Return the job files of a program: one, or a master and the parts it calls.
+
+    Args:
+        program: What the robot shall do.
+        robot: Who shall do it.
+        settings: How it is written.
+        profile: The controller.
+        date: Date of the jobs.
+
+    Raises:
+        InputError: If something the job asks for is not legal on the controller, the template is
+            unusable, or a pulse ratio is neither verified nor accepted.
+        UnsafeError: If a posture is beyond the soft limits.
+        OplError: If a pass has more moves than a job can hold, or cannot keep its time.
+    """
+    if settings.positions is PositionForm.PULSES:
+        where = "program.accept_unverified_pulses"
+        require_accepted(robot.unverified_pulses, settings.accepted_pulses, where)
+    parts = split_for(program, profile)
+    clash = settings.actions.calls & {part.name for part in parts}
+    if clash:
+        raise InputError("program: call", f"{sorted(clash)[0]} is the name of the program itself")
+    T_base_frame = frame_pose(settings)
+    files, speeds, times = {}, {}, {}
+    for part in parts:
+        text = render(part, robot, settings, profile, date)
+        files[part.name + FILE_SUFFIX] = text
+        job = parse(text)
+        written_times = move_times(job, robot, T_base_frame, settings.T_flange_tool)
+        for move, line, time in zip(part.moves, job.moves, written_times, strict=True):
+            if move.duration is None and move.posture in speeds:
+                continue  # a part begins where the one before it ended
+            speeds[move.posture] = next(
+                f"{tag}={value}" for tag, value in line.tags if tag in ("VJ", "V", "VR")
+            )
+            if np.isfinite(time):
+                times[move.posture] = float(time)
+    return Written(files, speeds, times, pass_times(program, times, profile.name))
+
+
+def post_of(profile: ControllerProfile) -> Post:
+    """Return the post of a controller."""
+
+    def write(program: Program, robot: Robot, settings: ProgramSettings, date: datetime) -> Written:
+        return write_jobs(program, robot, settings, profile, date)
+
+    title = f"Yaskawa {profile.name} (INFORM)"
+    return Post(title, write, TEMPLATE, VARIABLES, counts_pulses=True)
+
+
+NX100, DX100, DX200, YRC1000 = (
+    post_of(PROFILES[name]) for name in ("NX100", "DX100", "DX200", "YRC1000")
+)

@@ -1,0 +1,100 @@
+"""Universal Robots scripts (URScript): joint positions in [rad], each move with its time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from datetime import datetime
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from opl import resources
+from opl.cell.robot import Robot, forward
+from opl.program.actions import Action, Call, Dwell, SetOutput, WaitInput
+from opl.program.makers.text import VARIABLES, Dialect, rounded_times, write_steps, written
+from opl.program.moves import Program
+from opl.program.posts import Post, Written
+from opl.program.settings import Array, ProgramSettings
+
+TEMPLATE = resources.folder("templates") / "urscript" / "program.script.j2"
+
+_DIALECT = Dialect(
+    maker="URScript",
+    name=re.compile(r"[A-Z][A-Z0-9_]{0,49}"),
+    name_rule="a letter and up to 49 letters, digits or _",
+    comment_length=80,
+    motion=re.compile(r"^(?:move[jlpc]|servo[jc]|speed[jl])\("),
+    line_end="\n",
+)
+# Blends of two neighbouring points must not overlap, and none needs more than this in [m].
+_BLEND_SHARE = 0.4
+_LARGEST_BLEND = 0.001
+_START_ACCELERATION = 0.3  # [rad/s^2] of the move to the first posture
+
+
+def write(program: Program, robot: Robot, settings: ProgramSettings, date: datetime) -> Written:
+    """Return the program as URScript."""
+    _DIALECT.require_legal(program, settings)
+    times = rounded_times(program.moves, 4, 0.0001)
+    q = np.array([move.q for move in program.moves]).reshape(-1, 6)
+    Ts_base_tool = forward(robot, q) @ settings.T_flange_tool
+    blends = _blends(program, Ts_base_tool)
+    moves = []
+    for move, time, blend in zip(program.moves, times, blends, strict=True):
+        target = "[" + ", ".join(f"{round(float(a), 6) + 0.0:.6f}" for a in move.q) + "]"
+        speed = f"t={time:.4f}"
+        if np.isnan(time):
+            speed = f"a={_START_ACCELERATION}, v={move.speed * robot.max_speed.min():.4f}"
+        word = "movel" if move.straight else "movej"
+        moves.append((f"{word}({target}, {speed}, r={blend:.5f})", target, speed, float(time)))
+    steps = write_steps(program, moves, lambda action: [*_action(action)])
+    x, y, z = settings.T_flange_tool[:3, 3]
+    turn = Rotation.from_matrix(settings.T_flange_tool[:3, :3]).as_rotvec()
+    values = {
+        "name": program.name,
+        "date": f"{date:%Y-%m-%d %H:%M}",
+        "title": settings.title,
+        "tool": "p[" + ", ".join(f"{value + 0.0:.6f}" for value in (x, y, z, *turn)) + "]",
+        "comments": program.comments,
+    }
+    text = _DIALECT.render(settings.template or TEMPLATE, values, steps)
+    return written(program, f"{program.name}.script", text, steps)
+
+
+def _blends(program: Program, Ts_base_tool: Array) -> Array:
+    """Return the blend radius at the end of each move in [m]."""
+    lengths = np.linalg.norm(np.diff(Ts_base_tool[:, :3, 3], axis=0), axis=1)
+    before, after = np.r_[0.0, lengths], np.r_[lengths, 0.0]
+    room = np.minimum(_BLEND_SHARE * np.minimum(before, after), _LARGEST_BLEND)
+    stops = np.array([move.exact_stop for move in program.moves], dtype=bool)
+    return np.where(stops, 0.0, room)
+
+
+def _action(action: Action) -> Iterator[str]:
+    if isinstance(action, SetOutput):
+        yield f"set_standard_digital_out({action.number}, {action.state})"
+    elif isinstance(action, Dwell):
+        yield f"sleep({action.seconds:.2f})"
+    elif isinstance(action, WaitInput):
+        missing = f"get_standard_digital_in({action.number}) != {action.state}"
+        if action.timeout is None:
+            yield from (f"while {missing}:", "sync()", "end")
+        else:
+            yield "waited = 0.0"
+            yield f"while {missing}:"
+            yield "sleep(0.01)"
+            yield "waited = waited + 0.01"
+            yield f"if waited >= {action.timeout:.2f}:"
+            # gone on with by a person, it waits again instead of going on without the signal
+            yield f'popup("no signal at input {action.number}", blocking=True)'
+            yield "waited = 0.0"
+            yield "end"
+            yield "end"
+    elif isinstance(action, Call):
+        yield f"{action.name}()"
+    else:
+        yield f"# {action.text}"
+
+
+POST = Post("Universal Robots URScript", write, TEMPLATE, VARIABLES)

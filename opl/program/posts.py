@@ -1,0 +1,122 @@
+"""Posts: what turns a maker-neutral program into the files of one controller.
+
+A post is a Python entry point of the group ``opl.posts``; its name is what a job calls its
+controller. Those that come with opl are declared in opl's own ``pyproject.toml``, those of a site
+in the site's own package, which leaves opl as it is::
+
+    [project.entry-points."opl.posts"]
+    OUR_CELL = "our_package.our_module:POST"
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from importlib.metadata import entry_points
+from pathlib import Path
+
+from opl.cell.robot import Robot
+from opl.errors import InputError, OplError
+from opl.program.moves import PassTime, Program
+from opl.program.settings import ProgramSettings
+
+GROUP = "opl.posts"
+
+# How far the time of a pass may be from the wanted one, as a fraction of it: the pressure of the
+# part on the belt is set for the feed.
+PASS_TIME_TOLERANCE = 0.02
+
+
+@dataclass(frozen=True)
+class Written:
+    """A program in the language of a controller.
+
+    Attributes:
+        files: Text by file name, line ends as the controller wants them, the one to start first.
+        speeds: Speed of the move to each posture as written, by the posture's index in the motion.
+        times: Time of that move at the written speed in [s], ramps left out, by the same index.
+        pass_times: Of each pass.
+    """
+
+    files: Mapping[str, str]
+    speeds: Mapping[int, str] = field(default_factory=dict)
+    times: Mapping[int, float] = field(default_factory=dict)
+    pass_times: tuple[PassTime, ...] = ()
+
+
+@dataclass(frozen=True)
+class Post:
+    """One way to write programs.
+
+    Attributes:
+        title: The controller, for people.
+        write: Writes a program; the date is part of the files where the controller wants one. It
+            raises `OplError`s, and returns nothing that the controller would refuse.
+        template: The layout that comes with the post.
+        variables: What its templates get: name and meaning.
+        counts_pulses: Whether positions may be written in encoder pulses.
+    """
+
+    title: str
+    write: Callable[[Program, Robot, ProgramSettings, datetime], Written]
+    template: Path
+    variables: Mapping[str, str]
+    counts_pulses: bool = False
+
+
+def known_posts() -> list[str]:
+    """Return the names of the posts that are installed."""
+    return sorted({entry.name for entry in entry_points(group=GROUP)})
+
+
+def find_post(name: str, where: str = "program.controller") -> Post:
+    """Return the post of a controller.
+
+    Args:
+        name: As a job names it.
+        where: File and key, for messages.
+
+    Raises:
+        InputError: If there is none, or it cannot be loaded.
+    """
+    found = [entry for entry in entry_points(group=GROUP) if entry.name == name]
+    if not found:
+        raise InputError(where, f"unknown controller {name!r}; known: {', '.join(known_posts())}")
+    try:
+        post = found[0].load()
+    except Exception as error:  # a package of the site's own: whatever is wrong in it
+        raise InputError(where, f"post {found[0].value} cannot be loaded: {error}") from error
+    if not isinstance(post, Post):
+        raise InputError(where, f"post {found[0].value} is no opl.program.posts.Post")
+    return post
+
+
+def pass_times(
+    program: Program, times: Mapping[int, float], controller: str
+) -> tuple[PassTime, ...]:
+    """Return wanted and written time of each pass.
+
+    Args:
+        program: The moves.
+        times: Time of the move to each posture as written in [s], by the posture's index.
+        controller: For messages.
+
+    Raises:
+        OplError: If a pass does not keep its time.
+    """
+    wanted: dict[int, float] = {}
+    written: dict[int, float] = {}
+    for move in program.moves:
+        if move.ground_pass is not None and move.duration is not None:
+            wanted[move.ground_pass] = wanted.get(move.ground_pass, 0.0) + move.duration
+            written[move.ground_pass] = written.get(move.ground_pass, 0.0) + times[move.posture]
+    found = {index: PassTime(wanted[index], written[index]) for index in sorted(wanted)}
+    for index, one in found.items():
+        if abs(one.error) > PASS_TIME_TOLERANCE:
+            raise OplError(
+                f"pass {index + 1} would take {one.written:.2f} s instead of {one.wanted:.2f} s: "
+                f"{controller} cannot be told speeds so low; raise process.feed_mm_s, or ask for "
+                "program.motion: straight"
+            )
+    return tuple(found.values())

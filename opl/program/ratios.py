@@ -1,0 +1,159 @@
+"""Pulse ratios of one robot in a small file of the user's own, written by opl or by hand.
+
+By axis it holds either what the controller's parameters say, or two readings from the pendant: the
+same axis in two positions, each in pulses and in degrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from opl.cell.robot import Robot
+from opl.documents import Document, read
+from opl.errors import InputError
+from opl.program.parameters import AxisParameters
+
+# Readings nearer than this in [deg] give a ratio of too few digits: the pendant shows hundredths.
+LEAST_SPAN = 20.0
+# Farthest from zero pulses [deg] that two readings may meet zero degrees.
+ZERO_TOLERANCE = 0.1
+# Link lengths [m] of a calibrated arm stray from the drawing's by some millimetres.
+LINK_TOLERANCE = 0.01
+
+
+class _Reading(Document):
+    pulses: int
+    degrees: float
+
+
+class _Axis(Document):
+    name: str
+    per_degree: Annotated[float, Field(gt=0.0)] | None = None
+    readings: Annotated[list[_Reading], Field(min_length=2, max_length=2)] | None = None
+    lower_pulses: int | None = None
+    upper_pulses: int | None = None
+
+    @model_validator(mode="after")
+    def _usable(self) -> _Axis:
+        if (self.per_degree is None) == (self.readings is None):
+            raise ValueError("needs either per_degree or readings")
+        low, high = self.lower_pulses, self.upper_pulses
+        if low is not None and high is not None and low >= high:
+            raise ValueError(f"lower_pulses must be below upper_pulses {high}")
+        if self.readings is not None:
+            first, second = self.readings
+            span = second.degrees - first.degrees
+            if abs(span) < LEAST_SPAN:
+                raise ValueError(f"readings must be {LEAST_SPAN:g} degrees apart or more")
+            ratio = (second.pulses - first.pulses) / span
+            if ratio <= 0.0:
+                raise ValueError("readings must grow in pulses as in degrees")
+            if abs(first.degrees - first.pulses / ratio) > ZERO_TOLERANCE:
+                raise ValueError("readings must lie on a line through 0 pulses at 0 degrees")
+        return self
+
+    def ratio(self) -> float:
+        """Return the pulses per degree."""
+        if self.per_degree is not None:
+            return self.per_degree
+        assert self.readings is not None
+        first, second = self.readings
+        return (second.pulses - first.pulses) / (second.degrees - first.degrees)
+
+
+class _RatioFile(Document):
+    robot: str
+    source: str
+    axes: Annotated[list[_Axis], Field(min_length=1)]
+
+
+def with_ratios(robot: Robot, path: Path) -> Robot:
+    """Return a robot that counts, and is limited, as its own controller says.
+
+    The axes of the file are verified then; axes it leaves out stay as they were. Of two limits the
+    narrower one holds.
+
+    Args:
+        robot: The robot as opl knows it.
+        path: The file.
+
+    Raises:
+        InputError: If the file is unusable or of another robot.
+    """
+    file = read(path, _RatioFile)
+    if file.robot != robot.name:
+        raise InputError(f"{path}: robot", f"must be {robot.name!r}, got {file.robot!r}")
+    names = [axis.name for axis in file.axes]
+    for place, name in enumerate(names):
+        where = f"{path}: axes.{place}.name"
+        if name not in robot.joint_names:
+            known = ", ".join(robot.joint_names)
+            raise InputError(where, f"no such joint {name!r}; have: {known}")
+        if name in names[:place]:
+            raise InputError(where, f"joint {name} is given twice")
+    ratios, lower, upper = (
+        np.array(value) for value in (robot.pulses_per_radian, robot.lower, robot.upper)
+    )
+    for axis in file.axes:
+        joint = robot.joint_names.index(axis.name)
+        ratios[joint] = np.rad2deg(axis.ratio())
+        if axis.lower_pulses is not None:
+            lower[joint] = max(lower[joint], axis.lower_pulses / ratios[joint])
+        if axis.upper_pulses is not None:
+            upper[joint] = min(upper[joint], axis.upper_pulses / ratios[joint])
+        if lower[joint] >= upper[joint]:
+            raise InputError(str(path), f"joint {axis.name}: no range is left between the limits")
+    unverified = tuple(name for name in robot.unverified_pulses if name not in names)
+    return replace(
+        robot, pulses_per_radian=ratios, lower=lower, upper=upper, unverified_pulses=unverified
+    )
+
+
+def ratio_file(robot: Robot, parameters: AxisParameters, source: str) -> str:
+    """Return the text of a file with the controller's parameters.
+
+    Args:
+        robot: Whose parameters they are said to be.
+        parameters: As read from the controller's file.
+        source: Name of that file.
+    """
+    axes = zip(
+        robot.joint_names,
+        parameters.pulses_per_degree,
+        parameters.lower,
+        parameters.upper,
+        strict=True,
+    )
+    rows = [
+        f"  - {{name: {name}, per_degree: {ratio:.6f}, lower_pulses: {low}, upper_pulses: {high}}}"
+        for name, ratio, low, high in axes
+    ]
+    cautions = [f"# caution: {line}" for line in mismatches(robot, parameters)]
+    return "\n".join(
+        [
+            f"# Pulse ratios and soft limits of one {robot.title}; a job names this file as",
+            "# program.pulse_ratios.",
+            *cautions,
+            f"robot: {robot.name}",
+            f"source: '{source.replace(chr(39), chr(39) * 2)}, layout of {parameters.layout}'",
+            "axes:",
+            *rows,
+            "",
+        ]
+    )
+
+
+def mismatches(robot: Robot, parameters: AxisParameters) -> Sequence[str]:
+    """Return what speaks against the parameters being those of the robot, one line each."""
+    arm, links = robot.arm, np.array(parameters.link_lengths)
+    drawn = np.abs([arm.a1, arm.c2, arm.a2, arm.c3, arm.c4])
+    if not links.any() or np.abs(links - drawn).max() <= LINK_TOLERANCE:
+        return ()
+    seen, known = (" ".join(f"{length * 1e3:.0f}" for length in row) for row in (links, drawn))
+    return (f"the file is of an arm with links of {seen} mm, {robot.title} has {known} mm",)

@@ -1,0 +1,94 @@
+"""What a job asks of its program, in SI units; the YAML keys are known in `opl.job` only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opl.program.actions import NO_ACTIONS, Actions
+
+Array = NDArray[np.float64]
+
+
+class MotionForm(str, Enum):
+    """How moves on the wheel and along its normal are written."""
+
+    JOINT = "joint"  # all joints linear, as verified
+    STRAIGHT = "straight"  # the tool point on a line, where that stays near the verified path
+
+
+class PositionForm(str, Enum):
+    """How positions are written."""
+
+    PULSES = "pulses"
+    BASE = "base"
+    ROBOT = "robot"
+    USER = "user"
+
+
+@dataclass(frozen=True, eq=False)
+class UserFrame:
+    """A user frame as it is set on the controller.
+
+    Attributes:
+        number: Its number.
+        T_base_user: Where it lies, shape (4, 4).
+    """
+
+    number: int
+    T_base_user: Array
+
+
+@dataclass(frozen=True)
+class ByKind:
+    """A number for each kind of move, none where the controller's own is to hold.
+
+    Attributes:
+        on_wheel: While grinding.
+        lead: To and from the wheel along its normal.
+        air: From and to home, and between passes.
+    """
+
+    on_wheel: int | None = None
+    lead: int | None = None
+    air: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramSettings:
+    """How a program is written.
+
+    Attributes:
+        controller: Name of the post that writes it, e.g. ``DX200``.
+        tool: Number of the tool in whose name positions are kept.
+        T_flange_tool: That tool as it is set on the controller, shape (4, 4).
+        motion: How moves on the wheel are written.
+        positions: How positions are written.
+        user_frame: The frame of positions in a user frame.
+        levels: How far corners may be rounded where the robot does not stop (PL of a Yaskawa).
+        acceleration: Of each kind of move in percent of the controller's own ramp.
+        deceleration: The same for slowing down.
+        actions: What is done around the passes.
+        accepted_pulses: Joints whose unverified pulse ratios are accepted.
+        title: A line about the program, None without one.
+        template: The user's own template, None for the one that comes with opl.
+    """
+
+    controller: str = "DX200"
+    tool: int = 0
+    T_flange_tool: Array = field(default_factory=lambda: np.eye(4))
+    motion: MotionForm = MotionForm.JOINT
+    positions: PositionForm = PositionForm.PULSES
+    user_frame: UserFrame | None = None
+    # the finest level that does not stop: a pass must not, or the belt digs in
+    levels: ByKind = ByKind(on_wheel=1, lead=1, air=1)
+    acceleration: ByKind = ByKind()
+    deceleration: ByKind = ByKind()
+    actions: Actions = NO_ACTIONS
+    accepted_pulses: tuple[str, ...] = ()
+    title: str | None = None
+    template: Path | None = None
