@@ -62,8 +62,10 @@ class CollisionScene:
 
     def colliding_pairs(self, q: Array) -> list[Pair]:
         """Return the names of every pair in collision at one posture, shape (6,)."""
-        self._ask(q, False)
         results = self._geometry_data.collisionResults
+        for result in results:
+            result.clear()  # the broad phase leaves those of the pairs it passes over as they were
+        self._ask(q, False)
         hits = [pair for pair, hit in zip(self._pairs, results, strict=True) if hit.isCollision()]
         return list(dict.fromkeys(hits))
 

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from opl.cell.collision import CollisionScene
-from opl.geometry.frames import Array
+from opl.planning.ladder import Ladder
 from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
-from opl.planning.recursive import Ladder
-
-SAME_SUM = 1e-6  # [rad] two tracks whose joint range sums differ by less are equally good
 
 
 @dataclass(frozen=True)
@@ -50,6 +46,11 @@ class Branch:
     causes: Counter[tuple[int, str]] = field(default_factory=Counter)
     reached: int = 0
     _swept: set[int] = field(default_factory=set)
+
+    @property
+    def blocked_steps(self) -> np.ndarray:
+        """The blocked keys, sorted, as the searches take them."""
+        return np.array(sorted(self.blocked), dtype=np.int64)
 
     def block_step(self, column: int, rows: np.ndarray, cause: str) -> None:
         """Block the step that a track makes from a column to the next."""
@@ -91,52 +92,3 @@ def branches_of(problem: GrindingProblem) -> list[Branch]:
         free = problem.free_nodes(nodes)
         branches.append(Branch(nodes, problem.ladder(nodes, free), free))
     return branches
-
-
-def twins(branches: list[Branch], track: Track, lower: Array, upper: Array) -> list[Track]:
-    """Return the tracks with the same contact positions and joint range sum, best margin first.
-
-    The other flip of the wrist, or a full turn of a wrist axis, makes the same motion at another
-    distance from the joint limits. ``track`` itself is among them.
-
-    Args:
-        branches: All branches.
-        track: The track.
-        lower: Lower joint limits in [rad], shape (6,).
-        upper: Upper joint limits in [rad], shape (6,).
-    """
-    nodes = branches[track.branch].nodes
-    positions = nodes.position_index[track.rows]
-    total = _range_sum(nodes, track.rows)
-    found = []
-    for index, branch in enumerate(branches):
-        for rows in _followers(branch, positions):
-            if abs(_range_sum(branch.nodes, rows) - total) < SAME_SUM and branch.allows(rows):
-                q = branch.nodes.q[np.arange(len(rows)), rows]
-                margins = np.minimum(q - lower, upper - q).min(axis=0)
-                nearness = float((1.0 / np.maximum(margins, 1e-3)).sum())
-                found.append((nearness, Track(index, rows)))
-    found.sort(key=lambda item: item[0])
-    return [twin for _, twin in found] or [track]
-
-
-def _range_sum(nodes: NodeMatrix, rows: np.ndarray) -> float:
-    return float(np.ptp(nodes.q[np.arange(len(rows)), rows], axis=0).sum())
-
-
-def _followers(branch: Branch, positions: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the tracks of a branch with given contact positions, one for each turn of the wrist."""
-    nodes = branch.nodes
-    for start in np.flatnonzero(nodes.position_index == positions[0]):
-        rows = np.full(len(positions), start)
-        for column in range(1, len(positions)):
-            alike = np.flatnonzero(nodes.position_index == positions[column])
-            away = np.abs(nodes.q[column, alike] - nodes.q[column - 1, rows[column - 1]]).sum(
-                axis=1
-            )
-            if np.isnan(away).all():
-                break
-            rows[column] = alike[np.nanargmin(away)]
-        else:
-            if nodes.exists[0, start]:
-                yield rows

@@ -1,8 +1,10 @@
 """The node matrix: every posture that can grind each cutter point.
 
-A column is a cutter point, a row is a contact position together with a full turn of the wrist axes:
-a ladder graph whose rungs are the columns. Each branch of the inverse kinematics has its own
-matrix, because a track never changes branch (a change passes a singularity).
+A column is a cutter point, a row a contact position: a ladder graph whose rungs are the columns.
+Each branch of the inverse kinematics has its own matrices, because a track never changes branch (a
+change passes a singularity). Joints that turn more than once have several counts of turns for a
+posture; where the angles of a branch leave a gap that no step could cross, each count is a matrix
+of its own, elsewhere the counts are more rows of one matrix.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from opl.geometry.toolpath import CutterPoints
 
 @dataclass(frozen=True)
 class NodeMatrix:
-    """The nodes of one branch.
+    """The nodes of one branch, or of one count of full turns in it.
 
     Attributes:
         branch: Slot of the inverse kinematics, 0 to 7.
@@ -38,7 +40,7 @@ class NodeMatrix:
     @cached_property
     def exists(self) -> np.ndarray:
         """Which nodes there are, shape (n_columns, n_rows)."""
-        return ~np.isnan(self.q[..., 0])
+        return np.ascontiguousarray(~np.isnan(self.q[..., 0]))
 
 
 @dataclass(frozen=True)
@@ -49,12 +51,16 @@ class NodeField:
         contact_positions: The values of t, shape (M,).
         q: All inverse solutions as principal angles in [rad], NaN out of reach, shape
             (n_columns, M, 8, 6). Kept to tell reach from limits when nothing is left.
-        branches: One matrix per branch that has a node within the limits, in slot order.
+        branches: The matrices that have a node within the limits, in slot order.
     """
 
     contact_positions: Array
     q: Array
     branches: tuple[NodeMatrix, ...]
+
+
+# [rad] a gap in the angles of a joint that is wider than this is crossed by no step of a track
+SEAM_GAP = np.deg2rad(45.0)
 
 
 def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) -> NodeField:
@@ -72,17 +78,60 @@ def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) 
     q = inverse(robot.arm, Ts_base_flange)  # (N, M, 8, 6)
     branches = []
     for branch in range(q.shape[2]):
-        columns, rows = [], []
-        for turn in turns(robot.lower, robot.upper):
-            turned = q[:, :, branch] + turn
+        if np.isnan(q[:, :, branch, 0]).all():
+            continue
+        lifted, sheets, copies = _lift(q[:, :, branch], robot.lower, robot.upper)
+        for sheet in sheets:
+            # (N, copies, M, 6)
+            turned = lifted[:, None] + sheet + copies[:, None]
             within = ((turned >= robot.lower) & (turned <= robot.upper)).all(axis=-1)
-            turned = np.where(within[..., None], turned, np.nan)
-            used = np.flatnonzero(within.any(axis=0))
-            columns.append(turned[:, used])
-            rows.append(used)
-        position_index = np.concatenate(rows)
-        if len(position_index):
-            q_branch = np.ascontiguousarray(np.concatenate(columns, axis=1))
-            t = contact_positions[position_index]
-            branches.append(NodeMatrix(branch, q_branch, t, position_index))
+            copy, position_index = np.nonzero(within.any(axis=0))
+            if len(position_index):
+                q_sheet = np.ascontiguousarray(
+                    np.where(within[..., None], turned, np.nan)[:, copy, position_index]
+                )
+                t = contact_positions[position_index]
+                branches.append(NodeMatrix(branch, q_sheet, t, position_index))
     return NodeField(contact_positions, q, tuple(branches))
+
+
+def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
+    """Unroll the angles of one branch where they leave a gap.
+
+    Args:
+        q: Principal angles in [rad], NaN where there are none, shape (N, M, 6).
+        lower: Lower joint limits in [rad], shape (6,).
+        upper: Upper joint limits in [rad], shape (6,).
+
+    Returns:
+        Angles that are continuous over the whole field wherever there is a gap, shape (N, M, 6);
+        the full turns that make sheets of them, shape (n_sheets, 6); the full turns by which the
+        nodes of one sheet are repeated, shape (n_copies, 6); both in [rad].
+    """
+    lifted = q.copy()
+    sheet_turns: list[Array] = [np.zeros(1)] * 6
+    copy_turns: list[Array] = [np.zeros(1)] * 6
+    all_turns = turns(lower, upper)
+    for joint in range(6):
+        counts = np.unique(all_turns[:, joint])
+        if len(counts) == 1:
+            continue
+        angles = np.sort(q[..., joint], axis=None)
+        angles = angles[~np.isnan(angles)]
+        gaps = np.diff(angles, append=angles[0] + 2.0 * np.pi)
+        widest = int(np.argmax(gaps))
+        if gaps[widest] <= SEAM_GAP:
+            copy_turns[joint] = counts
+            continue
+        start = angles[(widest + 1) % len(angles)]
+        lifted[..., joint] = start + np.remainder(q[..., joint] - start, 2.0 * np.pi)
+        end = start + 2.0 * np.pi - gaps[widest]
+        first = np.ceil((lower[joint] - end) / (2.0 * np.pi))
+        last = np.floor((upper[joint] - start) / (2.0 * np.pi))
+        sheet_turns[joint] = 2.0 * np.pi * np.arange(first, last + 1)
+    return lifted, _products(sheet_turns), _products(copy_turns)
+
+
+def _products(values: list[Array]) -> Array:
+    """Return every combination of one value per joint, shape (k, 6)."""
+    return np.stack(np.meshgrid(*values, indexing="ij"), axis=-1).reshape(-1, len(values))

@@ -11,8 +11,8 @@ from opl.cell.robot import forward
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array, interpolate, transform
 from opl.geometry.toolpath import CutterPoints
+from opl.planning.ladder import middle_count
 from opl.planning.nodes import NodeMatrix
-from opl.planning.recursive import middle_count
 
 
 @dataclass(frozen=True)

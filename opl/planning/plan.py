@@ -16,13 +16,14 @@ import numpy as np
 from opl.cell.workcell import PART, WHEEL
 from opl.errors import NoPathError
 from opl.planning.air import UnreachableApproachError, whole_motion
-from opl.planning.branch import Branch, Track, branches_of, twins
+from opl.planning.branch import Branch, Track, branches_of
 from opl.planning.check import Fault, find_faults
 from opl.planning.motion import Motion, Stretch
 from opl.planning.path import BrokenStepError, GrindingPath, fill_in
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import explain
 from opl.planning.starts import Start, tracks_from_best_start, tracks_from_nearest_start
+from opl.planning.symmetry import twins
 
 
 @dataclass(frozen=True)
@@ -33,11 +34,14 @@ class Plan:
         path: Postures on the wheel.
         motion: The whole motion, free of collision as far as the planner can tell.
         checks: How many motions were checked, this one included.
+        lower_bound: No path through the cutter points has a smaller joint range sum, in [rad]; None
+            if that was not asked.
     """
 
     path: GrindingPath
     motion: Motion
     checks: int
+    lower_bound: float | None = None
 
 
 def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
@@ -67,14 +71,23 @@ def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
 def _first_free(problem: GrindingProblem, branches: list[Branch], tracks: Iterator[Track]) -> Plan:
     """Return the first of the tracks whose motion is free, blocking what is not on the way."""
     for checks, track in enumerate(tracks, start=1):
-        plan = _check(problem, branches[track.branch], track.rows, checks)
+        plan = check_track(problem, branches[track.branch], track.rows, checks)
         if plan is not None:
             return plan
-    raise _no_path(problem, branches)
+    raise no_path(problem, branches)
 
 
-def _check(problem: GrindingProblem, branch: Branch, rows: np.ndarray, checks: int) -> Plan | None:
-    """Return the plan if the track's whole motion is free, else block what is not."""
+def check_track(
+    problem: GrindingProblem, branch: Branch, rows: np.ndarray, checks: int
+) -> Plan | None:
+    """Return the plan if a track's whole motion is free, else block what is not.
+
+    Args:
+        problem: What is to be planned.
+        branch: The branch of the track.
+        rows: The row in each column, shape (N,).
+        checks: How many motions were checked, this one included.
+    """
     try:
         path = fill_in(problem.cell, problem.points, branch.nodes, rows, problem.interpolation)
     except BrokenStepError as error:
@@ -119,7 +132,8 @@ def _block(
         branch.block_node(len(rows) - 1, int(rows[-1]), f"way home: {cause}")
 
 
-def _no_path(problem: GrindingProblem, branches: list[Branch]) -> NoPathError:
+def no_path(problem: GrindingProblem, branches: list[Branch]) -> NoPathError:
+    """Return the error that says how far the searches came and what stopped them."""
     reached = max((branch.reached for branch in branches), default=0)
     causes: Counter[tuple[int, str]] = Counter()
     for branch in branches:
@@ -130,6 +144,8 @@ def _no_path(problem: GrindingProblem, branches: list[Branch]) -> NoPathError:
         return NoPathError(
             f"no path: no free posture at cutter point 0 (0 of {n} reached)", reasons
         )
+    if reached == n:
+        return NoPathError(f"no path: every track through the {n} cutter points collides", reasons)
     return NoPathError(
         f"no path beyond cutter point {reached - 1} ({reached} of {n} reached)", reasons
     )

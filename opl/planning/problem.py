@@ -11,9 +11,9 @@ from opl.cell.collision import CollisionScene
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
+from opl.planning.ladder import Ladder
 from opl.planning.nodes import NodeField, NodeMatrix
 from opl.planning.path import Interpolation
-from opl.planning.recursive import Ladder
 from opl.planning.timing import Pace
 
 
@@ -49,7 +49,7 @@ class GrindingProblem:
     def free_nodes(self, nodes: NodeMatrix) -> np.ndarray:
         """Return which nodes exist and do not cut into the wheel, shape (N, n_rows)."""
         free = self.wheel_clearance >= -self.cell.contact_allowance
-        return nodes.exists & free[:, nodes.position_index]
+        return np.ascontiguousarray(nodes.exists & free[:, nodes.position_index])
 
     def ladder(self, nodes: NodeMatrix, free: np.ndarray) -> Ladder:
         """Return a branch as the search sees it."""

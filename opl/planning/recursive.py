@@ -12,46 +12,11 @@ that does not depend on how it was reached.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numba import njit
 
-from opl.geometry.frames import Array
-
-
-@dataclass(frozen=True)
-class Ladder:
-    """A node matrix as the search sees it.
-
-    Attributes:
-        q: Joint positions in [rad], shape (n_columns, n_rows, 6); entries of nodes that are not
-            free are not looked at.
-        free: Which nodes may be used, shape (n_columns, n_rows).
-        contact_position: t of each row, shape (n_rows,).
-        off_wheel: Whether the step from each column to the next leaves the wheel (a new pass),
-            shape (n_columns - 1,). Such a step has no intermediate nodes and may be of any size.
-        max_contact_step: Largest difference of t between adjacent nodes, the paper's delta T.
-        max_joint_step: Largest change of a joint between adjacent nodes in [rad]; more is taken for
-            a discontinuity.
-    """
-
-    q: Array
-    free: np.ndarray
-    contact_position: Array
-    off_wheel: np.ndarray
-    max_contact_step: float
-    max_joint_step: float
-
-    @cached_property
-    def q_by_joint(self) -> Array:
-        """Joint positions as the inner loop reads them, shape (n_columns, 6, n_rows)."""
-        return np.ascontiguousarray(np.moveaxis(self.q, 1, 2))
-
-    def step_key(self, column: int, row: int, next_row: int) -> int:
-        """Return the number under which a step is remembered as blocked."""
-        n_rows = self.q.shape[1]
-        return (column * n_rows + row) * n_rows + next_row
+from opl.planning.ladder import Ladder, contains, continuous
 
 
 @dataclass(frozen=True)
@@ -71,16 +36,8 @@ class Descent:
     reached: int
 
 
-def middle_count(contact_step: float, max_contact_step: float) -> int:
-    """Return how many intermediate nodes keep t from changing by more than delta T (equation 15).
-
-    A step exactly divisible by delta T does not repeat its end node.
-    """
-    return max(int(np.ceil(abs(contact_step) / max_contact_step - 1e-9)) - 1, 0)
-
-
 def descend(
-    ladder: Ladder, start: int, blocked: Array, dead: np.ndarray, bound: float = np.inf
+    ladder: Ladder, start: int, blocked: np.ndarray, dead: np.ndarray, bound: float = np.inf
 ) -> Descent:
     """Search from one start node.
 
@@ -99,6 +56,7 @@ def descend(
         ladder.contact_position,
         ladder.off_wheel,
         ladder.max_contact_step,
+        ladder.contact_changes,
         ladder.max_joint_step,
         blocked,
         dead,
@@ -109,7 +67,7 @@ def descend(
     return Descent(rows if outcome == _COMPLETE else None, total, reached)
 
 
-def add_dead_ends(ladder: Ladder, blocked: Array, dead: np.ndarray) -> None:
+def add_dead_ends(ladder: Ladder, blocked: np.ndarray, dead: np.ndarray) -> None:
     """Mark every node from which the last column cannot be reached.
 
     A search finds dead ends as it meets them; one that is to stop at a bound must know them before,
@@ -126,6 +84,7 @@ def add_dead_ends(ladder: Ladder, blocked: Array, dead: np.ndarray) -> None:
         ladder.contact_position,
         ladder.off_wheel,
         ladder.max_contact_step,
+        ladder.contact_changes,
         ladder.max_joint_step,
         blocked,
         dead,
@@ -134,35 +93,15 @@ def add_dead_ends(ladder: Ladder, blocked: Array, dead: np.ndarray) -> None:
 
 _COMPLETE, _FAILED, _GIVEN_UP = 1, 0, 2
 
-_FIELD = "float64[:,:,::1],boolean[:,::1],float64[::1],boolean[::1],float64,float64,int64[::1]"
-
-
-@njit(
-    "boolean(float64[:,:,::1],float64[::1],boolean[::1],float64,float64,int64,int64,int64)",
-    cache=True,
+_FIELD = (
+    "float64[:,:,::1],boolean[:,::1],float64[::1],boolean[::1],"
+    "float64,float64[::1],float64,int64[::1]"
 )
-def _continuous(  # type: ignore[no-untyped-def]
-    q, t, off_wheel, max_t_step, max_q_step, column, here, row
-):
-    """Return whether a step to a row of the next column jumps in no joint."""
-    if off_wheel[column]:
-        return True
-    largest = max_q_step * max(np.ceil(abs(t[row] - t[here]) / max_t_step - 1e-9), 1.0)
-    for joint in range(q.shape[1]):
-        if abs(q[column + 1, joint, row] - q[column, joint, here]) > largest:
-            return False
-    return True
-
-
-@njit("boolean(int64[::1],int64)", cache=True)
-def _contains(keys, key):  # type: ignore[no-untyped-def]
-    place = np.searchsorted(keys, key)
-    return place < len(keys) and keys[place] == key
 
 
 @njit(f"void({_FIELD},boolean[:,::1])", cache=True)
 def _add_dead_ends(  # type: ignore[no-untyped-def]
-    q, free, t, off_wheel, max_t_step, max_q_step, blocked, dead
+    q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, dead
 ):
     n_columns, _, n_rows = q.shape
     for column in range(n_columns - 2, -1, -1):
@@ -174,9 +113,11 @@ def _add_dead_ends(  # type: ignore[no-untyped-def]
                 row = (here + k) % n_rows  # the row it is on leads on most often
                 if not free[column + 1, row] or dead[column + 1, row]:
                     continue
-                if not _continuous(q, t, off_wheel, max_t_step, max_q_step, column, here, row):
+                if not continuous(
+                    q, t, off_wheel, max_t_step, max_t_change, max_q_step, column, here, row
+                ):
                     continue
-                if not _contains(blocked, (column * n_rows + here) * n_rows + row):
+                if not contains(blocked, (column * n_rows + here) * n_rows + row):
                     leads_on = True
                     break
             dead[column, here] = not leads_on
@@ -187,7 +128,7 @@ def _add_dead_ends(  # type: ignore[no-untyped-def]
     cache=True,
 )
 def _descend(  # type: ignore[no-untyped-def]
-    q, free, t, off_wheel, max_t_step, max_q_step, blocked, dead, start, bound, rows
+    q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, dead, start, bound, rows
 ):
     n_columns, n_joints, n_rows = q.shape
     sums = np.empty(n_rows)
@@ -222,7 +163,9 @@ def _descend(  # type: ignore[no-untyped-def]
                 continue
             if ranges == tried_sum[following] and row <= tried_row[following]:
                 continue
-            if not _continuous(q, t, off_wheel, max_t_step, max_q_step, column, here, row):
+            if not continuous(
+                q, t, off_wheel, max_t_step, max_t_change, max_q_step, column, here, row
+            ):
                 continue
             best_sum = ranges
             best_row = row
@@ -236,7 +179,7 @@ def _descend(  # type: ignore[no-untyped-def]
             return _GIVEN_UP, best_sum, reached
         tried_sum[following] = best_sum
         tried_row[following] = best_row
-        if _contains(blocked, (column * n_rows + here) * n_rows + best_row):
+        if contains(blocked, (column * n_rows + here) * n_rows + best_row):
             continue
         rows[following] = best_row
         total = best_sum

@@ -1,4 +1,4 @@
-"""The recursive search from many start nodes: tracks in the order in which they should be checked."""
+"""The recursive search from many start nodes: tracks in the order in which to check them."""
 
 from __future__ import annotations
 

@@ -21,6 +21,8 @@ class Pace:
         feed: Speed of the ground point along the surface in [m/s].
         approach_length: Length of approach and retract along the contact normal in [m].
         approach_speed: Speed along the contact normal in [m/s].
+        contact_speed: Largest speed of the contact position on the wheel in belt units per second:
+            pivoting takes time even where the ground point hardly moves.
         air_speed: Fraction of each joint's largest speed used for free moves, 0 to 1.
         home: Joint positions at the start and the end in [rad], shape (6,).
     """
@@ -28,6 +30,7 @@ class Pace:
     feed: float
     approach_length: float
     approach_speed: float
+    contact_speed: float
     air_speed: float
     home: Array
 
@@ -40,7 +43,8 @@ def lead_count(pace: Pace) -> int:
 def timed(motion: Motion, points: CutterPoints, pace: Pace, max_speed: Array) -> Motion:
     """Return a motion with the time of every move.
 
-    The ground point passes along the surface at the feed; approach and retract run at their speed;
+    The ground point passes along the surface at the feed, or slower where the contact position
+    moves fast over the wheel; approach and retract run at their speed;
     on free moves the joint with the longest way runs at its share of its largest speed. A move that
     no joint could follow takes as long as the slowest joint needs.
 
@@ -54,6 +58,7 @@ def timed(motion: Motion, points: CutterPoints, pace: Pace, max_speed: Array) ->
     fastest = (turned / max_speed).max(axis=1)
     arc = np.interp(motion.cutter_point, np.arange(len(points)), points.arc_length)
     along_surface = np.abs(np.diff(arc, prepend=np.nan)) / pace.feed
+    over_wheel = np.abs(np.diff(motion.contact_position, prepend=np.nan)) / pace.contact_speed
     lead = pace.approach_length / lead_count(pace) / pace.approach_speed
     wanted = np.empty(len(motion))
     for move, stretch in enumerate(motion.stretch):
@@ -62,5 +67,5 @@ def timed(motion: Motion, points: CutterPoints, pace: Pace, max_speed: Array) ->
         elif stretch in (Stretch.APPROACH, Stretch.RETRACT) or np.isnan(along_surface[move]):
             wanted[move] = lead  # the move onto the first cutter point of a pass ends the approach
         else:
-            wanted[move] = along_surface[move]
+            wanted[move] = max(along_surface[move], over_wheel[move])
     return replace(motion, duration=np.maximum(wanted, fastest))

@@ -21,13 +21,14 @@ from opl.findings import Finding, Level
 from opl.geometry.frames import Array, transform
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.motion import Motion, Stretch, VerifiedMotion
+from opl.verification.limits import limit_findings, missing_points
+from opl.verification.place import where
 from opl.verification.world import World
 
 STEP = 1e-3  # [m]
 TURN = np.deg2rad(0.5)
 HORIZON = 0.1  # [m] distances beyond this are not measured, only known to be more
 FARTHEST_GAP = 0.005  # [m] between part and wheel that is measured while grinding
-SPEED_TOLERANCE = 1.001  # programmed speeds have four digits
 
 ON_WHEEL = (Stretch.GRIND, Stretch.BETWEEN)
 ALONG_NORMAL = (Stretch.APPROACH, Stretch.RETRACT)
@@ -43,7 +44,7 @@ class Verification:
         collisions: Number of poses in which some pair was too near.
         min_clearance: Smallest distance of any pair that needs clearance in [m], part on wheel
             aside; `HORIZON` if nothing came nearer than that.
-        max_contact_error: Largest distance between part and wheel while grinding in [m].
+        max_contact_error: Largest distance of the ground point from the wheel's surface in [m].
         limit_violations: Number of postures beyond a joint limit or moves beyond a joint speed.
         findings: What is wrong, worst of each kind and place.
         verified: The motion with its clearances, or None if anything is wrong.
@@ -72,19 +73,20 @@ def replay(
         cell: The cell.
         points: The cutter points that are to be ground.
         motion: The motion.
-        max_contact_error: Largest distance of part and wheel allowed while grinding in [m].
+        max_contact_error: Largest distance of the ground point from the wheel's surface allowed,
+            in [m].
         progress: Told the part of the motion that is done, 0 to 1.
     """
     with World(cell) as world:
-        run = _Run(cell, world, motion, max_contact_error)
+        run = _Run(cell, world, points, motion, max_contact_error)
         for move in range(len(motion)):
             run.make_move(move)
             if move % 50 == 0:
                 progress(move / len(motion))
         version = world.version
     findings = run.findings.worst()
-    limits = _limit_findings(cell, motion)
-    missing = _missing_points(points, motion)
+    limits = limit_findings(cell, motion)
+    missing = missing_points(points, motion)
     findings = (*findings, *limits, *missing)
     motion = replace(motion, clearance=run.clearance)
     return Verification(
@@ -120,7 +122,12 @@ class _Run:
     """One motion being replayed."""
 
     def __init__(
-        self, cell: WorkCell, world: World, motion: Motion, max_contact_error: float
+        self,
+        cell: WorkCell,
+        world: World,
+        points: CutterPoints,
+        motion: Motion,
+        max_contact_error: float,
     ) -> None:
         self.poses = 0
         self.collisions = 0
@@ -128,6 +135,7 @@ class _Run:
         self.findings = _Worst()
         self.clearance = np.full(len(motion), HORIZON)  # of the move that ends at each posture
         self._cell = cell
+        self._points = points
         self._world = world
         self._motion = motion
         self._allowed_error = max_contact_error
@@ -139,7 +147,7 @@ class _Run:
         low, high = cell.part.vertices.min(axis=0), cell.part.vertices.max(axis=0)
         self._corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
         self._q = motion.q[0]
-        self._at = self._corners_at(self._q)
+        self._at = transform(world.move_to(self._q), self._corners)
 
     def make_move(self, move: int) -> None:
         """Go on to a posture, checking on the way."""
@@ -152,7 +160,8 @@ class _Run:
             if 1.0 - ahead < 1e-6:
                 ahead = 1.0
             q = start + ahead * (target - start)
-            corners = self._corners_at(q)
+            T_base_workpiece = self._world.move_to(q)
+            corners = transform(T_base_workpiece, self._corners)
             way = np.sqrt(np.square(corners - self._at).sum(axis=1).max()) / STEP
             turn = np.abs(q - self._q).max() / TURN
             longest = max(way, turn)
@@ -162,9 +171,7 @@ class _Run:
             done = ahead
             self._at = corners
             self._check(move, q)
-
-    def _corners_at(self, q: Array) -> Array:
-        return transform(self._world.move_to(q), self._corners)
+            self._check_contact(move, done, T_base_workpiece)
 
     def _check(self, move: int, q: Array) -> None:
         """Check the pose that the world is in."""
@@ -176,18 +183,18 @@ class _Run:
         # near pairs are measured at every pose, so that the smallest clearance is found too
         for k in np.flatnonzero(self._apart < np.maximum(self._needed, self.clearance[move])):
             pair = self._pairs[k]
-            distance = self._world.distance(pair.first, pair.second, HORIZON)
-            self._apart[k] = min(distance, HORIZON)
+            distance = self._world.distance(pair.first, pair.second, HORIZON) - pair.rounding
+            self._apart[k] = min(distance, HORIZON - pair.rounding)
             if pair.clearance > 0.0:
                 self.clearance[move] = min(self.clearance[move], distance)
             if distance < pair.clearance or distance <= 0.0:
                 hit = True
                 self._too_near(move, pair.first.name, pair.second.name, distance, pair.clearance)
-        hit |= self._check_contact(move)
+        hit |= self._check_wheel(move)
         self.collisions += hit
 
-    def _check_contact(self, move: int) -> bool:
-        """Check part against wheel; return whether they collide."""
+    def _check_wheel(self, move: int) -> bool:
+        """Check part against wheel as bodies; return whether they collide."""
         motion, cell = self._motion, self._cell
         grinding = motion.stretch[move] in ON_WHEEL
         touching_down = grinding and motion.stretch[move - 1] is Stretch.APPROACH
@@ -198,18 +205,45 @@ class _Run:
         if gap < needed:
             self._too_near(move, PART, WHEEL, gap, needed)
             return True
-        if grinding and not touching_down:
-            self.max_contact_error = max(self.max_contact_error, abs(gap))
-            if abs(gap) > self._allowed_error:
-                self.findings.add(
-                    "contact",
-                    self._place(move),
-                    self._where(move),
-                    f"{PART} and {WHEEL}",
-                    abs(gap),
-                    f"{1e3 * gap:.3f} mm from touching, {1e3 * self._allowed_error:g} mm allowed",
-                )
+        if grinding and not touching_down and gap > self._allowed_error:
+            self._contact_lost(move, gap, "part and wheel do not touch")
         return False
+
+    def _check_contact(self, move: int, fraction: float, T_base_workpiece: Array) -> None:
+        """Check that the point to be ground lies on the wheel's surface.
+
+        Args:
+            move: The move.
+            fraction: How much of the move is done.
+            T_base_workpiece: Where the part is, shape (4, 4).
+        """
+        motion = self._motion
+        if motion.stretch[move] not in ON_WHEEL:
+            return
+        place = motion.cutter_point[move]
+        if motion.stretch[move - 1] in ON_WHEEL:
+            place -= (1.0 - fraction) * (place - motion.cutter_point[move - 1])
+        elif fraction < 1.0:
+            return  # touching down
+        points = self._points.Ts_workpiece_cutter[:, :3, 3]
+        before = int(place)
+        after = min(before + 1, len(points) - 1)
+        point = points[before] + (place - before) * (points[after] - points[before])
+        error = abs(self._world.distance_to_wheel(transform(T_base_workpiece, point)))
+        self.max_contact_error = max(self.max_contact_error, error)
+        if error > self._allowed_error:
+            self._contact_lost(move, error, "ground point")
+
+    def _contact_lost(self, move: int, error: float, subject: str) -> None:
+        self.findings.add(
+            "contact",
+            self._place(move),
+            where(self._motion, move),
+            subject,
+            error,
+            f"{1e3 * error:.3f} mm from the wheel's surface, "
+            f"{1e3 * self._allowed_error:g} mm allowed",
+        )
 
     def _too_near(self, move: int, first: str, second: str, distance: float, needed: float) -> None:
         told = (
@@ -220,7 +254,7 @@ class _Run:
         self.findings.add(
             "collision",
             self._place(move),
-            self._where(move),
+            where(self._motion, move),
             f"{first} and {second}",
             needed - distance,
             told,
@@ -228,51 +262,3 @@ class _Run:
 
     def _place(self, move: int) -> str:
         return f"{self._motion.stretch[move].value} {self._motion.pass_index[move]}"
-
-    def _where(self, move: int) -> str:
-        return where(self._motion, move)
-
-
-def where(motion: Motion, move: int) -> str:
-    """Say which part of a motion a move is, as a person would look for it."""
-    index = motion.pass_index[move] + 1  # people count passes from 1
-    stretch = motion.stretch[move]
-    if stretch in ON_WHEEL:
-        return f"pass {index}, cutter point {motion.cutter_point[move]:.4g}"
-    if stretch is Stretch.HOME:
-        return "way home" if index == 0 and move > 0 else "way from home"
-    return f"{stretch.value} of pass {index}"
-
-
-def _limit_findings(cell: WorkCell, motion: Motion) -> list[Finding]:
-    robot, found = cell.robot, []
-    beyond = np.maximum(robot.lower - motion.q, motion.q - robot.upper)
-    for move, joint in np.argwhere(beyond > 1e-9):
-        amount = f"{np.rad2deg(beyond[move, joint]):.3f} deg beyond its limit"
-        place, name = where(motion, move), robot.joint_names[joint]
-        found.append(Finding(Level.ERROR, "limit", place, f"joint {name}: {amount}"))
-    for move in range(1, len(motion)):
-        turned = np.abs(motion.q[move] - motion.q[move - 1])
-        allowed = robot.max_speed * motion.duration[move] * SPEED_TOLERANCE
-        for joint in np.flatnonzero(turned > allowed + 1e-12):
-            speed = np.rad2deg(turned[joint]) / max(motion.duration[move], 1e-12)
-            most = np.rad2deg(robot.max_speed[joint])
-            told = f"joint {robot.joint_names[joint]}: {speed:.1f} deg/s, {most:.1f} allowed"
-            found.append(Finding(Level.ERROR, "speed", where(motion, move), told))
-    return found
-
-
-def _missing_points(points: CutterPoints, motion: Motion) -> list[Finding]:
-    """Check that every cutter point is ground, once and in order."""
-    ground = [
-        int(point)
-        for point, stretch in zip(motion.cutter_point, motion.stretch, strict=True)
-        if stretch is Stretch.GRIND
-    ]
-    if ground == list(range(len(points))):
-        return []
-    expected = next(
-        (k for k, point in enumerate(ground) if point != k), min(len(ground), len(points) - 1)
-    )
-    told = f"{len(points)} cutter points expected in order, {len(ground)} ground"
-    return [Finding(Level.ERROR, "order", f"cutter point {expected}", told)]

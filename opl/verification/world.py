@@ -19,6 +19,9 @@ from opl.geometry.shapes import Body, Box
 from opl.verification.engine import pybullet, start
 
 BASE_LINK = -1  # Bullet's number of the link that does not move
+# Bullet rounds the edges of a link's boxes by about this much, so that they seem farther away than
+# they are; it is added to what is needed
+LINK_ROUNDING = 1e-3  # [m]
 # Bullet rounds the edges of cylinders by their margin and blows up meshes by it: the default of
 # 1 mm is as much as the contact itself
 MARGIN = 1e-5  # [m]
@@ -35,11 +38,19 @@ class Solid:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two solids that must stay apart, by at least ``clearance`` in [m]."""
+    """Two solids that must stay apart.
+
+    Attributes:
+        first: One of them.
+        second: The other.
+        clearance: How far they must stay apart in [m].
+        rounding: How much nearer than Bullet says they can be, in [m].
+    """
 
     first: Solid
     second: Solid
     clearance: float
+    rounding: float = 0.0
 
 
 class World:
@@ -72,6 +83,8 @@ class World:
         ]
         wheel = cell.wheel_body()
         self._wheel = self._add(wheel, wheel.T_parent_body)
+        self._wheel_pose = wheel.T_parent_body
+        self._wheel_size = (cell.wheel.radius, cell.wheel.width)
         self._obstacles = [self._add(body, body.T_parent_body) for body in cell.obstacles]
 
     def __enter__(self) -> World:
@@ -88,14 +101,14 @@ class World:
         links, clearance = self._links, self._cell.clearance
         for k, link in enumerate(links):
             # neighbouring links share a bearing
-            yield from (Pair(link, other, 0.0) for other in links[k + 2 :])
+            yield from (Pair(link, other, 0.0, LINK_ROUNDING) for other in links[k + 2 :])
             if k > 0:  # the base does not move, nor does what stands around it
                 for other in (self._wheel, *self._obstacles):
-                    yield Pair(link, other, clearance)
+                    yield Pair(link, other, clearance, LINK_ROUNDING)
             if k < len(links) - 1:  # the fixture is bolted to the last link
                 # and turns close in front of the last but one
                 needed = 0.0 if k == len(links) - 2 else clearance
-                yield from (Pair(link, held, needed) for held, _ in self._held)
+                yield from (Pair(link, held, needed, LINK_ROUNDING) for held, _ in self._held)
         for held, _ in self._held:
             yield from (Pair(held, other, clearance) for other in self._obstacles)
             if held.name != PART:
@@ -127,6 +140,20 @@ class World:
     def gap(self, within: float) -> float:
         """Return the distance of the part from the wheel in [m], as `distance`."""
         return self.distance(self._held[0][0], self._wheel, within)
+
+    def distance_to_wheel(self, p_base: Array) -> float:
+        """Return how far a point, given in the base frame, is from the wheel's surface in [m].
+
+        Negative inside. Written out for a cylinder from its axis, apart from `ContactWheel`.
+        """
+        T = self._wheel_pose
+        from_middle = p_base - T[:3, 3]
+        along = abs(float(from_middle @ T[:3, 2]))
+        away = float(np.linalg.norm(np.cross(from_middle, T[:3, 2])))
+        beside, beyond = along - self._wheel_size[1] / 2.0, away - self._wheel_size[0]
+        if max(beside, beyond) <= 0.0:
+            return max(beside, beyond)
+        return float(np.hypot(max(beside, 0.0), max(beyond, 0.0)))
 
     @property
     def version(self) -> str:

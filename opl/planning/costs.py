@@ -1,0 +1,74 @@
+"""What a track is charged for where the joint range sum does not care."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from opl.cell.collision import CollisionScene
+from opl.cell.singularity import singularity_margins
+from opl.geometry.frames import Array
+from opl.planning.nodes import NodeMatrix
+from opl.planning.problem import GrindingProblem
+from opl.planning.smooth import Roughness
+
+NEAR_LIMIT = np.deg2rad(10.0)  # from where on nearness to a joint limit is charged
+NEAR_SINGULARITY = 0.2  # as in `singularity_margins`; for the wrist 11.5 degrees
+
+
+@dataclass(frozen=True)
+class Costs:
+    """Prices, all in the same unit as joint travel with weight 1, [rad].
+
+    Attributes:
+        joint_weights: For each radian that a joint turns, shape (6,).
+        contact_weight: For each belt unit that t moves on the wheel: the belt dwells meanwhile.
+        time_weight: For each second on the wheel.
+        limit_weight: For a node at a joint limit; falls to 0 at `NEAR_LIMIT` from it.
+        singularity_weight: For a node in a singularity; falls to 0 at `NEAR_SINGULARITY`.
+        push_away: Nodes that keep less than this beyond the required clearance from everything but
+            the wheel are charged, in [m]; 0 charges none.
+        push_weight: For such a node.
+    """
+
+    joint_weights: Array
+    contact_weight: float
+    time_weight: float
+    limit_weight: float
+    singularity_weight: float
+    push_away: float
+    push_weight: float
+
+
+def roughness(
+    problem: GrindingProblem, nodes: NodeMatrix, costs: Costs, inside: np.ndarray
+) -> Roughness:
+    """Return the costs of every step and node of a branch.
+
+    Args:
+        problem: For limits, speeds and the scene.
+        nodes: The branch.
+        costs: The prices.
+        inside: The nodes that matter, shape (n_columns, n_rows); the others cost nothing.
+    """
+    robot = problem.cell.robot
+    node_cost = np.zeros(inside.shape)
+    q = nodes.q[inside]
+    margin = np.minimum(q - robot.lower, robot.upper - q) / NEAR_LIMIT
+    charge = costs.limit_weight * np.square(np.maximum(1.0 - margin, 0.0)).sum(axis=-1)
+    near = singularity_margins(robot.arm, q) / NEAR_SINGULARITY
+    charge += costs.singularity_weight * np.square(np.maximum(1.0 - near, 0.0)).sum(axis=-1)
+    if costs.push_away > 0.0 and costs.push_weight > 0.0:
+        wider = replace(problem.cell, clearance=problem.cell.clearance + costs.push_away)
+        charge += costs.push_weight * CollisionScene(wider).collides(q)
+    node_cost[inside] = charge
+    arc_step = np.abs(np.diff(problem.points.arc_length))
+    return Roughness(
+        joint_weights=costs.joint_weights,
+        contact_weight=costs.contact_weight,
+        time_weight=costs.time_weight,
+        step_seconds=np.where(problem.off_wheel, 0.0, arc_step / problem.pace.feed),
+        max_speed=robot.max_speed,
+        node_cost=node_cost,
+    )

@@ -1,0 +1,103 @@
+"""The ladder graph that every search walks: nodes, and which steps between them are small."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+
+from opl.geometry.frames import Array
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """A node matrix as the search sees it.
+
+    Attributes:
+        q: Joint positions in [rad], shape (n_columns, n_rows, 6); entries of nodes that are not
+            free are not looked at.
+        free: Which nodes may be used, shape (n_columns, n_rows).
+        contact_position: t of each row, shape (n_rows,).
+        off_wheel: Whether the step from each column to the next leaves the wheel (a new pass),
+            shape (n_columns - 1,). Such a step has no intermediate nodes and may be of any size.
+        max_contact_step: Largest difference of t between adjacent nodes, the paper's delta T.
+        max_contact_change: Largest difference of t over each step on the wheel, shape
+            (n_columns - 1,) or one for all; the paper sets none.
+        max_joint_step: Largest change of a joint between adjacent nodes in [rad]; more is taken for
+            a discontinuity.
+    """
+
+    q: Array
+    free: np.ndarray
+    contact_position: Array
+    off_wheel: np.ndarray
+    max_contact_step: float
+    max_joint_step: float
+    max_contact_change: Array | float = np.inf
+
+    @cached_property
+    def contact_changes(self) -> Array:
+        """Largest difference of t over each step, shape (n_columns - 1,)."""
+        return np.broadcast_to(self.max_contact_change, len(self.q) - 1).astype(float)
+
+    @cached_property
+    def q_by_joint(self) -> Array:
+        """Joint positions as the inner loop reads them, shape (n_columns, 6, n_rows)."""
+        return np.ascontiguousarray(np.moveaxis(self.q, 1, 2))
+
+    def step_key(self, column: int, row: int, next_row: int) -> int:
+        """Return the number under which a step is remembered as blocked."""
+        n_rows = self.q.shape[1]
+        return (column * n_rows + row) * n_rows + next_row
+
+
+def middle_count(contact_step: float, max_contact_step: float) -> int:
+    """Return how many intermediate nodes keep t from changing by more than delta T (equation 15).
+
+    A step exactly divisible by delta T does not repeat its end node.
+    """
+    return max(int(np.ceil(abs(contact_step) / max_contact_step - 1e-9)) - 1, 0)
+
+
+@njit(
+    "boolean(float64[:,:,::1],float64[::1],boolean[::1],float64,float64[::1],float64,int64,int64,int64)",
+    cache=True,
+)
+def continuous(  # type: ignore[no-untyped-def]
+    q, t, off_wheel, max_t_step, max_t_change, max_q_step, column, here, row
+):
+    """Return whether a step to a row of the next column is small in t and in every joint."""
+    if off_wheel[column]:
+        return True
+    t_step = abs(t[row] - t[here])
+    if t_step > max_t_change[column] + 1e-9:
+        return False
+    largest = max_q_step * max(np.ceil(t_step / max_t_step - 1e-9), 1.0)
+    for joint in range(q.shape[1]):
+        if abs(q[column + 1, joint, row] - q[column, joint, here]) > largest:
+            return False
+    return True
+
+
+@njit("boolean(int64[::1],int64)", cache=True)
+def contains(keys, key):  # type: ignore[no-untyped-def]
+    """Return whether a number is among sorted ones."""
+    place = np.searchsorted(keys, key)
+    return place < len(keys) and keys[place] == key
+
+
+@njit(
+    "boolean(float64[:,:,::1],float64[::1],boolean[::1],float64,float64[::1],float64,int64[::1],"
+    "int64,int64,int64)",
+    cache=True,
+)
+def allowed(  # type: ignore[no-untyped-def]
+    q, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, column, here, row
+):
+    """Return whether a step to a row of the next column is small enough and not blocked."""
+    n_rows = q.shape[2]
+    return continuous(
+        q, t, off_wheel, max_t_step, max_t_change, max_q_step, column, here, row
+    ) and not contains(blocked, (column * n_rows + here) * n_rows + row)

@@ -1,0 +1,214 @@
+"""The least joint range sum, certified, and the smoothest motion that attains it.
+
+The certificate says how small a box of joint space that holds a connected track can be, and names
+such a box. Inside it, widened a little, the smoothest track is sought. Between two of its nodes a
+track may still bulge out of the box; where it does, places between the cutter points are taken in
+as columns, and certificate and track are found anew. The lower bound that is told is always that of
+the cutter points alone: it holds for every path through them.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from opl.planning.box import JointBox
+from opl.planning.branch import Branch, Track, branches_of
+from opl.planning.certificate import least_box
+from opl.planning.costs import Costs, roughness
+from opl.planning.path import BrokenStepError, fill_in
+from opl.planning.plan import Plan, check_track
+from opl.planning.problem import GrindingProblem
+from opl.planning.refine import RefinedProblem, carried, refine
+from opl.planning.smooth import smoothest
+from opl.planning.symmetry import twins, undominated
+
+SUBDIVIDE = np.array([0.25, 0.5, 0.75])  # where a step that bulges is given columns
+MOST_REFINEMENTS = 8
+# fractions to which boxes are solved: what remains of the gap of a path is then that of its track
+PROOF_GAP = 1e-6
+REFINED_GAP = 1e-5
+WIDENINGS = 2.0 ** np.arange(12)  # times the widening asked for, until a track fits
+LEAST_WIDENING = 1e-4  # fraction of the size of a box
+
+
+@dataclass(frozen=True)
+class OptimalSettings:
+    """What is wanted of the optimal method.
+
+    Attributes:
+        widen: Fraction by which the joint range sum may exceed the lower bound for the sake of a
+            smoother track. It becomes larger only where no track fits.
+        max_contact_change: Largest change of t between neighbouring cutter points in belt units.
+        costs: What a track is charged for inside the box.
+        seconds: After this time no further improvement is begun.
+    """
+
+    widen: float
+    max_contact_change: float
+    costs: Costs
+    seconds: float
+
+
+def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: Plan) -> Plan:
+    """Find the collision-free motion with the least joint range sum, the smoothest of these.
+
+    Args:
+        problem: What is to be planned.
+        settings: What is wanted.
+        fallback: The motion to return if no better one is found in time.
+
+    Returns:
+        The plan with its lower bound.
+    """
+    deadline = time.monotonic() + settings.seconds
+    search = _Search(problem, settings, deadline)
+    plan = search.run()
+    if plan is None or plan.path.joint_range_sum > fallback.path.joint_range_sum:
+        plan = fallback
+    return replace(plan, lower_bound=min(search.lower_bound(), plan.path.joint_range_sum))
+
+
+class _Search:
+    """The certified search, and what it has learnt of collisions."""
+
+    def __init__(
+        self, problem: GrindingProblem, settings: OptimalSettings, deadline: float
+    ) -> None:
+        self._settings = settings
+        self._deadline = deadline
+        self._original = branches_of(problem)
+        self._refined = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
+        self._branches = branches_of(problem)
+        self._refinements = 0
+        self._checks = 0
+        self._blocked_something = False
+        self._bound = 0.0
+        self._searched = undominated(self._original)
+
+    def run(self) -> Plan | None:
+        """Return the best plan, or None if there is none within time and widenings."""
+        self._bound, _ = self._certify(self._original, PROOF_GAP)
+        while not self._late():
+            learnt = (self._refinements, self._blocked_something)
+            self._blocked_something = False
+            _, best = self._certify(self._branches, REFINED_GAP)
+            if best is None:
+                return None
+            plan = self._smooth_plan(*best)
+            if plan is not None:
+                return plan
+            if self._blocked_something:
+                self._searched = undominated(self._branches)
+            if learnt[0] == self._refinements and not self._blocked_something:
+                return None
+        return None
+
+    def lower_bound(self) -> float:
+        """Return the least joint range sum of any track through the cutter points, in [rad].
+
+        Nodes at cutter points that were found to collide are left out.
+        """
+        columns = np.searchsorted(self._refined.places, np.arange(len(self._original[0].free)))
+        lost = False
+        for original, branch in zip(self._original, self._branches, strict=True):
+            lost |= bool((original.free & ~branch.free[columns]).any())
+            original.free &= branch.free[columns]
+        if lost:
+            self._searched = undominated(self._original)
+            self._bound = max(self._bound, self._certify(self._original, PROOF_GAP)[0])
+        return self._bound
+
+    def _late(self) -> bool:
+        return time.monotonic() > self._deadline
+
+    def _certify(
+        self, branches: list[Branch], gap: float
+    ) -> tuple[float, tuple[int, JointBox] | None]:
+        """Return the least lower bound of all branches, and the branch with the smallest box."""
+        lower_bound = size = np.inf
+        best = None
+        for index in self._searched:
+            branch = branches[index]
+            certificate = least_box(
+                branch.ladder,
+                branch.blocked_steps,
+                bound=size,
+                gap=gap,
+                seconds=self._deadline - time.monotonic(),
+            )
+            lower_bound = min(lower_bound, certificate.lower_bound)
+            if certificate.box is not None:
+                size, best = certificate.box.size, (index, certificate.box)
+        return min(lower_bound, size), best
+
+    def _smooth_plan(self, index: int, box: JointBox) -> Plan | None:
+        """Return the plan of the smoothest free track in the box, widened as little as possible.
+
+        None if more was learnt of the problem first: bulges became columns, or nothing in the box
+        is free.
+        """
+        branch, problem = self._branches[index], self._refined.problem
+        settings = self._settings
+        share = np.diff(self._refined.places)
+        # a fraction of a step between cutter points may take that fraction of the change
+        changes = np.maximum(
+            settings.max_contact_change * share, problem.interpolation.max_contact_step
+        )
+        ladder = replace(
+            branch.ladder, max_contact_change=np.where(problem.off_wheel, np.inf, changes)
+        )
+        allowance = max(self._bound * (1.0 + settings.widen) - box.size, LEAST_WIDENING * box.size)
+        for widening in WIDENINGS:
+            wide = box.widened(float(widening) * allowance)
+            inside = branch.free & wide.holds(np.nan_to_num(branch.nodes.q, nan=np.inf))
+            costs = roughness(problem, branch.nodes, settings.costs, inside)
+            while not self._late():
+                smooth = smoothest(ladder, branch.blocked_steps, inside, costs)
+                if smooth is None:
+                    break
+                bulges = self._bulges(branch, smooth.rows, wide)
+                if len(bulges) and self._refinements < MOST_REFINEMENTS:
+                    self._refine(bulges)
+                    return None
+                plan = self._check(Track(index, smooth.rows))
+                if plan is not None:
+                    return plan
+                self._blocked_something = True
+                inside &= branch.free
+        return None
+
+    def _bulges(self, branch: Branch, rows: np.ndarray, box: JointBox) -> np.ndarray:
+        """Return the columns from which a track steps through postures outside of a box."""
+        problem = self._refined.problem
+        try:
+            path = fill_in(problem.cell, problem.points, branch.nodes, rows, problem.interpolation)
+        except BrokenStepError:
+            return np.empty(0, dtype=int)  # the check will find and block it
+        return np.unique(path.cutter_point[~box.holds(path.q)].astype(int))
+
+    def _refine(self, columns: np.ndarray) -> None:
+        """Take in places on the steps that start at these columns."""
+        before = self._refined.places
+        ends = before[columns], before[columns + 1]
+        places = ends[0][:, None] + (ends[1] - ends[0])[:, None] * SUBDIVIDE
+        self._refined = refine(self._refined, places.ravel())
+        self._branches = carried(self._branches, before, self._refined)
+        self._refinements += 1
+
+    def _check(self, track: Track) -> Plan | None:
+        """Return the plan of a track or of a twin of it, if one of them is free."""
+        problem = self._refined.problem
+        robot = problem.cell.robot
+        for twin in twins(self._branches, track, robot.lower, robot.upper):
+            self._checks += 1
+            plan = check_track(problem, self._branches[twin.branch], twin.rows, self._checks)
+            if plan is not None:
+                return replace(
+                    plan,
+                    path=self._refined.original_path(plan.path),
+                    motion=self._refined.original_motion(plan.motion),
+                )
+        return None

@@ -1,0 +1,134 @@
+"""More columns: places between two cutter points taken into the node matrix.
+
+What a track does between two cutter points counts as much as what it does at them. A place between
+them, taken in as a column, holds every track to a node there as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from opl.cell.inverse import inverse
+from opl.geometry.frames import Array
+from opl.geometry.toolpath import CutterPoints
+from opl.planning.branch import Branch, branches_of
+from opl.planning.layer import wheel_layer
+from opl.planning.motion import Motion, Stretch
+from opl.planning.nodes import NodeField, NodeMatrix
+from opl.planning.path import GrindingPath, cutter_frames
+from opl.planning.problem import GrindingProblem
+
+
+@dataclass(frozen=True)
+class RefinedProblem:
+    """A problem with columns between its cutter points.
+
+    Attributes:
+        problem: The problem, every column a cutter point of its own.
+        places: Fractional cutter point, in the original numbering, of each column, shape (n,).
+    """
+
+    problem: GrindingProblem
+    places: Array
+
+    def original_path(self, path: GrindingPath) -> GrindingPath:
+        """Return a path with its cutter points in the original numbering."""
+        return replace(path, cutter_point=self._original_places(path.cutter_point))
+
+    def original_motion(self, motion: Motion) -> Motion:
+        """Return a motion with its cutter points in the original numbering."""
+        place = self._original_places(motion.cutter_point)
+        stretch = tuple(
+            Stretch.BETWEEN if kind is Stretch.GRIND and where % 1.0 else kind
+            for kind, where in zip(motion.stretch, place, strict=True)
+        )
+        return replace(motion, cutter_point=place, stretch=stretch)
+
+    def _original_places(self, columns: Array) -> Array:
+        return np.interp(columns, np.arange(len(self.places)), self.places)
+
+
+def refine(refined: RefinedProblem, places: Array) -> RefinedProblem:
+    """Take in more columns.
+
+    Args:
+        refined: What there is.
+        places: Fractional cutter points in the original numbering, within passes, shape (k,).
+    """
+    problem = refined.problem
+    new = np.setdiff1d(places, refined.places)
+    columns = np.interp(new, refined.places, np.arange(len(refined.places)))
+    before = columns.astype(int)
+    points = problem.points
+    added = CutterPoints(
+        cutter_frames(points, columns),
+        np.zeros(len(new), dtype=np.int64),
+        np.interp(columns, np.arange(len(points)), points.arc_length),
+    )
+    t = problem.field.contact_positions
+    layer = wheel_layer(problem.cell, problem.samples, added, t)
+    Ts_base_flange = problem.cell.Ts_base_flange(t[None, :], added.Ts_workpiece_cutter[:, None])
+    q = inverse(problem.cell.robot.arm, Ts_base_flange)
+    at = before + 1
+    field = NodeField(
+        t,
+        np.insert(problem.field.q, at, q, axis=0),
+        tuple(_insert(problem, nodes, q, before) for nodes in problem.field.branches),
+    )
+    return RefinedProblem(
+        replace(
+            problem,
+            points=CutterPoints(
+                np.insert(points.Ts_workpiece_cutter, at, added.Ts_workpiece_cutter, axis=0),
+                np.insert(points.pass_index, at, points.pass_index[before]),
+                np.insert(points.arc_length, at, added.arc_length),
+            ),
+            field=field,
+            wheel_clearance=np.insert(problem.wheel_clearance, at, layer, axis=0),
+        ),
+        np.insert(refined.places, at, new),
+    )
+
+
+def _insert(
+    problem: GrindingProblem, nodes: NodeMatrix, q: Array, before: np.ndarray
+) -> NodeMatrix:
+    """Return a matrix with new columns, each on the same count of turns as its neighbours.
+
+    Args:
+        problem: For the limits.
+        nodes: The matrix.
+        q: All inverse solutions of the new columns in [rad], shape (k, M, 8, 6).
+        before: Column of ``nodes`` that each new one follows, shape (k,).
+    """
+    added = q[:, nodes.position_index, nodes.branch]
+    near = nodes.q[before]
+    near = np.where(np.isnan(near), nodes.q[before + 1], near)
+    added = added + 2.0 * np.pi * np.round((near - added) / (2.0 * np.pi))
+    robot = problem.cell.robot
+    within = ((added >= robot.lower) & (added <= robot.upper)).all(axis=-1)
+    added = np.where(within[..., None], added, np.nan)
+    return replace(nodes, q=np.insert(nodes.q, before + 1, added, axis=0))
+
+
+def carried(branches: list[Branch], places: Array, refined: RefinedProblem) -> list[Branch]:
+    """Return the branches of a refined problem, with what is known to be blocked.
+
+    Args:
+        branches: The branches before.
+        places: Their columns in the original numbering, shape (n,).
+        refined: The problem with more columns.
+    """
+    columns = np.searchsorted(refined.places, places)
+    together = np.diff(columns) == 1
+    result = branches_of(refined.problem)
+    for before, after in zip(branches, result, strict=True):
+        after.free[columns] &= before.free
+        n_rows = before.free.shape[1]
+        for key in before.blocked:
+            column, rows = divmod(key, n_rows * n_rows)
+            if together[column]:
+                after.blocked.add(int(columns[column]) * n_rows * n_rows + rows)
+    return result

@@ -1,0 +1,48 @@
+"""Joint limits, joint speeds, and whether every cutter point is ground: no geometry needed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from opl.cell.workcell import WorkCell
+from opl.findings import Finding, Level
+from opl.geometry.toolpath import CutterPoints
+from opl.planning.motion import Motion, Stretch
+from opl.verification.place import where
+
+SPEED_TOLERANCE = 1.001  # programmed speeds have four digits
+
+
+def limit_findings(cell: WorkCell, motion: Motion) -> list[Finding]:
+    """Return a finding for each posture beyond a limit and each move beyond a joint speed."""
+    robot, found = cell.robot, []
+    beyond = np.maximum(robot.lower - motion.q, motion.q - robot.upper)
+    for move, joint in np.argwhere(beyond > 1e-9):
+        amount = f"{np.rad2deg(beyond[move, joint]):.3f} deg beyond its limit"
+        place, name = where(motion, move), robot.joint_names[joint]
+        found.append(Finding(Level.ERROR, "limit", place, f"joint {name}: {amount}"))
+    for move in range(1, len(motion)):
+        turned = np.abs(motion.q[move] - motion.q[move - 1])
+        allowed = robot.max_speed * motion.duration[move] * SPEED_TOLERANCE
+        for joint in np.flatnonzero(turned > allowed + 1e-12):
+            speed = np.rad2deg(turned[joint]) / max(motion.duration[move], 1e-12)
+            most = np.rad2deg(robot.max_speed[joint])
+            told = f"joint {robot.joint_names[joint]}: {speed:.1f} deg/s, {most:.1f} allowed"
+            found.append(Finding(Level.ERROR, "speed", where(motion, move), told))
+    return found
+
+
+def missing_points(points: CutterPoints, motion: Motion) -> list[Finding]:
+    """Return a finding unless every cutter point is ground, once and in order."""
+    ground = [
+        int(point)
+        for point, stretch in zip(motion.cutter_point, motion.stretch, strict=True)
+        if stretch is Stretch.GRIND
+    ]
+    if ground == list(range(len(points))):
+        return []
+    expected = next(
+        (k for k, point in enumerate(ground) if point != k), min(len(ground), len(points) - 1)
+    )
+    told = f"{len(points)} cutter points expected in order, {len(ground)} ground"
+    return [Finding(Level.ERROR, "order", f"cutter point {expected}", told)]

@@ -1,0 +1,225 @@
+"""The certified least box and the smoothest track against exhaustive enumeration."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from opl.planning.box import JointBox
+from opl.planning.certificate import least_box
+from opl.planning.ladder import Ladder
+from opl.planning.smooth import Roughness, smoothest
+
+
+def random_field(seed):
+    """Return a small field with blocked nodes and blocked steps, some of it coarse (ties)."""
+    random = np.random.default_rng(seed)
+    n_columns, n_rows = int(random.integers(2, 6)), int(random.integers(1, 6))
+    q = random.uniform(-1.0, 1.0, (n_columns, n_rows, 6))
+    if seed % 3 == 0:
+        q = np.round(q * 2.0) / 2.0
+    free = random.random((n_columns, n_rows)) > 0.15
+    q[~free & (random.random(free.shape) > 0.5)] = np.nan
+    ladder = Ladder(
+        q=q,
+        free=free,
+        contact_position=np.linspace(-3.0, 3.0, n_rows),
+        off_wheel=random.random(n_columns - 1) < 0.2,
+        max_contact_step=1.0,
+        max_joint_step=random.uniform(0.3, 1.5),
+        max_contact_change=random.choice([2.0, 4.0, np.inf]),
+    )
+    blocked = {
+        (c, a, b)
+        for c in range(n_columns - 1)
+        for a in range(n_rows)
+        for b in range(n_rows)
+        if random.random() < 0.15
+    }
+    return ladder, blocked
+
+
+def keys_of(ladder, blocked):
+    return np.array(sorted(ladder.step_key(*step) for step in blocked), dtype=np.int64)
+
+
+def may_step(ladder, blocked, column, row, following):
+    """The rule for steps, written from its description."""
+    if (column, row, following) in blocked:
+        return False
+    if ladder.off_wheel[column]:
+        return True
+    change = abs(ladder.contact_position[following] - ladder.contact_position[row])
+    if change > ladder.contact_changes[column] + 1e-9:
+        return False
+    moves = max(int(np.ceil(change / ladder.max_contact_step - 1e-9)), 1)
+    turned = np.abs(ladder.q[column + 1, following] - ladder.q[column, row]).max()
+    return turned <= ladder.max_joint_step * moves
+
+
+def all_tracks(ladder, blocked):
+    n_columns, n_rows = ladder.free.shape
+    for rows in product(range(n_rows), repeat=n_columns):
+        if all(ladder.free[c, r] for c, r in enumerate(rows)) and all(
+            may_step(ladder, blocked, c, rows[c], rows[c + 1]) for c in range(n_columns - 1)
+        ):
+            yield rows
+
+
+def range_sum(ladder, rows):
+    return float(np.ptp(ladder.q[np.arange(len(rows)), list(rows)], axis=0).sum())
+
+
+def cost_of(ladder, rows, roughness):
+    q = ladder.q[np.arange(len(rows)), list(rows)]
+    t = ladder.contact_position[list(rows)]
+    turned = np.abs(np.diff(q, axis=0))
+    on_wheel = ~ladder.off_wheel
+    seconds = np.maximum(roughness.step_seconds, (turned / roughness.max_speed).max(axis=1))
+    return float(
+        (turned @ roughness.joint_weights).sum()
+        + roughness.contact_weight * np.abs(np.diff(t))[on_wheel].sum()
+        + roughness.time_weight * seconds[on_wheel].sum()
+        + roughness.node_cost[np.arange(len(rows)), list(rows)].sum()
+    )
+
+
+def random_roughness(ladder, seed):
+    random = np.random.default_rng(seed)
+    return Roughness(
+        joint_weights=random.uniform(0.0, 2.0, 6),
+        contact_weight=float(random.uniform(0.0, 0.3)),
+        time_weight=float(random.uniform(0.0, 0.5)),
+        step_seconds=np.where(ladder.off_wheel, 0.0, random.uniform(0.0, 1.0)),
+        max_speed=random.uniform(0.5, 2.0, 6),
+        node_cost=random.uniform(0.0, 0.5, ladder.free.shape),
+    )
+
+
+@pytest.mark.parametrize("block", range(10))
+def test_the_least_box_is_the_one_that_enumeration_finds(block):
+    for seed in range(20 * block, 20 * block + 20):
+        ladder, blocked = random_field(seed)
+        least = min((range_sum(ladder, rows) for rows in all_tracks(ladder, blocked)), default=None)
+        certificate = least_box(ladder, keys_of(ladder, blocked))
+        if least is None:
+            assert certificate.rows is None
+            assert certificate.lower_bound == np.inf
+            continue
+        assert certificate.box.size == pytest.approx(least, abs=1e-8)
+        assert certificate.lower_bound <= least + 1e-12
+        assert certificate.lower_bound == pytest.approx(least, abs=1e-8)
+        assert range_sum(ladder, certificate.rows) == pytest.approx(certificate.box.size, abs=1e-12)
+        assert tuple(certificate.rows) in set(all_tracks(ladder, blocked))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_proof_with_a_gap_keeps_its_promise(seed):
+    ladder, blocked = random_field(seed)
+    least = min((range_sum(ladder, rows) for rows in all_tracks(ladder, blocked)), default=None)
+    if least is None:
+        return
+    certificate = least_box(ladder, keys_of(ladder, blocked), gap=0.1)
+    assert certificate.lower_bound <= least + 1e-12
+    assert certificate.box.size * 0.9 <= certificate.lower_bound + 1e-8
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_proof_that_is_cut_short_still_bounds_from_below(seed):
+    ladder, blocked = random_field(seed)
+    certificate = least_box(ladder, keys_of(ladder, blocked), seconds=-1.0)
+    least = min((range_sum(ladder, rows) for rows in all_tracks(ladder, blocked)), default=np.inf)
+    assert certificate.lower_bound <= least
+    assert not certificate.finished or least == np.inf
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_nothing_is_found_below_the_least_box(seed):
+    ladder, blocked = random_field(seed)
+    keys = keys_of(ladder, blocked)
+    first = least_box(ladder, keys)
+    if first.rows is None:
+        return
+    again = least_box(ladder, keys, bound=first.box.size)
+    assert again.rows is None
+    assert again.lower_bound >= first.box.size - 1e-8
+
+
+@pytest.mark.parametrize("block", range(10))
+def test_the_smoothest_track_is_the_one_that_enumeration_finds(block):
+    for seed in range(20 * block, 20 * block + 20):
+        ladder, blocked = random_field(seed)
+        roughness = random_roughness(ladder, seed)
+        inside = np.random.default_rng(seed).random(ladder.free.shape) > 0.1
+        tracks = [
+            rows
+            for rows in all_tracks(ladder, blocked)
+            if all(inside[c, r] for c, r in enumerate(rows))
+        ]
+        found = smoothest(ladder, keys_of(ladder, blocked), inside, roughness)
+        if not tracks:
+            assert found is None
+            continue
+        least = min(cost_of(ladder, rows, roughness) for rows in tracks)
+        assert found.cost == pytest.approx(least, abs=1e-9)
+        assert cost_of(ladder, found.rows, roughness) == pytest.approx(least, abs=1e-9)
+        assert tuple(found.rows) in set(tracks)
+
+
+def test_the_smoothest_track_of_a_large_field_is_a_shortest_path_of_scipy():
+    random = np.random.default_rng(7)
+    n_columns, n_rows = 40, 30
+    ladder = Ladder(
+        q=np.cumsum(random.normal(0.0, 0.05, (n_columns, n_rows, 6)), axis=1),
+        free=random.random((n_columns, n_rows)) > 0.2,
+        contact_position=np.linspace(-15.0, 15.0, n_rows),
+        off_wheel=np.arange(n_columns - 1) % 13 == 12,
+        max_contact_step=1.0,
+        max_joint_step=0.4,
+        max_contact_change=8.0,
+    )
+    roughness = random_roughness(ladder, 7)
+    everywhere = np.ones_like(ladder.free)
+    found = smoothest(ladder, np.empty(0, dtype=np.int64), everywhere, roughness)
+
+    start, end = n_columns * n_rows, n_columns * n_rows + 1
+    edges = {}
+    for row in np.flatnonzero(ladder.free[0]):
+        edges[start, row] = 1.0 + roughness.node_cost[0, row]
+    for row in np.flatnonzero(ladder.free[-1]):
+        edges[(n_columns - 1) * n_rows + row, end] = 1.0
+    for column in range(n_columns - 1):
+        for row in np.flatnonzero(ladder.free[column]):
+            for following in np.flatnonzero(ladder.free[column + 1]):
+                if may_step(ladder, set(), column, row, following):
+                    pair = Ladder(
+                        ladder.q[column : column + 2],
+                        ladder.free[column : column + 2],
+                        ladder.contact_position,
+                        ladder.off_wheel[column : column + 1],
+                        1.0,
+                        0.4,
+                    )
+                    price = Roughness(
+                        roughness.joint_weights,
+                        roughness.contact_weight,
+                        roughness.time_weight,
+                        roughness.step_seconds[column : column + 1],
+                        roughness.max_speed,
+                        np.stack([np.zeros(n_rows), roughness.node_cost[column + 1]]),
+                    )
+                    key = (column * n_rows + row, (column + 1) * n_rows + following)
+                    edges[key] = cost_of(pair, (row, following), price)
+    tails, heads = np.array(list(edges)).T
+    graph = csr_array((list(edges.values()), (tails, heads)), shape=(end + 1, end + 1))
+    shortest = dijkstra(graph, indices=start)[end] - 2.0
+    assert found.cost == pytest.approx(shortest, abs=1e-9)
+
+
+def test_a_widened_box_grows_by_the_amount_given():
+    box = JointBox(np.zeros(6), np.arange(6.0))
+    assert box.widened(0.6).size == pytest.approx(box.size + 0.6)
+    assert box.widened(0.6).holds(np.full(6, -0.05))
+    assert not box.holds(np.full(6, -0.05))
