@@ -17,9 +17,10 @@ from opl.batch import Row
 from opl.cell.inverse import branch_name
 from opl.cell.robot import Robot
 from opl.job import Job
-from opl.pipeline import Outcome
+from opl.outcome import Outcome
 from opl.pipeline import Progress as Watch
 from opl.result import search_seconds
+from opl.surfacing import Surfacing
 
 FILE_WIDTH = 120  # columns
 
@@ -51,10 +52,12 @@ def progress_bar(quiet: bool) -> Iterator[Watch]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=len(STAGES))
         order = list(STAGES)
+        furthest = 0.0  # a stage may come twice
 
         def watch(stage: str, fraction: float) -> None:
-            done = order.index(stage) + fraction
-            bar.update(task, description=STAGES[stage], completed=done)
+            nonlocal furthest
+            furthest = max(furthest, order.index(stage) + fraction)
+            bar.update(task, description=STAGES[stage], completed=furthest)
 
         yield watch
 
@@ -64,6 +67,9 @@ def show_outcome(outcome: Outcome, written: list[Path], verbose: bool) -> None:
     console = _console()
     if outcome.plan is not None:
         console.print(_comparison(outcome))
+    for finding in outcome.warnings:
+        console.print(f"warning: {finding}", markup=False)
+    if outcome.plan is not None:
         for line in _facts(outcome):
             console.print(line, markup=False)
     if verbose:
@@ -73,34 +79,33 @@ def show_outcome(outcome: Outcome, written: list[Path], verbose: bool) -> None:
         console.print(f"wrote {path}", markup=False)
 
 
+HEADINGS = {
+    "fixed": "contact fixed\nat t = 0",
+    "paper_start": "recursive,\npaper's start",
+    "recursive": "recursive,\nbest start",
+    "optimal": "optimal",
+}
+
+
 def _comparison(outcome: Outcome) -> Table:
-    """Return joint ranges, contact fixed beside found, as in table 2 of the paper."""
-    names = outcome.job.cell.robot.joint_names
+    """Return what every path costs, contact fixed beside found, as in table 2 of the paper."""
+    columns = list(outcome.compared.items())
     table = Table(title="joint ranges along the path, in rad", title_justify="left")
-    table.add_column("path", no_wrap=True)
-    for name in (*names, "sum", "travel"):
-        table.add_column(name, justify="right", no_wrap=True)
-    fixed = outcome.fixed
-    if fixed is not None and fixed.q is not None:
-        passes = outcome.points.pass_index if outcome.points is not None else np.zeros(0)
-        on_wheel = np.diff(passes) == 0
-        travel = float(np.abs(np.diff(fixed.q, axis=0)[on_wheel]).sum())
-        label = "contact fixed at t = 0" + ("" if fixed.feasible else " (!)")
-        ranges = np.ptp(fixed.q, axis=0)
-        table.add_row(label, *_figures(ranges), f"{ranges.sum():.4f}", f"{travel:.2f}")
-    for label, plan in (
-        ("recursive, paper's start", outcome.paper_start),
-        (f"{outcome.job.method.value}, {outcome.job.start.value} start", outcome.plan),
-    ):
-        if plan is not None:
-            path = plan.path
-            figures = (*_figures(path.joint_ranges), f"{path.joint_range_sum:.4f}")
-            table.add_row(label, *figures, f"{path.joint_travel:.2f}")
+    table.add_column("joint")
+    for name, _ in columns:
+        heading = HEADINGS[name]
+        if name == "fixed" and outcome.fixed is not None and not outcome.fixed.feasible:
+            heading += ", not feasible"
+        table.add_column(heading, justify="right", min_width=10)
+    names = outcome.job.cell.robot.joint_names
+    for k, name in enumerate(names):
+        last = k == len(names) - 1
+        table.add_row(name, *(f"{f.joint_ranges[k]:.4f}" for _, f in columns), end_section=last)
+    table.add_row("sum", *(f"{f.joint_range_sum:.4f}" for _, f in columns), end_section=True)
+    table.add_row("joint travel", *(f"{f.joint_travel:.2f}" for _, f in columns))
+    table.add_row("travel of t", *(f"{f.contact_travel:.0f}" for _, f in columns))
+    table.add_row("time on wheel, s", *(f"{f.seconds:.1f}" for _, f in columns))
     return table
-
-
-def _figures(ranges: np.ndarray) -> list[str]:
-    return [f"{value:.4f}" for value in ranges]
 
 
 def _facts(outcome: Outcome) -> Iterator[str]:
@@ -114,6 +119,12 @@ def _facts(outcome: Outcome) -> Iterator[str]:
         f"path: {len(points)} cutter points in {points.n_passes} passes, "
         f"{path.n_intermediate} intermediate nodes, branch {branch_name(path.branch)}"
     )
+    if plan.lower_bound is not None:
+        gap = 1.0 - plan.lower_bound / path.joint_range_sum
+        yield (
+            f"no path through these points has a joint range sum below {plan.lower_bound:.4f} rad: "
+            f"the one found is within {100.0 * gap:.3f} % of the least there is"
+        )
     yield f"search with its collision checks: {search_seconds(outcome):.2f} s"
     if found is not None:
         yield (
@@ -124,7 +135,11 @@ def _facts(outcome: Outcome) -> Iterator[str]:
         )
     if outcome.program is not None and found is not None and found.verified is not None:
         duration = found.verified.motion.duration.sum()
-        yield f"program: {len(outcome.program.moves)} moves, {duration:.1f} s"
+        worst = max((abs(time.error) for time in outcome.program.pass_times), default=0.0)
+        yield (
+            f"program: {len(outcome.program.moves)} moves, {duration:.1f} s, passes within "
+            f"{100.0 * worst:.2f} % of their time"
+        )
         if robot.unverified_pulses:
             yield (
                 f"caution: the pulse ratios of {', '.join(robot.unverified_pulses)} of "
@@ -132,10 +147,11 @@ def _facts(outcome: Outcome) -> Iterator[str]:
             )
 
 
-def show_check(job: Job, n_points: int, n_passes: int) -> None:
+def show_check(job: Job, surfacing: Surfacing) -> None:
     """Print what a run of the job would do."""
     console = _console()
     cell, wheel = job.cell, job.cell.wheel
+    n_points, n_passes = len(surfacing.points), surfacing.points.n_passes
     lines = [
         f"{job.path} is a valid job",
         f"program {job.name} for {cell.robot.title}",
@@ -143,12 +159,13 @@ def show_check(job: Job, n_points: int, n_passes: int) -> None:
         f"{np.rad2deg(wheel.max_roll):g} deg about its edges",
         f"{n_points} cutter points in {n_passes} passes ({job.passes.order.value}), bow height "
         f"{job.passes.max_bow_height * 1e3:g} mm",
-        f"node matrix {n_points} x {job.n_contact_positions}, search {job.method.value} from the "
-        f"{job.start.value} start node",
+        f"node matrix {n_points} x {job.search.n_contact_positions}, search "
+        f"{job.search.method.value} for the least {job.search.objective.value}",
         f"obstacles: {', '.join(body.name for body in cell.obstacles) or 'none'}",
     ]
     if cell.robot.unverified_pulses:
         lines.append(f"pulse ratios not verified: {', '.join(cell.robot.unverified_pulses)}")
+    lines += [f"warning: {finding}" for finding in surfacing.warnings]
     for line in lines:
         console.print(line, markup=False)
 
@@ -156,9 +173,7 @@ def show_check(job: Job, n_points: int, n_passes: int) -> None:
 def show_batch(rows: Sequence[Row]) -> None:
     """Print what became of the jobs of a batch."""
     console = _console()
-    table = Table()
-    for name in ("job", "status", "points", "range sum [rad]", "time [s]", "files, or why not"):
-        table.add_column(name, overflow="fold")
+    table = _table("job", "status", "cutter points", "range sum [rad]", "time [s]", "files in")
     for row in rows:
         points = total = spent = ""
         if row.result is not None:
@@ -166,20 +181,31 @@ def show_batch(rows: Sequence[Row]) -> None:
             spent = f"{row.result['seconds']['total']:.1f}"
             if row.result["path"] is not None:
                 total = f"{row.result['path']['joint_range_sum_rad']:.4f}"
-        last = str(row.folder) if row.exit_status == 0 else row.message
-        cells = (str(row.job), row.status, points, total, spent, last)
+        folder = "" if row.folder is None else str(row.folder)
+        cells = (str(row.job), row.status, points, total, spent, folder)
         table.add_row(*(Text(cell) for cell in cells))
     console.print(table)
+    for row in rows:
+        if row.message:
+            named = row.message.startswith(str(row.job))
+            told = row.message if named else f"{row.job}: {row.message}"
+            console.print(told.replace("\n", "\n  "), markup=False)
     failed = sum(row.exit_status != 0 for row in rows)
     console.print(f"{len(rows) - failed} of {len(rows)} jobs have a program", markup=False)
+
+
+def _table(*headings: str) -> Table:
+    table = Table()
+    for heading in headings:
+        # as Text: rich would take a unit in brackets for markup and leave it out
+        table.add_column(Text(heading), overflow="fold")
+    return table
 
 
 def show_robots(robots: Sequence[Robot]) -> None:
     """Print the robots that are known."""
     console = _console()
-    table = Table()
-    for name in ("name", "robot", "reach [mm]", "pulse ratios not verified"):
-        table.add_column(name)
+    table = _table("name", "robot", "reach [mm]", "pulse ratios not verified")
     for robot in robots:
         arm = robot.arm
         reach = arm.a1 + arm.c2 + np.hypot(arm.a2, arm.c3)

@@ -2,43 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import Enum
+import re
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from opl.cell.robot import Robot, load_robot
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.documents import Document, read
 from opl.errors import InputError
 from opl.geometry.frames import Array, NotARotationError, from_roll_pitch_yaw, nearest_pose
-from opl.geometry.mesh import load_mesh
-from opl.geometry.nurbs import NurbsSurface, load_surface
+from opl.geometry.passes import MachinedSurface, Passes
 from opl.geometry.shapes import Body, Box, Cylinder
 from opl.geometry.wheel import ContactWheel
-from opl.planning.path import Interpolation
-from opl.planning.starts import Start
+from opl.job_program import ProgramSection
+from opl.job_search import Method, ProcessSection, Search, SearchSection
+from opl.job_surface import PassesSection, WorkpieceSection
 from opl.planning.timing import Pace
+from opl.program.settings import ProgramSettings
 
 MM = 1e-3
-MAX_JOINT_STEP = np.deg2rad(15.0)  # between adjacent nodes; more is a jump through a singularity
-
-
-class Order(str, Enum):
-    """In which direction the passes are ground."""
-
-    ONE_WAY = "one_way"
-    ZIGZAG = "zigzag"
-
-
-class Method(str, Enum):
-    """How the path is searched."""
-
-    RECURSIVE = "recursive"
-
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -47,19 +33,24 @@ Six = Annotated[list[float], Field(min_length=6, max_length=6)]
 Row = Annotated[list[float], Field(min_length=4, max_length=4)]
 
 
-def _proper(rows: object) -> object:
+def _proper(rows: list[list[float]]) -> list[list[float]]:
     """Check a 4x4 matrix with its origin in mm, as a calibration prints it."""
-    matrix = np.array(rows, dtype=float)
-    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
-        raise ValueError("must be 4 rows of 4 finite numbers")
     try:
-        nearest_pose(matrix)
+        nearest_pose(np.array(rows))
     except NotARotationError as error:
         raise ValueError(f"{error}, at most 0.02 is taken for rounding") from error
     return rows
 
 
-Matrix = Annotated[list[Row], Field(min_length=4, max_length=4), BeforeValidator(_proper)]
+Matrix = Annotated[list[Row], Field(min_length=4, max_length=4), AfterValidator(_proper)]
+
+_NAME = r"^[A-Z0-9_-]{1,28}$"
+
+
+def _legal_name(name: str) -> str:
+    if not re.fullmatch(_NAME, name):
+        raise ValueError("must be 1 to 28 capital letters, digits, _ or -")
+    return name
 
 
 class _Wheel(Document):
@@ -107,72 +98,20 @@ class _Fixture(Document):
     bodies: list[_Body] = Field(default=[])
 
 
-class _Workpiece(Document):
-    surface: str
-    reversed_normal: bool = False
-    mesh: str
-    mesh_unit: Literal["mm", "m"]
-    sample_spacing_mm: Positive = 2.0
-
-
-class _Passes(Document):
-    plane_normal: Triple
-    pitch_mm: Positive
-    margin_mm: NotNegative = 0.0
-    rows: Annotated[int, Field(ge=1)] | None = None
-    bow_height_mm: Positive
-    largest_step_mm: Positive
-    order: Literal["one_way", "zigzag"] = "one_way"
-
-
-class _Search(Document):
-    method: Literal["recursive"] = "recursive"
-    start: Literal["best", "nearest"] = "best"
-    contact_positions: Annotated[int, Field(ge=2)]
-    max_contact_step: Positive
-    max_contact_error_mm: Positive = 0.1
-
-
-class _Process(Document):
-    feed_mm_s: Positive
-    home_deg: Six
-    approach_mm: Positive = 50.0
-    approach_mm_s: Positive = 50.0
-    air_speed_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 10.0
-
-
-class _Program(Document):
-    tool: Annotated[int, Field(ge=0, le=63)] = 0
-    template: str | None = None
-
-
 class JobFile(Document):
     """The keys of a job file; `opl schema` prints them for editors."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Z0-9_-]{1,28}$")]
+    name: Annotated[str, Field(json_schema_extra={"pattern": _NAME}), AfterValidator(_legal_name)]
     robot: str
     wheel: _Wheel
     obstacles: list[_Body] = Field(default=[])
     clearance_mm: NotNegative = 5.0
     fixture: _Fixture
-    workpiece: _Workpiece
-    passes: _Passes
-    search: _Search
-    process: _Process
-    program: _Program = _Program()
-
-
-@dataclass(frozen=True)
-class Passes:
-    """How the surface is cut into passes; lengths in [m]."""
-
-    plane_normal: Array
-    pitch: float
-    margin: float
-    rows: int | None
-    max_bow_height: float
-    largest_step: float
-    order: Order
+    workpiece: WorkpieceSection
+    passes: PassesSection
+    search: SearchSection
+    process: ProcessSection
+    program: ProgramSection = ProgramSection()
 
 
 @dataclass(frozen=True)
@@ -184,34 +123,22 @@ class Job:
         name: Name of the program.
         cell: Robot, wheel, part and surroundings.
         surface: The surface to be ground, in the workpiece frame.
-        reversed_normal: Whether its outward normal is -(du x dv).
         sample_spacing: Of the part's surface samples in [m].
         passes: How the surface is cut.
-        n_contact_positions: M, the number of values of t.
-        method: The search.
-        start: Its start node.
-        interpolation: How the path between nodes is filled in.
-        max_contact_error: Largest distance of part and wheel on the wheel in [m].
+        search: How the path is sought.
         pace: Speeds, approach and home.
-        tool: Number of the tool that the program names.
-        template: The user's own template of the program, or None.
+        program: How the program is written.
     """
 
     path: Path
     name: str
     cell: WorkCell
-    surface: NurbsSurface
-    reversed_normal: bool
+    surface: MachinedSurface
     sample_spacing: float
     passes: Passes
-    n_contact_positions: int
-    method: Method
-    start: Start
-    interpolation: Interpolation
-    max_contact_error: float
+    search: Search
     pace: Pace
-    tool: int
-    template: Path | None
+    program: ProgramSettings
 
 
 def load(path: Path, method: str | None = None) -> Job:
@@ -226,6 +153,7 @@ def load(path: Path, method: str | None = None) -> Job:
     """
     file = read(path, JobFile)
     robot = _robot(path, file.robot)
+    robot = file.program.robot_as_counted(path, robot)
     home = np.deg2rad(file.process.home_deg)
     _check_home(path, robot, home)
     if file.search.max_contact_error_mm <= file.passes.bow_height_mm:
@@ -240,52 +168,32 @@ def load(path: Path, method: str | None = None) -> Job:
         float(np.deg2rad(file.wheel.max_roll_deg)),
         _pose(file.wheel.T_base_contact0_mm),
     )
+    part = file.workpiece.load_part(path)
+    surface = file.workpiece.load_surface(path)
+    file.workpiece.check_sizes(path, surface, part)
     cell = WorkCell(
         robot=robot,
         wheel=wheel,
         obstacles=tuple(body.in_si() for body in file.obstacles),
-        part=load_mesh(path.parent / file.workpiece.mesh, file.workpiece.mesh_unit),
+        part=part,
         fixture=tuple(body.in_si() for body in file.fixture.bodies),
         T_flange_workpiece=_pose(file.fixture.T_flange_workpiece_mm),
         contact_allowance=file.wheel.contact_allowance_mm * MM,
         clearance=file.clearance_mm * MM,
     )
-    template = file.program.template
+    search = file.search.in_si(file.passes.bow_height_mm)
+    if method is not None:
+        search = replace(search, method=Method(method))
     return Job(
         path=path,
         name=file.name,
         cell=cell,
-        surface=load_surface(path.parent / file.workpiece.surface),
-        reversed_normal=file.workpiece.reversed_normal,
+        surface=surface,
         sample_spacing=file.workpiece.sample_spacing_mm * MM,
-        passes=Passes(
-            np.array(file.passes.plane_normal),
-            file.passes.pitch_mm * MM,
-            file.passes.margin_mm * MM,
-            file.passes.rows,
-            file.passes.bow_height_mm * MM,
-            file.passes.largest_step_mm * MM,
-            Order(file.passes.order),
-        ),
-        n_contact_positions=file.search.contact_positions,
-        method=Method(method or file.search.method),
-        start=Start(file.search.start),
-        interpolation=Interpolation(
-            file.search.max_contact_step,
-            # the rest of what is allowed is the bow height of the path itself
-            (file.search.max_contact_error_mm - file.passes.bow_height_mm) * MM,
-            float(MAX_JOINT_STEP),
-        ),
-        max_contact_error=file.search.max_contact_error_mm * MM,
-        pace=Pace(
-            file.process.feed_mm_s * MM,
-            file.process.approach_mm * MM,
-            file.process.approach_mm_s * MM,
-            file.process.air_speed_percent / 100.0,
-            home,
-        ),
-        tool=file.program.tool,
-        template=None if template is None else path.parent / template,
+        passes=file.passes.in_si(path, surface, wheel.radius),
+        search=search,
+        pace=file.process.in_si(),
+        program=file.program.in_si(path, file.name, robot, home),
     )
 
 

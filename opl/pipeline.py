@@ -2,70 +2,31 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from datetime import datetime, timezone
 
-from opl.cell.clearance import sample_tree
+from opl.cell.clearance import PartSamples, sample_tree, wheel_clearance
 from opl.cell.collision import CollisionScene
 from opl.cell.robot import forward
+from opl.cell.workcell import PART, WHEEL
 from opl.errors import InputError, NoPathError
+from opl.export import draw, job_date, write_program
 from opl.geometry.mesh import surface_samples
-from opl.geometry.nurbs import DegenerateNormalError
-from opl.geometry.toolpath import CutterPoints, equal_section_passes
-from opl.job import Job, Order
-from opl.planning.fixed import FixedContact, keep_contact, runs_of
+from opl.geometry.toolpath import CutterPoints
+from opl.job import Job
+from opl.outcome import Outcome
+from opl.planning.fixed import keep_contact, runs_of
 from opl.planning.layer import wheel_layer
-from opl.planning.motion import VerifiedMotion
 from opl.planning.nodes import build_nodes
-from opl.planning.plan import Plan, plan_recursive
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import unreachable_points
-from opl.planning.starts import Start
-from opl.planning.states import NodeState, node_states
 from opl.planning.timing import timed
-from opl.program.inform import render_jobs
-from opl.program.moves import Program, plan_moves
-from opl.program.pulses import PulseScale
-from opl.program.table import render_table
-from opl.report.pictures import contact_chart, joint_chart
-from opl.verification.replay import Verification, replay
+from opl.searches import compare, from_paper_start, search_path
+from opl.surfacing import cut_surface
+from opl.verification.replay import replay
 
 Progress = Callable[[str, float], None]
-
-
-@dataclass
-class Outcome:
-    """What became of a job, as far as it came.
-
-    Attributes:
-        job: The job.
-        status: ``ok``, ``no_path`` or ``unsafe``.
-        seconds: Time of each stage.
-        points: The cutter points.
-        fixed: The contact-fixed path.
-        plan: The found path and its motion.
-        paper_start: The path found from the paper's own start node, or None if there is none.
-        verification: What the replay found.
-        program: The moves of the program.
-        refusal: Why there is no path, if so.
-        files: Texts to be written, by file name.
-    """
-
-    job: Job
-    status: str = "ok"
-    seconds: dict[str, float] = field(default_factory=dict)
-    points: CutterPoints | None = None
-    fixed: FixedContact | None = None
-    plan: Plan | None = None
-    paper_start: Plan | None = None
-    verification: Verification | None = None
-    program: Program | None = None
-    refusal: NoPathError | None = None
-    files: dict[str, str] = field(default_factory=dict)
 
 
 def run(job: Job, progress: Progress = lambda stage, fraction: None) -> Outcome:
@@ -79,26 +40,30 @@ def run(job: Job, progress: Progress = lambda stage, fraction: None) -> Outcome:
         InputError: If the job's surface cannot be cut into passes, or lies out of reach.
         OplError: If the program cannot be written for the controller.
     """
+    job_date()  # before the work, that it may not be in vain
     outcome = Outcome(job)
     clock = _Clock(outcome.seconds, progress)
     with clock("cutter_points"):
-        outcome.points = points = cutter_points(job)
+        surfacing = cut_surface(job)
+        outcome.points = points = surfacing.points
+        outcome.warnings = surfacing.warnings
     problem = pose_problem(job, points, clock)
     with clock("comparison"):
         outcome.fixed = keep_contact(problem)
     try:
         with clock("search"):
-            outcome.plan = plan = plan_recursive(problem, job.start)
+            outcome.plan = plan = search_path(outcome, problem)
     except NoPathError as error:
         outcome.status, outcome.refusal = "no_path", error
         return outcome
     with clock("comparison"):
-        outcome.paper_start = _from_paper_start(problem)
+        outcome.paper_start = from_paper_start(problem)
+        outcome.compared = compare(outcome)
     with clock("motion"):
         motion = timed(plan.motion, points, job.pace, job.cell.robot.max_speed)
     with clock("verification"):
         outcome.verification = verification = replay(
-            job.cell, points, motion, job.max_contact_error, clock.share
+            job.cell, points, motion, job.search.max_contact_error, clock.share
         )
     if verification.verified is None:
         outcome.status = "unsafe"
@@ -115,32 +80,17 @@ def cutter_points(job: Job) -> CutterPoints:
     Raises:
         InputError: If that cannot be done; names the key that is to blame.
     """
-    passes = job.passes
-    try:
-        return equal_section_passes(
-            job.surface,
-            passes.plane_normal,
-            pitch=passes.pitch,
-            margin=passes.margin,
-            rows=passes.rows,
-            max_bow_height=passes.max_bow_height,
-            largest_step=passes.largest_step,
-            zigzag=passes.order is Order.ZIGZAG,
-            reversed_normal=job.reversed_normal,
-        )
-    except DegenerateNormalError as error:
-        raise InputError(f"{job.path}: workpiece.surface", str(error)) from error
-    except ValueError as error:
-        raise InputError(f"{job.path}: passes", str(error)) from error
+    return cut_surface(job).points
 
 
 def pose_problem(job: Job, points: CutterPoints, clock: _Clock) -> GrindingProblem:
     """Build the node matrix and the clearance layer.
 
     Raises:
-        InputError: If the arm reaches some cutter point at no contact position.
+        InputError: If the arm reaches some cutter point at no contact position, or collides at
+            home.
     """
-    contact_positions = job.cell.wheel.positions(job.n_contact_positions)
+    contact_positions = job.cell.wheel.positions(job.search.n_contact_positions)
     with clock("nodes"):
         field = build_nodes(job.cell, points, contact_positions)
     with clock("clearance"):
@@ -148,7 +98,7 @@ def pose_problem(job: Job, points: CutterPoints, clock: _Clock) -> GrindingProbl
         layer = wheel_layer(job.cell, samples, points, contact_positions)
         scene = CollisionScene(job.cell)
     problem = GrindingProblem(
-        job.cell, scene, samples, points, field, layer, job.interpolation, job.pace
+        job.cell, scene, samples, points, field, layer, job.search.interpolation, job.pace
     )
     unreachable = unreachable_points(problem)
     if len(unreachable):
@@ -158,77 +108,23 @@ def pose_problem(job: Job, points: CutterPoints, clock: _Clock) -> GrindingProbl
             f"{runs_of(unreachable)} of {len(points)}; check wheel.T_base_contact0_mm and "
             "fixture.T_flange_workpiece_mm",
         )
-    hits = scene.colliding_pairs(job.pace.home)
+    hits = [*scene.colliding_pairs(job.pace.home), *_part_near_wheel(job, samples)]
     if hits:
         pairs = ", ".join(" and ".join(pair) for pair in hits)
-        raise InputError(f"{job.path}: process.home_deg", f"at home these collide: {pairs}")
+        raise InputError(
+            f"{job.path}: process.home_deg",
+            f"at home these are nearer to each other than {1e3 * job.cell.clearance:g} mm "
+            f"(clearance_mm) or collide: {pairs}",
+        )
     return problem
 
 
-def _from_paper_start(problem: GrindingProblem) -> Plan | None:
-    try:
-        return plan_recursive(problem, Start.NEAREST)
-    except NoPathError:
-        return None
-
-
-def write_program(outcome: Outcome, verified: VerifiedMotion) -> Program:
-    """Render the job files and the table of a verified motion."""
-    job, robot = outcome.job, outcome.job.cell.robot
-    scale = PulseScale(
-        robot.joint_names,
-        robot.pulses_per_radian,
-        robot.lower,
-        robot.upper,
-        robot.unverified_pulses,
-    )
-    program = plan_moves(verified, job.name, robot.max_speed, ["OPL"], robot.joint_names)
-    outcome.files.update(
-        render_jobs(program, scale, job_date(), tool=job.tool, template=job.template)
-    )
-    Ts_base_flange = forward(robot, verified.motion.q)
-    outcome.files[f"{job.name}.csv"] = render_table(verified, program, scale, Ts_base_flange)
-    return program
-
-
-def draw(outcome: Outcome, problem: GrindingProblem) -> None:
-    """Draw the contact chart and the joint angles."""
-    plan, fixed, points, job = outcome.plan, outcome.fixed, outcome.points, outcome.job
-    assert plan is not None and fixed is not None and points is not None
-    path = plan.path
-    outcome.files[f"{job.name}_contact.svg"] = contact_chart(
-        title=f"{job.name}: where the part touches the wheel",
-        contact_positions=problem.field.contact_positions,
-        states=node_states(problem, path.branch),
-        state_names=[state.value for state in NodeState],
-        pass_index=points.pass_index,
-        flat_end=job.cell.wheel.flat_end,
-        path_cutter_point=path.cutter_point,
-        path_contact_position=path.contact_position,
-        path_pass=path.pass_index,
-    )
-    robot = job.cell.robot
-    outcome.files[f"{job.name}_joints.svg"] = joint_chart(
-        title=f"{job.name}: joint angles along the path",
-        joint_names=robot.joint_names,
-        lower=robot.lower,
-        upper=robot.upper,
-        found_cutter_point=path.cutter_point,
-        found_q=path.q,
-        found_pass=path.pass_index,
-        fixed_q=fixed.q,
-        pass_index=points.pass_index,
-    )
-
-
-def job_date() -> datetime:
-    """Return SOURCE_DATE_EPOCH, which makes runs repeatable to the byte, or the time now."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    if epoch is None:
-        return datetime.now()
-    if not epoch.isdecimal():
-        raise InputError("SOURCE_DATE_EPOCH", f"must be seconds since 1970, got {epoch!r}")
-    return datetime.fromtimestamp(int(epoch), tz=timezone.utc)
+def _part_near_wheel(job: Job, samples: PartSamples) -> list[tuple[str, str]]:
+    """Return part and wheel if they are too near at home, where they do not touch on purpose."""
+    home = job.pace.home[None]
+    Ts_contact0_workpiece = job.cell.Ts_contact0_workpiece(forward(job.cell.robot, home))
+    distance = wheel_clearance(samples, job.cell.wheel, Ts_contact0_workpiece)[0]
+    return [(PART, WHEEL)] if distance < job.cell.clearance else []
 
 
 class _Clock:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from opl.cell.inverse import branch_name
-from opl.pipeline import Outcome
+from opl.outcome import Outcome
+from opl.planning.figures import Figures
 from opl.planning.plan import Plan
 
 MM = 1e3
@@ -23,10 +24,11 @@ def result(outcome: Outcome) -> dict[str, Any]:
         "robot": {"name": robot.name, "unverified_pulse_ratios": list(robot.unverified_pulses)},
         "cutter_points": None if points is None else len(points),
         "passes": None if points is None else points.n_passes,
+        "warnings": [str(finding) for finding in outcome.warnings],
         "reasons": reasons(outcome),
         "fixed": _fixed(outcome),
         "path": _path(outcome, outcome.plan),
-        "paper_start": _path(outcome, outcome.paper_start),
+        "compared": {name: _figures(figures) for name, figures in outcome.compared.items()},
         "verification": _verification(outcome),
         "program": _program(outcome),
         "seconds": {stage: round(spent, 4) for stage, spent in _seconds(outcome).items()},
@@ -64,17 +66,38 @@ def _fixed(outcome: Outcome) -> dict[str, Any] | None:
     return {
         "joint_ranges_rad": None if ranges is None else _rounded(ranges),
         "joint_range_sum_rad": None if ranges is None else _rounded(ranges.sum()),
+        "joint_ranges_by_pass_rad": _by_pass(outcome),
         "feasible": fixed.feasible,
         "reason": fixed.reason,
+    }
+
+
+def _by_pass(outcome: Outcome) -> list[list[float]] | None:
+    """Return the joint ranges of each pass by itself; the paper's figures are of one pass."""
+    fixed, points = outcome.fixed, outcome.points
+    if fixed is None or fixed.q is None or points is None:
+        return None
+    passes = [fixed.q[points.pass_index == k] for k in range(points.n_passes)]
+    return [_rounded(np.ptp(q, axis=0)) for q in passes]
+
+
+def _figures(figures: Figures) -> dict[str, Any]:
+    return {
+        "joint_ranges_rad": _rounded(figures.joint_ranges),
+        "joint_range_sum_rad": _rounded(figures.joint_range_sum),
+        "joint_travel_rad": _rounded(figures.joint_travel),
+        "contact_travel": _rounded(figures.contact_travel),
+        "seconds_on_wheel": _rounded(figures.seconds),
     }
 
 
 def _path(outcome: Outcome, plan: Plan | None) -> dict[str, Any] | None:
     if plan is None:
         return None
-    path = plan.path
+    path, bound = plan.path, plan.lower_bound
     return {
-        "method": outcome.job.method.value,
+        "method": outcome.job.search.method.value,
+        "objective": outcome.job.search.objective.value,
         "branch": branch_name(path.branch),
         "joint_ranges_rad": _rounded(path.joint_ranges),
         "joint_range_sum_rad": _rounded(path.joint_range_sum),
@@ -82,8 +105,8 @@ def _path(outcome: Outcome, plan: Plan | None) -> dict[str, Any] | None:
         "contact_travel": _rounded(path.contact_travel),
         "nodes": len(path.q) - path.n_intermediate,
         "intermediate_nodes": path.n_intermediate,
-        "lower_bound_rad": None,
-        "gap": None,
+        "lower_bound_rad": None if bound is None else _rounded(bound),
+        "gap": None if bound is None else _rounded(1.0 - bound / path.joint_range_sum),
     }
 
 
@@ -110,6 +133,10 @@ def _program(outcome: Outcome) -> dict[str, Any] | None:
         "files": list(outcome.files),
         "moves": len(outcome.program.moves),
         "duration_s": round(float(verified.motion.duration.sum()), 3),
+        "passes": [
+            {"wanted_s": round(time.wanted, 3), "written_s": round(time.written, 3)}
+            for time in outcome.program.pass_times
+        ],
     }
 
 

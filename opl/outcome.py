@@ -1,0 +1,53 @@
+"""What became of a job, as far as it came: what is written, printed and told to other programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from opl.errors import NoPathError
+from opl.findings import Finding
+from opl.geometry.toolpath import CutterPoints
+from opl.job import Job
+from opl.planning.figures import Figures
+from opl.planning.fixed import FixedContact
+from opl.planning.plan import Plan
+from opl.program.moves import Program
+from opl.verification.replay import Verification
+
+
+@dataclass
+class Outcome:
+    """What became of a job, as far as it came.
+
+    Attributes:
+        job: The job.
+        status: ``ok``, ``no_path`` or ``unsafe``.
+        seconds: Time of each stage.
+        points: The cutter points.
+        warnings: What is doubtful about them.
+        fixed: The contact-fixed path.
+        plan: The found path and its motion.
+        recursive: The path of the paper's search from the best start node.
+        paper_start: The path of the paper's search from the paper's own start node, or None if
+            there is none.
+        compared: The figures of every path, by what it is.
+        verification: What the replay found.
+        program: The moves of the program.
+        refusal: Why there is no path, if so.
+        files: Texts to be written, by file name.
+    """
+
+    job: Job
+    status: str = "ok"
+    seconds: dict[str, float] = field(default_factory=dict)
+    points: CutterPoints | None = None
+    warnings: tuple[Finding, ...] = ()
+    fixed: FixedContact | None = None
+    plan: Plan | None = None
+    recursive: Plan | None = None
+    paper_start: Plan | None = None
+    compared: dict[str, Figures] = field(default_factory=dict)
+    verification: Verification | None = None
+    program: Program | None = None
+    refusal: NoPathError | None = None
+    files: dict[str, str] = field(default_factory=dict)

@@ -1,0 +1,59 @@
+"""Which search a job asks for, and how what it finds compares with the others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from opl.errors import NoPathError
+from opl.job_search import Method, Objective
+from opl.outcome import Outcome
+from opl.planning.cheapest import plan_cheapest
+from opl.planning.figures import Figures, figures_of_path, figures_of_points
+from opl.planning.optimal import plan_optimal
+from opl.planning.plan import Plan, plan_recursive
+from opl.planning.problem import GrindingProblem
+from opl.planning.starts import Start
+
+
+def search_path(outcome: Outcome, problem: GrindingProblem) -> Plan:
+    """Search the path by the method and for the objective of the job.
+
+    Raises:
+        NoPathError: If there is none.
+    """
+    search = outcome.job.search
+    outcome.recursive = plan = plan_recursive(problem, search.start)
+    if search.method is Method.RECURSIVE:
+        return plan
+    if search.objective is Objective.RANGE:
+        return plan_optimal(problem, search.optimal, plan)
+    travel, time = (0.0, 1.0) if search.objective is Objective.TIME else (1.0, 0.0)
+    weights = search.optimal.costs
+    costs = replace(weights, joint_weights=travel * weights.joint_weights, time_weight=time)
+    return plan_cheapest(problem, costs, search.optimal.max_contact_change)
+
+
+def compare(outcome: Outcome) -> dict[str, Figures]:
+    """Return the figures of the contact-fixed path and of all that were found."""
+    job, points = outcome.job, outcome.points
+    assert points is not None
+    max_speed = job.cell.robot.max_speed
+    compared = {}
+    if outcome.fixed is not None and outcome.fixed.q is not None:
+        q = outcome.fixed.q
+        compared["fixed"] = figures_of_points(q, points, job.pace, max_speed)
+    plans = {"paper_start": outcome.paper_start, "recursive": outcome.recursive}
+    if outcome.plan is not outcome.recursive:
+        plans["optimal"] = outcome.plan
+    for name, plan in plans.items():
+        if plan is not None:
+            compared[name] = figures_of_path(plan.path, plan.motion, points, job.pace, max_speed)
+    return compared
+
+
+def from_paper_start(problem: GrindingProblem) -> Plan | None:
+    """Return what the paper's search finds from the paper's own start node, None if nothing."""
+    try:
+        return plan_recursive(problem, Start.NEAREST)
+    except NoPathError:
+        return None

@@ -1,0 +1,306 @@
+"""How the package is built: imports run one way, heavy libraries live in one place each."""
+
+import ast
+import importlib
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+import opl
+
+PACKAGE = Path(opl.__file__).parent
+
+# Lowest first. A module may import from floors below its own, and from its own room. Rooms on one
+# floor do not know each other. A room is a folder, or a module that lies in the package itself.
+FLOORS = [
+    {"__init__", "errors", "findings", "resources"},
+    {"documents"},
+    {"geometry"},
+    {"cell"},
+    {"planning"},
+    {"verification", "program", "report"},
+    {"job_program", "job_search", "job_surface"},
+    {"job"},
+    {"outcome"},
+    {"searches", "export"},
+    {"pipeline"},
+    {"result"},
+    {"deliver"},
+    {"batch"},
+    {"console"},
+    {"cli_programs", "cli_surfaces"},
+    {"cli", "__main__"},
+]
+
+# where a library may be imported: rooms, or single modules
+HOMES = {
+    "pinocchio": {"cell"},
+    "coal": {"cell"},
+    "hppfcl": set(),
+    "fcl": set(),  # the tests' own second scene
+    "pybullet": {"verification"},
+    "pybullet_utils": {"verification"},
+    "pybullet_data": set(),
+    "jinja2": {"program"},
+    "yaml": {"documents"},
+    "click": {"cli", "cli_programs", "cli_surfaces"},
+    "rich": {"console"},
+    "matplotlib": {"report"},
+    "trimesh": {"geometry/mesh"},
+    "contourpy": {"geometry"},
+    "numba": {"cell/clearance", "planning"},
+}
+
+LONGEST = 300  # lines
+
+
+def modules_of(package):
+    """Return {dotted name below the package: path}; a folder is named as its __init__."""
+    return {
+        ".".join(path.relative_to(package).with_suffix("").parts): path
+        for path in sorted(package.rglob("*.py"))
+    }
+
+
+def imports_of(package, name, path):
+    """Return (own modules, other libraries) that a module imports anywhere in its text."""
+    known = modules_of(package)
+    own, others = set(), set()
+
+    def note(parts):
+        if parts[0] != package.name:
+            others.add(parts[0])
+            return
+        # the longest part of a dotted name that is a module; the rest is what is taken from it
+        for end in range(len(parts), 0, -1):
+            inner = parts[1:end]
+            for candidate in (".".join(inner), ".".join([*inner, "__init__"])):
+                if candidate in known:
+                    own.add(candidate)
+                    return
+
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                note(alias.name.split("."))
+        elif isinstance(node, ast.ImportFrom):
+            here = [package.name, *name.split(".")]
+            start = here[: len(here) - node.level] if node.level else []
+            module = [*start, *(node.module.split(".") if node.module else [])]
+            for alias in node.names:
+                note([*module, alias.name])
+    return own - {name}, others
+
+
+def room_of(name):
+    return name.split(".")[0]
+
+
+def floor_of(name):
+    for number, rooms in enumerate(FLOORS):
+        if room_of(name) in rooms:
+            return number
+    return None
+
+
+def wrong_imports(package):
+    """Return what is wrong with the imports of a package, one line each."""
+    found = []
+    for name, path in modules_of(package).items():
+        if floor_of(name) is None:
+            found.append(f"{name} is on no floor")
+            continue
+        own, others = imports_of(package, name, path)
+        for other in sorted(own):
+            below = floor_of(other) is not None and floor_of(other) < floor_of(name)
+            if room_of(other) != room_of(name) and not below:
+                found.append(f"{name} imports {other}")
+        # the model of a document stands beside what is made from it, on the rules of documents.py
+        if "pydantic" in others and name != "documents" and "documents" not in own:
+            found.append(f"{name} imports pydantic, but not documents")
+        for library in sorted(others & HOMES.keys()):
+            if not {room_of(name), name.replace(".", "/")} & HOMES[library]:
+                found.append(f"{name} imports {library}")
+    return found
+
+
+def cycles(package):
+    """Return modules that import each other in a circle, each circle once."""
+    graph = {name: imports_of(package, name, path)[0] for name, path in modules_of(package).items()}
+    found, done = [], set()
+
+    def visit(name, trail):
+        if name in trail:
+            circle = trail[trail.index(name) :]
+            if not any(set(circle) == set(other) for other in found):
+                found.append(circle)
+            return
+        if name not in done:
+            for other in sorted(graph[name]):
+                visit(other, [*trail, name])
+            done.add(name)
+
+    for name in graph:
+        visit(name, [])
+    return found
+
+
+def too_long(package):
+    lengths = {
+        name: len(path.read_text().splitlines()) for name, path in modules_of(package).items()
+    }
+    return sorted(name for name, length in lengths.items() if length > LONGEST)
+
+
+def with_leftovers(package):
+    mark = re.compile(r"\b(TODO|FIXME|XXX)\b")
+    return sorted(
+        name for name, path in modules_of(package).items() if mark.search(path.read_text())
+    )
+
+
+def importable(name):
+    module = ".".join([PACKAGE.name, *(part for part in name.split(".") if part != "__init__")])
+    return importlib.import_module(module)
+
+
+# the package
+
+
+def test_imports_run_one_way_and_heavy_libraries_stay_at_home():
+    assert wrong_imports(PACKAGE) == []
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    assert cycles(PACKAGE) == []
+
+
+def test_every_module_has_one_screenful_of_concept():
+    assert too_long(PACKAGE) == []
+
+
+def test_nothing_is_left_to_be_done():
+    assert with_leftovers(PACKAGE) == []
+
+
+def test_every_room_is_there():
+    rooms = {room_of(name) for name in modules_of(PACKAGE)}
+    assert {"geometry", "cell", "planning", "verification", "program", "report", "job"} <= rooms
+
+
+@pytest.mark.parametrize("name", [name for name in modules_of(PACKAGE) if "__main__" not in name])
+def test_what_a_module_offers_exists(name):
+    module = importable(name)
+    for offered in getattr(module, "__all__", []):
+        assert hasattr(module, offered)
+
+
+@pytest.mark.parametrize("name", list(modules_of(PACKAGE)))
+def test_every_module_says_what_it_is(name):
+    assert ast.get_docstring(ast.parse(modules_of(PACKAGE)[name].read_text()))
+
+
+def test_the_search_knows_arrays_and_no_robot():
+    own, _ = imports_of(PACKAGE, "planning.recursive", PACKAGE / "planning" / "recursive.py")
+    assert {room_of(name) for name in own} <= {"geometry", "planning"}
+    for name in own & {name for name in modules_of(PACKAGE) if name.startswith("planning.")}:
+        inner, _ = imports_of(PACKAGE, name, modules_of(PACKAGE)[name])
+        assert {room_of(other) for other in inner} <= {"geometry", "planning"}
+
+
+def test_libraries_do_not_set_up_logging_or_print():
+    # only the console and the command line speak
+    for name, path in modules_of(PACKAGE).items():
+        if room_of(name) in ("cli", "console"):
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                assert node.func.id != "print", f"{name} prints"
+            if isinstance(node, ast.Attribute):
+                assert node.attr != "basicConfig", f"{name} sets up logging"
+
+
+# the test itself
+
+
+@pytest.fixture
+def made_up(tmp_path):
+    """Return a function that writes a package from {path: text}."""
+
+    def write(files):
+        package = tmp_path / "made_up"
+        for path, text in {"__init__.py": "", **files}.items():
+            target = package / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(text)
+        return package
+
+    return write
+
+
+def test_a_good_tree_passes(made_up):
+    package = made_up(
+        {
+            "errors.py": "class Bad(Exception): ...",
+            "geometry/wheel.py": "from made_up.errors import Bad\nimport numpy",
+            "cell/robot.py": "import pinocchio\nfrom made_up.geometry import wheel",
+            "planning/plan.py": "from made_up.cell import robot\nfrom made_up.planning import path",
+            "planning/path.py": "from ..geometry.wheel import y",
+        }
+    )
+    assert wrong_imports(package) == []
+    assert cycles(package) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "told"),
+    [
+        ("geometry/a.py", "from made_up.cell.b import c", "geometry.a imports cell.b"),
+        ("geometry/a.py", "import made_up.cell.b", "geometry.a imports cell.b"),
+        ("geometry/a.py", "from made_up.cell import b", "geometry.a imports cell.b"),
+        ("geometry/a.py", "from ..cell.b import c", "geometry.a imports cell.b"),
+        ("geometry/a.py", "from ..cell import b", "geometry.a imports cell.b"),
+        (
+            "geometry/a.py",
+            "def f():\n    from made_up.cell.b import c",
+            "geometry.a imports cell.b",
+        ),
+        ("program/a.py", "from made_up.report.b import c", "program.a imports report.b"),
+        (
+            "verification/a.py",
+            "from made_up.program.b import c",
+            "verification.a imports program.b",
+        ),
+        ("planning/a.py", "from made_up.job import c", "planning.a imports job"),
+        ("errors.py", "from made_up.geometry.b import c", "errors imports geometry.b"),
+        ("planning/a.py", "import pinocchio as pin", "planning.a imports pinocchio"),
+        ("planning/a.py", "if True:\n    from coal import Box", "planning.a imports coal"),
+        ("cell/a.py", "import yaml", "cell.a imports yaml"),
+        ("cell/a.py", "from pydantic import Field", "cell.a imports pydantic, but not documents"),
+        ("cell/a.py", "import numba", "cell.a imports numba"),
+        ("geometry/a.py", "import trimesh.creation", "geometry.a imports trimesh"),
+        ("job.py", "import click", "job imports click"),
+        ("utils.py", "", "utils is on no floor"),
+    ],
+)
+def test_an_offending_import_is_found(made_up, path, text, told):
+    files = {f"{room}/b.py": "c = 1" for room in ("cell", "geometry", "program", "report")}
+    package = made_up({**files, "job.py": "c = 1", path: text})
+    assert wrong_imports(package) == [told]
+
+
+def test_a_circle_is_found(made_up):
+    files = {
+        f"cell/{one}.py": f"from made_up.cell.{other} import x"
+        for one, other in pairwise(["a", "b", "c", "a"])
+    }
+    (circle,) = cycles(made_up(files))
+    assert set(circle) == {"cell.a", "cell.b", "cell.c"}
+
+
+def test_a_long_module_and_leftovers_are_found(made_up):
+    package = made_up({"cell/a.py": "x = 1\n" * (LONGEST + 1), "cell/b.py": "# TODO: later"})
+    assert too_long(package) == ["cell.a"]
+    assert with_leftovers(package) == ["cell.b"]
