@@ -247,6 +247,13 @@ def test_a_bad_urdf_is_refused_with_its_file(copied_robot, old, new, message):
         load_robot(str(copied_robot))
 
 
+def test_shapes_that_the_replay_would_not_see_are_refused(copied_robot):
+    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+    spoil(copied_robot / "mh24.urdf", '<link name="tool0">', f'<link name="tool0">{ball}')
+    with pytest.raises(InputError, match="link tool0 has collision shapes but hangs on a fixed"):
+        load_robot(str(copied_robot))
+
+
 def test_a_urdf_without_flange_frame_is_refused(copied_robot):
     text = (copied_robot / "mh24.urdf").read_text(encoding="utf-8")
     (copied_robot / "mh24.urdf").write_text(text.replace("tool0", "hand"), encoding="utf-8")

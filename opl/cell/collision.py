@@ -30,7 +30,10 @@ class CollisionScene:
     def __init__(self, cell: WorkCell) -> None:
         self._model = pin.buildModelFromUrdf(str(cell.robot.urdf))
         self._geometry = pin.buildGeomFromUrdf(
-            self._model, str(cell.robot.urdf), pin.GeometryType.COLLISION
+            self._model,
+            str(cell.robot.urdf),
+            pin.GeometryType.COLLISION,
+            package_dirs=[str(cell.robot.urdf.parent)],  # where relative names of meshes start
         )
         self._n_links = self._geometry.ngeoms
         self._add_bodies(cell)

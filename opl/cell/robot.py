@@ -2,6 +2,9 @@
 
 Forward kinematics is pinocchio's, on the URDF. The closed form of `opl.cell.inverse` has its own
 numbers, in ``robot.yaml``; a robot whose two descriptions disagree is refused.
+
+Base frame of every robot that comes with opl, whatever its maker counts from: on axis 1 at the
+height of axis 2, z up, x ahead. So a cell stays as it is when another arm takes its place.
 """
 
 from __future__ import annotations
@@ -10,41 +13,43 @@ import math
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Literal
 
 import numpy as np
 import pinocchio as pin
-from pydantic import Field, model_validator
 
 from opl.cell.inverse import SphericalWristArm, inverse
-from opl.documents import Document, read
+from opl.cell.robot_file import N_JOINTS, RobotFile, read_robot_file
+from opl.cell.urdf_tree import UrdfTree
 from opl.errors import InputError
 from opl.geometry.frames import Array
 from opl.resources import folder
 
-N_JOINTS = 6
-
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """What is known of a robot. Its base frame is that of the controller.
+    """What is known of a robot.
 
     Attributes:
         name: Short name.
         title: Name for people.
+        maker: Who builds it.
         joint_names: In the order of every q.
         lower: Smallest joint positions in [rad], shape (6,).
         upper: Largest joint positions in [rad], shape (6,).
         max_speed: Largest joint speeds in [rad/s], shape (6,).
-        pulses_per_radian: Encoder counts as programs give them in [1/rad], shape (6,).
-        unverified_pulses: Joints whose pulses were never confirmed on this robot.
+        pulses_per_radian: Encoder counts as programs give them in [1/rad], shape (6,); NaN where
+            they are not known.
+        unverified_pulses: Joints whose pulses are known, but were never confirmed on this robot.
         arm: Closed form of the geometry.
         urdf: The geometry with shapes; has the frames ``base`` and ``tool0`` (flange face, z out).
         base_height: Base frame above the mounting face in [m].
+        controller_base_height: The same of the base frame that the maker's controller counts from.
+        payload: What the flange may carry in [kg], None if not known.
     """
 
     name: str
     title: str
+    maker: str
     joint_names: tuple[str, ...]
     lower: Array
     upper: Array
@@ -54,6 +59,8 @@ class Robot:
     arm: SphericalWristArm
     urdf: Path
     base_height: float
+    controller_base_height: float
+    payload: float | None
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper", "max_speed", "pulses_per_radian"):
@@ -63,10 +70,38 @@ class Robot:
             copy.setflags(write=False)
             object.__setattr__(self, name, copy)
 
+    @property
+    def missing_pulses(self) -> tuple[str, ...]:
+        """Joints whose pulses are not known."""
+        missing = np.isnan(self.pulses_per_radian)
+        return tuple(name for name, gone in zip(self.joint_names, missing, strict=True) if gone)
+
+    @property
+    def reach(self) -> float:
+        """Farthest that the wrist centre can be from axis 1 in [m]."""
+        arm = self.arm
+        return float(np.hypot(arm.a1 + arm.c2 + np.hypot(arm.a2, arm.c3), arm.b))
+
 
 def known_robots() -> list[str]:
     """Return the names of the robots that come with opl."""
     return sorted(path.parent.name for path in folder("robots").glob("*/robot.yaml"))
+
+
+def robot_path(name_or_folder: str, relative_to: Path | None = None) -> Path:
+    """Return where the ``robot.yaml`` of a robot lies; arguments as of `load_robot`.
+
+    Raises:
+        InputError: If there is no such robot.
+    """
+    if name_or_folder in known_robots():
+        return folder("robots") / name_or_folder / "robot.yaml"
+    path = (relative_to or Path()) / name_or_folder / "robot.yaml"
+    if not path.is_file():
+        known = ", ".join(known_robots())
+        message = f"unknown robot {name_or_folder!r}; known: {known}, or a folder with a robot.yaml"
+        raise InputError("robot", message)
+    return path
 
 
 def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
@@ -79,16 +114,8 @@ def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
     Raises:
         InputError: If there is no such robot, or its file or URDF is unusable.
     """
-    if name_or_folder in known_robots():
-        home = folder("robots") / name_or_folder
-    else:
-        home = (relative_to or Path()) / name_or_folder
-    path = home / "robot.yaml"
-    if not path.is_file():
-        known = ", ".join(known_robots())
-        message = f"unknown robot {name_or_folder!r}; known: {known}, or a folder with a robot.yaml"
-        raise InputError("robot", message)
-    robot = _robot(read(path, _RobotDocument), home)
+    path = robot_path(name_or_folder, relative_to)
+    robot = _robot(read_robot_file(path), path.parent)
     if not robot.urdf.is_file():
         raise InputError(str(path), f"urdf: no such file, got {robot.urdf.name!r}")
     _check_urdf(robot)
@@ -118,13 +145,23 @@ def forward(robot: Robot, q: Array) -> Array:
     return Ts_base_flange.reshape(*np.shape(q)[:-1], 4, 4)
 
 
+def controller_poses(robot: Robot, q: Array) -> Array:
+    """Return the flange poses of postures as the maker's controller counts them.
+
+    As `forward`, from the controller's own base frame instead of opl's.
+    """
+    Ts_controller_flange = forward(robot, q)
+    Ts_controller_flange[..., 2, 3] += robot.base_height - robot.controller_base_height
+    return Ts_controller_flange
+
+
 @cache
 def _model(urdf: Path) -> pin.Model:
     return pin.buildModelFromUrdf(str(urdf))
 
 
 def _check_urdf(robot: Robot) -> None:
-    """Refuse a URDF that speaks of other joints or lacks a frame."""
+    """Refuse a URDF that speaks of other joints, lacks a frame, or hides shapes from the replay."""
     try:
         model = _model(robot.urdf)
     except ValueError as error:
@@ -137,6 +174,7 @@ def _check_urdf(robot: Robot) -> None:
     missing = [frame for frame in ("base", "tool0") if not model.existFrame(frame)]
     if missing:
         raise InputError(str(robot.urdf), f"must have links base and tool0, lacks {missing[0]}")
+    UrdfTree(robot.urdf).require_shapes_on_joints()
 
 
 def _arm_fits_urdf(robot: Robot) -> bool:
@@ -149,79 +187,23 @@ def _arm_fits_urdf(robot: Robot) -> bool:
     return bool((distance < 1e-5).any(axis=-1).all())
 
 
-_Positive = Annotated[float, Field(gt=0)]
-
-
-class _Sourced(Document):
-    source: str
-    certainty: Literal["high", "medium", "low"]
-
-
-class _Base(_Sourced):
-    height_mm: float
-
-
-class _Arm(_Sourced):
-    a1_mm: float
-    a2_mm: float
-    b_mm: float
-    c1_mm: float
-    c2_mm: _Positive
-    c3_mm: float
-    c4_mm: float
-    offsets_deg: Annotated[list[float], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
-    signs: Annotated[list[Literal[1, -1]], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
-
-
-class _Limits(_Sourced):
-    lower_deg: float
-    upper_deg: float
-
-    @model_validator(mode="after")
-    def _in_order(self) -> _Limits:
-        if self.lower_deg >= self.upper_deg:
-            raise ValueError(f"lower_deg must be below upper_deg {self.upper_deg:g}")
-        return self
-
-
-class _Speed(_Sourced):
-    max_deg_s: _Positive
-
-
-class _Pulses(_Sourced):
-    per_degree: _Positive
-    verified: bool
-
-
-class _Joint(Document):
-    name: str
-    limits: _Limits
-    speed: _Speed
-    pulses: _Pulses
-
-
-class _RobotDocument(Document):
-    name: str
-    title: str
-    maker: str
-    urdf: str
-    base: _Base
-    arm: _Arm
-    joints: Annotated[list[_Joint], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
-
-
-def _robot(document: _RobotDocument, home: Path) -> Robot:
+def _robot(document: RobotFile, home: Path) -> Robot:
     """Return the robot in SI units."""
-    arm, joints = document.arm, document.joints
+    arm, base, joints = document.arm, document.base, document.joints
+    controller = base.controller_height_mm
+    counts = [joint.pulses.per_degree if joint.pulses else math.nan for joint in joints]
     return Robot(
         name=document.name,
         title=document.title,
+        maker=document.maker,
         joint_names=tuple(joint.name for joint in joints),
         lower=np.radians([joint.limits.lower_deg for joint in joints]),
         upper=np.radians([joint.limits.upper_deg for joint in joints]),
         max_speed=np.radians([joint.speed.max_deg_s for joint in joints]),
-        pulses_per_radian=np.array([joint.pulses.per_degree for joint in joints]) / np.radians(1.0),
-        unverified_pulses=tuple(joint.name for joint in joints if not joint.pulses.verified),
+        pulses_per_radian=np.array(counts) / np.radians(1.0),
+        unverified_pulses=tuple(
+            joint.name for joint in joints if joint.pulses and not joint.pulses.verified
+        ),
         arm=SphericalWristArm(
             a1=arm.a1_mm / 1e3,
             a2=arm.a2_mm / 1e3,
@@ -234,5 +216,7 @@ def _robot(document: _RobotDocument, home: Path) -> Robot:
             signs=tuple(arm.signs),
         ),
         urdf=(home / document.urdf).resolve(),
-        base_height=document.base.height_mm / 1e3,
+        base_height=base.height_mm / 1e3,
+        controller_base_height=(base.height_mm if controller is None else controller) / 1e3,
+        payload=None if document.payload is None else document.payload.max_kg,
     )

@@ -1,0 +1,177 @@
+"""From the joint axes of a URDF to the closed form of an arm with a spherical wrist.
+
+All is read off the zero posture, where every axis is a line in space. In the drawing of
+`opl.cell.inverse`: axis 1 gives z, axis 2 the side y of the arm, the line from axis 2 to axis 3 the
+tilt of the upper arm, axis 4 that of the forearm, axes 5 and 6 the wrist. What the drawing leaves
+open (the same arm seen from behind, or with its wrist turned half round) is settled by the zeros
+nearest to the drawing's own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from opl.cell.inverse import SphericalWristArm
+from opl.cell.robot_file import N_JOINTS
+from opl.errors import InputError
+from opl.geometry.frames import Array
+
+FLANGE = "tool0"
+# URDFs round right angles to five digits or more, which moves axes by hundredths of a millimetre.
+_LENGTH = 2e-5  # [m]
+_ANGLE = 2e-5  # [rad]
+
+
+@dataclass(frozen=True, eq=False)
+class RecognisedArm:
+    """An arm as its URDF has it.
+
+    Attributes:
+        joint_names: Six, from the base on.
+        arm: Closed form; its base frame is the root link of the URDF, on the mounting face.
+        lower: Smallest joint positions in [rad], shape (6,).
+        upper: Largest joint positions in [rad], shape (6,).
+        max_speed: Largest joint speeds in [rad/s], shape (6,); 0 where the URDF gives none.
+    """
+
+    joint_names: tuple[str, ...]
+    arm: SphericalWristArm
+    lower: Array
+    upper: Array
+    max_speed: Array
+
+
+def recognise(urdf: Path) -> RecognisedArm:
+    """Return the closed form of the arm in a URDF.
+
+    Raises:
+        InputError: If the file is no URDF of six revolute joints in a row with a link tool0, or the
+            arm has no spherical wrist or another build than the closed form; says which axes.
+    """
+    try:
+        model = pin.buildModelFromUrdf(str(urdf))
+    except ValueError as error:
+        raise InputError(str(urdf), "is not a URDF of one robot") from error
+    names = tuple(model.names)[1:]  # the first is the universe
+    in_a_row = list(model.parents)[1:] == list(range(len(names)))
+    if len(names) != N_JOINTS or model.nq != N_JOINTS or not in_a_row:
+        raise InputError(
+            str(urdf),
+            "must have six revolute joints with limits, one after the other, has "
+            f"{' '.join(names) or 'none'}"
+            + (", some of them continuous" if model.nq > model.nv else ""),
+        )
+    if not model.existFrame(FLANGE):
+        raise InputError(str(urdf), f"lacks the link {FLANGE}: flange face, z out of the flange")
+    data = model.createData()
+    pin.computeJointJacobians(model, data, np.zeros(N_JOINTS))
+    pin.updateFramePlacements(model, data)
+    flange = data.oMf[model.getFrameId(FLANGE)].homogeneous
+    axes, moments = data.J[3:].T, data.J[:3].T
+    if not np.allclose(np.linalg.norm(axes, axis=1), 1.0):
+        raise InputError(str(urdf), "has a joint that does not turn: all six must be revolute")
+    arm = _read_off(str(urdf), axes, np.cross(axes, moments), flange)
+    lower, upper = model.lowerPositionLimit, model.upperPositionLimit
+    return RecognisedArm(names, arm, lower.copy(), upper.copy(), model.velocityLimit.copy())
+
+
+def _read_off(where: str, axes: Array, points: Array, T_root_flange: Array) -> SphericalWristArm:
+    """Return the closed form.
+
+    Args:
+        where: The file, for messages.
+        axes: Directions of the joint axes at the zero posture, shape (6, 3).
+        points: A point on each in [m], shape (6, 3).
+        T_root_flange: The flange at the zero posture, shape (4, 4).
+    """
+    x_tool, z_tool = T_root_flange[:3, 0], T_root_flange[:3, 2]
+    z = np.array([0.0, 0.0, 1.0])
+    if not _parallel(axes[0], z) or np.hypot(*points[0, :2]) > _LENGTH:
+        raise InputError(where, "axis 1 must be the z axis of the root link")
+    wrist = _wrist_centre(where, axes, points)
+    for first, second, parallel in ((1, 2, False), (2, 3, True), (3, 4, False), (4, 5, False),
+                                    (5, 6, False)):  # fmt: skip
+        one, other = axes[first - 1], axes[second - 1]
+        if not (_parallel(one, other) if parallel else _square(one, other)):
+            wanted = "parallel" if parallel else "at right angles"
+            raise InputError(where, f"axes {first} and {second} must be {wanted}")
+    from_wrist = T_root_flange[:3, 3] - wrist
+    if not _parallel(z_tool, axes[5]) or np.linalg.norm(np.cross(from_wrist, z_tool)) > _LENGTH:
+        raise InputError(where, f"{FLANGE} must lie on axis 6, its z along that axis")
+
+    # y: to the left of an arm that looks ahead
+    sign2 = _sign(axes[1, 1] if abs(axes[1, 1]) > _ANGLE else -axes[1, 0])
+    y = sign2 * axes[1]
+    x = np.cross(y, z)
+    theta1 = np.arctan2(x[1], x[0])
+    upper_arm = points[2] - points[1]
+    upper_arm -= (upper_arm @ y) * y
+    theta2 = np.arctan2(upper_arm @ x, upper_arm @ z)
+    # the wrist centre lies ahead along the forearm
+    sign4 = _sign(axes[3] @ (wrist - points[2]))
+    forearm = sign4 * axes[3]
+    tilt = np.arctan2(forearm @ x, forearm @ z)
+    across = np.cross(y, forearm)
+    sign5 = _sign(axes[4] @ y if abs(axes[4] @ y) > _ANGLE else -axes[4] @ across)
+    y5 = sign5 * axes[4]
+    theta4 = np.arctan2(-y5 @ across, y5 @ y)
+    x5 = np.cross(y5, forearm)
+    theta5 = np.arctan2(z_tool @ x5, z_tool @ forearm)
+    x6 = np.cross(y5, z_tool)
+    theta6 = np.arctan2(x_tool @ y5, x_tool @ x6)
+    zeros = np.array([theta1, theta2, tilt - theta2, theta4, theta5, theta6])
+    signs = (axes[0] @ z, sign2, axes[2] @ y, sign4, sign5, axes[5] @ z_tool)
+    return SphericalWristArm(
+        a1=float((points[1] - points[0]) @ x),
+        a2=float((wrist - points[2]) @ across),
+        b=float(wrist @ y),
+        c1=float(points[1] @ z),
+        c2=float(np.linalg.norm(upper_arm)),
+        c3=float((wrist - points[2]) @ forearm),
+        c4=float(from_wrist @ z_tool),
+        offsets=tuple(float(_principal(-zero)) for zero in zeros),
+        signs=tuple(_sign(value) for value in signs),
+    )
+
+
+def _wrist_centre(where: str, axes: Array, points: Array) -> Array:
+    """Return where axes 4, 5 and 6 meet."""
+    if all(_parallel(axes[1], axes[k]) for k in (2, 3)):
+        raise InputError(
+            where,
+            "axes 2, 3 and 4 are parallel: an arm of UR's kind, without a spherical wrist; opl has "
+            "a closed form for arms with a spherical wrist only",
+        )
+    # the point nearest to the three lines
+    across = np.eye(3) - axes[3:, :, None] * axes[3:, None, :]
+    wrist = np.linalg.lstsq(across.sum(axis=0), (across @ points[3:, :, None]).sum(axis=0)[:, 0])[0]
+    miss = float(np.linalg.norm(np.cross(wrist - points[3:], axes[3:]), axis=1).max())
+    if miss > _LENGTH:
+        raise InputError(
+            where,
+            f"axes 4, 5 and 6 do not meet in one point, they pass it by {miss * 1e3:.3g} mm: the "
+            "wrist is not spherical; opl has a closed form for arms with a spherical wrist only",
+        )
+    return np.asarray(wrist)
+
+
+def _parallel(one: Array, other: Array) -> bool:
+    return float(np.linalg.norm(np.cross(one, other))) < _ANGLE
+
+
+def _square(one: Array, other: Array) -> bool:
+    return abs(float(one @ other)) < _ANGLE
+
+
+def _sign(value: float) -> int:
+    return 1 if value > 0.0 else -1
+
+
+def _principal(angle: float) -> float:
+    """Return an angle in (-pi, pi], half a turn positive however it is rounded."""
+    turned = float(np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi)
+    return np.pi if turned < -np.pi + 1e-9 else turned

@@ -1,0 +1,114 @@
+"""``robot.yaml``: what is known of a robot, every group of numbers with source and certainty."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from opl.documents import Document, read
+
+N_JOINTS = 6
+FROM_URDF = "from the URDF"
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class Sourced(Document):
+    """Numbers with their origin.
+
+    High: two or more independent sources agree. Medium: one good source, or carried over from an
+    arm with the same drive. Low: a guess to be confirmed.
+    """
+
+    source: str
+    certainty: Literal["high", "medium", "low", "from the URDF"]
+
+
+class Base(Sourced):
+    """Where the base frame is: on axis 1, so far above the mounting face.
+
+    The maker's controller may count from elsewhere on axis 1; ``controller_height_mm`` says so.
+    """
+
+    height_mm: float
+    controller_height_mm: float | None = None
+
+
+class Arm(Sourced):
+    """Link lengths, zero offsets and signs, as in `opl.cell.inverse.SphericalWristArm`."""
+
+    a1_mm: float
+    a2_mm: float
+    b_mm: float
+    c1_mm: float
+    c2_mm: Positive
+    c3_mm: float
+    c4_mm: float
+    offsets_deg: Annotated[list[float], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
+    signs: Annotated[list[Literal[1, -1]], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
+
+
+class Payload(Sourced):
+    """What the flange may carry."""
+
+    max_kg: Positive
+
+
+class Limits(Sourced):
+    """Travel of a joint."""
+
+    lower_deg: float
+    upper_deg: float
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Limits:
+        if self.lower_deg >= self.upper_deg:
+            raise ValueError(f"lower_deg must be below upper_deg {self.upper_deg:g}")
+        return self
+
+
+class Speed(Sourced):
+    """Top speed of a joint."""
+
+    max_deg_s: Positive
+
+
+class Pulses(Sourced):
+    """Encoder counts of a joint, as Yaskawa programs give them."""
+
+    per_degree: Positive
+    verified: bool
+
+
+class Joint(Document):
+    """One joint; without pulses where nobody knows them or the maker does not count in them."""
+
+    name: str
+    limits: Limits
+    speed: Speed
+    pulses: Pulses | None = None
+
+
+class RobotFile(Document):
+    """The keys of a ``robot.yaml``."""
+
+    name: str
+    title: str
+    maker: str
+    urdf: str
+    base: Base
+    arm: Arm
+    payload: Payload | None = None
+    shapes: Sourced | None = None  # of the shapes in the URDF
+    joints: Annotated[list[Joint], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
+
+
+def read_robot_file(path: Path) -> RobotFile:
+    """Read a ``robot.yaml``.
+
+    Raises:
+        InputError: If it is unusable; every fault with its key.
+    """
+    return read(path, RobotFile)

@@ -1,0 +1,203 @@
+"""A robot of the user's own from its URDF: ``robot.yaml``, URDF and meshes in one folder.
+
+The URDF is changed in two places only: the frame ``base`` comes to where opl counts from, and the
+meshes are named relative to the file.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from opl.cell.inverse import SphericalWristArm, inverse
+from opl.cell.recognise import RecognisedArm, recognise
+from opl.cell.robot import Robot, forward, load_robot
+from opl.cell.robot_file import FROM_URDF
+from opl.cell.singularity import singularity_margins
+from opl.cell.urdf_tree import UrdfTree
+from opl.errors import InputError
+
+N_CHECKED = 500
+# Farthest that a posture found may be from the pose asked for: what rounded right angles cost.
+CLOSURE = 2e-5  # [m], and as much in the entries of the rotation matrix
+# Stands for a speed that the URDF does not give: slow, for programs ask for a share of it.
+SLOW = np.deg2rad(10.0)
+_NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")
+
+
+@dataclass(frozen=True)
+class ImportedRobot:
+    """What came of an import.
+
+    Attributes:
+        robot: The robot, as a job would load it.
+        files: What was written.
+        closure: Largest error of FK(IK) over random postures, in [m] and in entries of rotations.
+        cautions: What the user should put right in ``robot.yaml``, one line each.
+    """
+
+    robot: Robot
+    files: tuple[Path, ...]
+    closure: float
+    cautions: tuple[str, ...]
+
+
+def import_urdf(
+    urdf: Path, name: str, folder: Path, *, base_at_floor: bool = False, maker: str = "unknown"
+) -> ImportedRobot:
+    """Make a robot folder from a URDF.
+
+    Args:
+        urdf: The file; xacro has to be expanded before.
+        name: Name of the robot, small letters, digits, _ and -.
+        folder: Where to write; must not hold a robot already.
+        base_at_floor: Whether the base frame shall lie on the mounting face instead of at the
+            height of axis 2, where it lies for the robots that come with opl.
+        maker: Who builds it.
+
+    Raises:
+        InputError: If the URDF is unusable or its arm has no closed form here, the name is not
+            legal, or the folder holds a robot.
+    """
+    if not _NAME.fullmatch(name):
+        raise InputError("name", f"must be small letters, digits, _ and -, got {name!r}")
+    if not urdf.is_file():
+        raise InputError(str(urdf), "no such file")
+    if urdf.suffix == ".xacro":
+        raise InputError(str(urdf), "is a xacro: expand it to a URDF first")
+    path = folder / "robot.yaml"
+    if path.exists():
+        raise InputError(str(path), "exists already; name a new folder")
+    tree = UrdfTree(urdf)
+    found = recognise(urdf)
+    height = 0.0 if base_at_floor else found.arm.c1
+    controller = tree.base_height()
+    tree.set_base(height)
+    tree.require_shapes_on_joints()
+    meshes = tree.collect_meshes()
+    cautions = [*tree.cautions(), *_doubts(found)]
+    found = replace(found, arm=replace(found.arm, c1=found.arm.c1 - height))
+
+    with TemporaryDirectory() as scratch:  # nothing is left behind by what fails
+        draft = Path(scratch)
+        (draft / "meshes" if meshes else draft).mkdir(exist_ok=True)
+        for target, source in meshes.items():
+            shutil.copyfile(source, draft / target)
+        tree.write(draft / f"{name}.urdf")
+        text = _robot_yaml(found, name, maker, height, controller, urdf.name)
+        (draft / path.name).write_text(text, encoding="utf-8")
+        closure = closure_error(load_robot(str(draft)))
+        if closure > CLOSURE:
+            message = f"FK(IK) misses by {closure:.1g}: the closed form is not that of the URDF"
+            raise InputError(str(urdf), message)
+        try:
+            shutil.copytree(draft, folder, dirs_exist_ok=True)
+        except (OSError, shutil.Error) as error:
+            raise InputError(str(folder), f"cannot be written: {error}") from error
+    robot = load_robot(str(folder))
+    files = (path, robot.urdf, *(folder / target for target in meshes))
+    return ImportedRobot(robot, files, closure, tuple(cautions))
+
+
+def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:
+    """Return the largest error of FK(IK) over random postures within the limits.
+
+    Infinite if a posture is not found again at all, apart from full turns; next to singularities,
+    where rounded right angles move joints far, that is not asked.
+    """
+    q = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (n, 6))
+    Ts_base_flange = forward(robot, q)
+    found = inverse(robot.arm, Ts_base_flange)
+    apart = np.abs(np.remainder(found - q[:, None] + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
+    regular = singularity_margins(robot.arm, q).min(axis=-1) > 0.02
+    nearest = np.where(np.isnan(apart), np.inf, apart).min(axis=1)
+    if not (nearest[regular] < 1e-2).all():
+        return float("inf")
+    exists = ~np.isnan(found).any(axis=-1)
+    wanted = np.broadcast_to(Ts_base_flange[:, None], (*exists.shape, 4, 4))[exists]
+    return float(np.abs(forward(robot, found[exists]) - wanted).max())
+
+
+def _doubts(found: RecognisedArm) -> Iterator[str]:
+    """Yield what looks like a placeholder."""
+    names = found.joint_names
+    for name, speed in zip(names, found.max_speed, strict=True):
+        if speed <= 0.0:
+            yield f"{name}: the URDF gives no speed, 10 deg/s stands there; see the data sheet"
+    for k in (1, 4):  # no such arm turns these all round
+        low, high = found.lower[k], found.upper[k]
+        if high - low > 2.0 * np.pi - 1e-3:
+            yield (
+                f"{names[k]}: limits {np.rad2deg(low):.0f} to {np.rad2deg(high):.0f} deg look like "
+                "a placeholder; see the data sheet"
+            )
+    if np.ptp(found.upper) < 1e-6 and np.ptp(found.lower) < 1e-6:
+        yield "all joints have the same limits, which look like placeholders; see the data sheet"
+    if np.ptp(found.max_speed) < 1e-6 and found.max_speed[0] > 0.0:
+        yield "all joints have the same speed, which looks like a placeholder; see the data sheet"
+
+
+def _robot_yaml(
+    found: RecognisedArm, name: str, maker: str, height: float, controller: float | None, urdf: str
+) -> str:
+    """Return the text of ``robot.yaml``."""
+    origin = [f"source: {urdf}", f"certainty: {FROM_URDF}"]
+    counts = [] if controller is None else [f"controller_height_mm: {_mm(controller)}"]
+    lines = [
+        f"# {name}, made by opl robots import-urdf from {urdf}.",
+        "# Check limits and speeds against the data sheet, and say so under source and certainty",
+        "# (high, medium, low).",
+        f"name: {name}",
+        f"title: {name}",
+        f"maker: {maker}",
+        f"urdf: {name}.urdf",
+        "",
+        "# The base frame lies on axis 1, so far above the mounting face; jobs are written in it.",
+        "base:",
+        *_indented(2, [f"height_mm: {_mm(height)}", *counts, *origin]),
+        "",
+        "arm:",
+        *_indented(2, [*_arm_lines(found.arm), *origin]),
+        "",
+        "shapes:",
+        *_indented(2, origin),
+        "",
+        "joints:",
+    ]
+    for k, joint in enumerate(found.joint_names):
+        speed, spoken = found.max_speed[k], origin
+        if speed <= 0.0:
+            speed, spoken = SLOW, ["source: none, a slow placeholder", "certainty: low"]
+        limits = [
+            f"lower_deg: {_deg(found.lower[k])}",
+            f"upper_deg: {_deg(found.upper[k])}",
+            *origin,
+        ]
+        lines += [f"  - name: {joint}", "    limits:", *_indented(6, limits)]
+        lines += ["    speed:", *_indented(6, [f"max_deg_s: {_deg(speed)}", *spoken])]
+    return "\n".join([*lines, ""])
+
+
+def _arm_lines(arm: SphericalWristArm) -> list[str]:
+    lengths = [f"{key}_mm: {_mm(getattr(arm, key))}" for key in ("a1", "a2", "b", "c1", "c2", "c3")]
+    offsets = ", ".join(_deg(offset) for offset in arm.offsets)
+    signs = ", ".join(map(str, arm.signs))
+    return [*lengths, f"c4_mm: {_mm(arm.c4)}", f"offsets_deg: [{offsets}]", f"signs: [{signs}]"]
+
+
+def _indented(columns: int, lines: list[str]) -> list[str]:
+    return [" " * columns + line for line in lines]
+
+
+def _mm(length: float) -> str:
+    return f"{round(length * 1e3, 8) + 0.0:.12g}"
+
+
+def _deg(angle: float) -> str:
+    return f"{round(float(np.rad2deg(angle)), 8) + 0.0:.12g}"

@@ -1,0 +1,189 @@
+"""Robots of the user's own: the closed form read off a URDF, and what is refused."""
+
+import numpy as np
+import pytest
+import trimesh
+from jobs import opl
+
+from opl.cell.recognise import recognise
+from opl.cell.robot import controller_poses, forward, known_robots, load_robot
+from opl.cell.robot_file import read_robot_file
+from opl.cell.urdf_import import import_urdf
+from opl.errors import InputError
+
+LENGTHS = ("a1", "a2", "b", "c2", "c3", "c4")
+MH24 = load_robot("mh24")
+
+
+def changed(tmp_path, *changes, name="mh24"):
+    """Return a copy of a URDF with texts replaced."""
+    text = load_robot(name).urdf.read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "changed.urdf"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def wrist_origin(dx, dy):
+    return ('<origin xyz="0.795 0 0"/>', f'<origin xyz="{0.795 + dx} {dy} 0"/>')
+
+
+@pytest.mark.parametrize("name", known_robots())
+def test_our_own_robots_are_recognised(name, tmp_path):
+    robot = load_robot(name)
+    found = recognise(robot.urdf)
+    for key in LENGTHS:
+        assert getattr(found.arm, key) == pytest.approx(getattr(robot.arm, key), abs=1e-9)
+    assert found.arm.c1 == pytest.approx(robot.base_height, abs=1e-9)
+    np.testing.assert_allclose(found.arm.offsets, robot.arm.offsets, atol=1e-9)
+    assert found.arm.signs == robot.arm.signs
+    made = import_urdf(robot.urdf, "mine", tmp_path / "mine")
+    assert made.closure < 1e-11
+    mine = load_robot("mine", tmp_path)
+    q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (20, 6))
+    np.testing.assert_allclose(forward(mine, q), forward(robot, q), atol=1e-9)
+    np.testing.assert_allclose(mine.upper, robot.upper, atol=1e-9)
+    np.testing.assert_allclose(mine.max_speed, robot.max_speed, atol=1e-9)
+    assert mine.missing_pulses == robot.joint_names and mine.payload is None
+    assert read_robot_file(made.files[0]).arm.certainty == "from the URDF"
+
+
+def test_an_arm_with_a_lateral_offset_and_odd_zeros_is_recognised(tmp_path):
+    tilted = ('<origin xyz="0 0 0.76"/>', '<origin xyz="0 0 0.76" rpy="0 0.3 0"/>')
+    path = changed(tmp_path, tilted, ('<origin xyz="0 0 0.2"/>', '<origin xyz="0 0.04 0.2"/>'))
+    made = import_urdf(path, "odd", tmp_path / "odd")
+    assert made.robot.arm.b == pytest.approx(0.04, abs=1e-9)
+    assert made.robot.arm.offsets[2] == pytest.approx(-np.pi / 2 - 0.3, abs=1e-9)
+    assert made.closure < 1e-9
+
+
+def test_rounded_right_angles_are_no_obstacle(tmp_path):
+    rounded = ('rpy="3.141592653589793 -1.5707963267948966 0"', 'rpy="3.14159 -1.570796 0"')
+    made = import_urdf(changed(tmp_path, rounded), "mine", tmp_path / "mine")
+    assert 1e-9 < made.closure < 2e-5
+
+
+def test_the_base_frame_goes_where_it_is_asked_for(tmp_path):
+    floor = import_urdf(MH24.urdf, "mine", tmp_path / "floor", base_at_floor=True).robot
+    assert floor.base_height == 0.0 and floor.arm.c1 == pytest.approx(0.505)
+    assert forward(floor, np.zeros(6))[2, 3] == pytest.approx(1.465)
+    # the frame base of the URDF is where the controller counts from
+    assert floor.controller_base_height == pytest.approx(0.505)
+    assert controller_poses(floor, np.zeros(6))[2, 3] == pytest.approx(0.960)
+
+
+def test_a_urdf_without_base_gets_one(tmp_path):
+    path = changed(tmp_path, ('link="base"', 'link="other"'), ('name="base"', 'name="other"'))
+    made = import_urdf(path, "mine", tmp_path / "mine").robot
+    assert made.base_height == made.controller_base_height == pytest.approx(0.505)
+    np.testing.assert_allclose(forward(made, np.zeros(6)), forward(MH24, np.zeros(6)), atol=1e-12)
+
+
+def test_meshes_come_along_and_are_found(tmp_path):
+    package = tmp_path / "my_arm"
+    (package / "urdf").mkdir(parents=True)
+    trimesh.creation.box((0.3, 0.3, 0.2)).export(package / "foot.stl")
+    mesh = '<mesh filename="package://my_arm/foot.stl"/>'
+    path = changed(package / "urdf", ('<box size="0.536 0.4 0.208"/>', mesh))
+    made = import_urdf(path, "mine", tmp_path / "mine")
+    assert tmp_path / "mine" / "meshes" / "foot.stl" in made.files
+    assert 'filename="meshes/foot.stl"' in made.robot.urdf.read_text(encoding="utf-8")
+    (package / "foot.stl").unlink()
+    with pytest.raises(
+        InputError, match=r"changed\.urdf: mesh package://my_arm/foot\.stl: no such"
+    ):
+        import_urdf(path, "mine", tmp_path / "other")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (wrist_origin(0, 0), None),
+        (("xyz=\"0.1 0 0\"", "xyz=\"0.1 0 0.03\""), r"do not meet in one point.* by \d+ mm"),
+        (
+            ('<axis xyz="-1 0 0"/>', '<axis xyz="0 1 0"/>'),
+            r"axes 2, 3 and 4 are parallel: an arm of UR's kind",
+        ),
+        (('<axis xyz="0 0 1"/>', '<axis xyz="0 1 0"/>'), r"axis 1 must be the z axis"),
+        (('<origin xyz="0.15 0 0.505"/>', '<origin xyz="0.15 0 0.505" rpy="0.1 0 0"/>'),
+         r"axes 1 and 2 must be at right angles"),
+        (('rpy="3.141592653589793 -1.5707963267948966 0"', ""), r"tool0 must lie on axis 6"),
+        (('name="T" type="revolute"', 'name="T" type="continuous"'), r"has S L U R B T, some of"),
+        (('name="T" type="revolute"', 'name="T" type="fixed"'), r"six revolute .* has S L U R B"),
+        (('name="T" type="revolute"', 'name="T" type="prismatic"'), r"all six must be revolute"),
+        (("tool0", "hand"), r"lacks the link tool0"),
+        (("</robot>", ""), r"not XML"),
+        (('<robot name="mh24">', '<robot name="mh24"><link name="a"/>'), r"one root link"),
+        (('<origin xyz="0 0 0.505"/>', '<origin xyz="0 0.1 0.505"/>'), r"link base must be fixed"),
+        (
+            ('<link name="base">', '<link name="base"><collision name="x"><geometry>'
+             '<sphere radius="0.1"/></geometry></collision>'),
+            r"link base has collision shapes but hangs on a fixed joint",
+        ),
+    ],
+)  # fmt: skip
+def test_what_has_no_closed_form_is_refused_with_the_reason(change, message, tmp_path):
+    path = changed(tmp_path, change)
+    if message is None:
+        import_urdf(path, "mine", tmp_path / "mine")
+        return
+    with pytest.raises(InputError, match=message):
+        import_urdf(path, "mine", tmp_path / "mine")
+    assert not (tmp_path / "mine").exists()
+
+
+def test_placeholders_are_told(tmp_path):
+    path = changed(tmp_path)
+    text = path.read_text(encoding="utf-8")
+    parts = text.split("<limit ")
+    same = ['lower="-3.2" upper="3.2" velocity="0" effort="0"/>' + part.split("/>", 1)[1]
+            for part in parts[1:]]  # fmt: skip
+    path.write_text("<limit ".join([parts[0], *same]), encoding="utf-8")
+    made = import_urdf(path, "mine", tmp_path / "mine")
+    told = "\n".join(made.cautions)
+    assert "L: limits -183 to 183 deg look like a placeholder" in told
+    assert "all joints have the same limits" in told
+    assert "S: the URDF gives no speed, 10 deg/s stands there" in told
+    np.testing.assert_allclose(made.robot.max_speed, np.radians(10.0))
+    speed = read_robot_file(made.files[0]).joints[0].speed
+    assert speed.certainty == "low"
+
+
+def test_a_link_without_shapes_is_told(tmp_path):
+    shape = MH24.urdf.read_text(encoding="utf-8").split('<collision name="wrist">')[1]
+    path = changed(tmp_path, (f'<collision name="wrist">{shape.split("</collision>")[0]}'
+                              "</collision>", ""))  # fmt: skip
+    made = import_urdf(path, "mine", tmp_path / "mine")
+    assert made.cautions == ("link B_link has no collision shape: nothing of it is checked",)
+
+
+@pytest.mark.parametrize(
+    ("name", "file", "message"),
+    [
+        ("Mine!", "x.urdf", "name: must be small letters"),
+        ("mine", "x.urdf", r"x\.urdf: no such file"),
+        ("mine", "arm.xacro", "is a xacro: expand it"),
+    ],
+)
+def test_a_bad_name_or_file_is_refused(name, file, message, tmp_path):
+    (tmp_path / "arm.xacro").write_text("<robot/>")
+    with pytest.raises(InputError, match=message):
+        import_urdf(tmp_path / file, name, tmp_path / "mine")
+
+
+# the command line
+
+
+def test_the_command_writes_a_robot_and_overwrites_none(tmp_path):
+    out = tmp_path / "mine"
+    arguments = ("robots", "import-urdf", MH24.urdf, "--name", "mine", "--out", out)
+    ended = opl(*arguments, "--maker", "Yaskawa")
+    assert ended.status == 0, ended.err
+    assert "reach 1730 mm" in ended.out and "FK(IK) closes within" in ended.out
+    assert load_robot(str(out)).maker == "Yaskawa"
+    shown = opl("robots", "show", out)
+    assert "from the URDF" in shown.out and "not known" in shown.out
+    again = opl(*arguments)
+    assert again.status == 2 and "robot.yaml: exists already" in again.err
