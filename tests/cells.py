@@ -10,12 +10,12 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from opl.cell.clearance import sample_tree
+from opl.cell.clearance import part_tree
 from opl.cell.collision import CollisionScene
 from opl.cell.robot import load_robot
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import pose
-from opl.geometry.mesh import TriangleMesh, surface_samples
+from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Body, Box
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import ContactWheel
@@ -63,14 +63,14 @@ def problem_of(job, points_of=None):
             points.arc_length[points_of],
         )
     positions = job.cell.wheel.positions(job.search.n_contact_positions)
-    samples = sample_tree(surface_samples(job.cell.part, job.sample_spacing))
+    part = part_tree(job.cell.part)
     return GrindingProblem(
         job.cell,
         CollisionScene(job.cell),
-        samples,
+        part,
         points,
         build_nodes(job.cell, points, positions),
-        wheel_layer(job.cell, samples, points, positions),
+        wheel_layer(job.cell, part, points, positions),
         job.search.interpolation,
         job.pace,
     )

@@ -17,11 +17,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from opl.cell.clearance import sample_tree
+from opl.cell.clearance import part_tree
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse import inverse
 from opl.cell.robot import forward
-from opl.geometry.mesh import surface_samples
 from opl.planning.check import RESOLUTION, densify, find_faults
 from opl.planning.motion import Stretch
 
@@ -51,14 +50,13 @@ def test_a_posture_held_is_one_posture():
     assert move.tolist() == [0, 1, 2]
 
 
-def faults_of(cell, motion, samples=None):
-    samples = samples or sample_tree(surface_samples(cell.part, 0.002))
-    return find_faults(cell, CollisionScene(cell), samples, motion)
+def faults_of(cell, motion):
+    return find_faults(cell, CollisionScene(cell), part_tree(cell.part), motion)
 
 
 def test_a_planned_motion_has_no_faults():
     problem = small_problem()
-    assert find_faults(problem.cell, problem.scene, problem.samples, small_motion()) == []
+    assert find_faults(problem.cell, problem.scene, problem.part, small_motion()) == []
 
 
 def test_an_obstacle_between_two_free_postures_is_found():
@@ -124,7 +122,7 @@ def test_the_part_may_sink_into_the_belt_by_the_allowance(depth, found):
     index = int(np.argmin(np.where(grind, np.abs(motion.contact_position), np.inf)))
     assert abs(motion.contact_position[index]) < 20.0
     moved = shifted_along_normal(motion, index, depth)
-    faults = find_faults(problem.cell, problem.scene, problem.samples, moved)
+    faults = find_faults(problem.cell, problem.scene, problem.part, moved)
     assert bool(faults) == found
     if found:
         assert faults[0].pair == ("part", "wheel")
@@ -135,7 +133,7 @@ def test_a_free_move_keeps_the_clearance_from_the_wheel():
     problem, motion = small_problem(), small_motion()
     on_wheel = next(k for k, s in enumerate(motion.stretch) if s is Stretch.GRIND)
     hold = free_move(motion.q[[on_wheel, on_wheel]])
-    faults = find_faults(problem.cell, problem.scene, problem.samples, hold)
+    faults = find_faults(problem.cell, problem.scene, problem.part, hold)
     assert [fault.pair for fault in faults] == [("part", "wheel")] * 2
 
 

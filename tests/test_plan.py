@@ -23,7 +23,6 @@ from cells import (
     with_problem_cell,
 )
 
-from opl.cell.clearance import sample_tree
 from opl.cell.robot import forward
 from opl.errors import NoPathError
 from opl.geometry.passes import Order
@@ -238,7 +237,7 @@ def test_a_blocked_link_is_avoided_by_another_step_from_pass_to_pass():
     link = next(k for k, s in enumerate(plan.motion.stretch) if s is Stretch.LINK)
     middle = (plan.motion.q[link - 1] + plan.motion.q[link]) / 2.0
     ghosts = Ghosts(middle, radius=0.01)
-    faults = find_faults(problem.cell, ghosts, problem.samples, plan.motion)
+    faults = find_faults(problem.cell, ghosts, problem.part, plan.motion)
     assert [plan.motion.stretch[fault.move] for fault in faults] == [Stretch.LINK]
     other = plan_recursive(replace(problem, scene=ghosts))
     assert other.checks > 1
@@ -296,8 +295,9 @@ def test_points_out_of_reach_are_found():
 def test_a_fixed_contact_that_cuts_is_told():
     # the part is larger than its surface by 1 mm
     problem = small_problem()
-    samples = sample_tree(problem.samples.points * 1.01)
-    fixed = keep_contact(replace(problem, samples=samples))
+    larger = replace(problem.part, triangles=problem.part.triangles * 1.01)
+    larger = replace(larger, spheres=problem.part.spheres * 1.01)
+    fixed = keep_contact(replace(problem, part=larger))
     assert not fixed.feasible
     assert fixed.reason.startswith("part cuts into wheel at 120 of 120 cutter points (0-119), ")
     assert fixed.reason.endswith(" mm deep at most")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.clearance import PartSamples, wheel_clearance
+from opl.cell.clearance import PartTree, wheel_clearance
 from opl.cell.collision import CollisionScene
 from opl.cell.robot import forward
 from opl.cell.workcell import PART, WHEEL, WorkCell
@@ -53,7 +53,7 @@ def densify(q: Array, resolution: float) -> tuple[Array, np.ndarray]:
 
 
 def find_faults(
-    cell: WorkCell, scene: CollisionScene, samples: PartSamples, motion: Motion
+    cell: WorkCell, scene: CollisionScene, part: PartTree, motion: Motion
 ) -> list[Fault]:
     """Return every move of a motion that collides, once each, in order.
 
@@ -63,15 +63,15 @@ def find_faults(
     Args:
         cell: The cell.
         scene: Its geometry.
-        samples: Surface samples of the part.
+        part: The triangles of the part.
         motion: The motion.
     """
     q, move = densify(motion.q, RESOLUTION)
     Ts_base_flange = forward(cell.robot, q)
-    distance = wheel_clearance(samples, cell.wheel, cell.Ts_contact0_workpiece(Ts_base_flange))
     free_move = np.array([stretch in FREE_MOVES for stretch in motion.stretch])
     needed = np.where(free_move[move], cell.clearance, -cell.contact_allowance)
-    cuts = distance < needed
+    Ts_contact0_workpiece = cell.Ts_contact0_workpiece(Ts_base_flange)
+    cuts = wheel_clearance(part, cell.wheel, Ts_contact0_workpiece, needed) < needed
     # a move that is refused for the wheel need not be asked about the rest
     ask = ~np.isin(move, move[cuts])
     hits = np.zeros(len(q), dtype=bool)

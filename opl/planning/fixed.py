@@ -7,13 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
-from opl.errors import NoPathError
 from opl.geometry.frames import Array
 from opl.planning.layer import wheel_layer
 from opl.planning.nodes import build_nodes
-from opl.planning.plan import plan_recursive
+from opl.planning.plan import try_recursive
 from opl.planning.problem import GrindingProblem
 from opl.planning.recursive import add_dead_ends, descend
+from opl.planning.starts import Start
+
+MOST_CHECKS = 50  # of contact-fixed motions, which differ in the counts of turns only
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ def keep_contact(problem: GrindingProblem) -> FixedContact:
     fixed = replace(
         problem,
         field=build_nodes(problem.cell, problem.points, middle),
-        wheel_clearance=wheel_layer(problem.cell, problem.samples, problem.points, middle),
+        wheel_clearance=wheel_layer(problem.cell, problem.part, problem.points, middle),
     )
     best = np.inf
     q = None
@@ -71,10 +73,8 @@ def keep_contact(problem: GrindingProblem) -> FixedContact:
             f"{PART} cuts into {WHEEL} at {len(cut)} of {len(q)} cutter points "
             f"({runs_of(cut)}), {deepest:.2f} mm deep at most",
         )
-    try:
-        plan_recursive(fixed)
-    except NoPathError as error:
-        return FixedContact(q, False, str(error).replace("\n", "; "))
+    if try_recursive(fixed, Start.BEST, MOST_CHECKS) is None:
+        return FixedContact(q, False, "every motion that was checked collides")
     return FixedContact(q, True, "")
 
 

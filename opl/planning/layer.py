@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from opl.cell.clearance import PartSamples, wheel_clearance
+from opl.cell.clearance import PartTree, wheel_clearance
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
 
 
 def wheel_layer(
-    cell: WorkCell, samples: PartSamples, points: CutterPoints, contact_positions: Array
+    cell: WorkCell, part: PartTree, points: CutterPoints, contact_positions: Array
 ) -> Array:
     """Return the signed distance of the part to the wheel in [m], shape (N, M).
 
+    As in `wheel_clearance`: exact where it is less than the contact allowance permits.
+
     Args:
         cell: The cell.
-        samples: Surface samples of the part.
+        part: The triangles of the part.
         points: N cutter points.
         contact_positions: M values of t.
     """
     Ts_contact0_contact = cell.wheel.T_contact0_contact(contact_positions)
     # cutter and contact coincide, whatever robot brings the part there
     Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[:, None]
-    return wheel_clearance(samples, cell.wheel, Ts_contact0_workpiece)
+    return wheel_clearance(part, cell.wheel, Ts_contact0_workpiece, -cell.contact_allowance)

@@ -27,6 +27,7 @@ from opl.planning.symmetry import twins, undominated
 
 SUBDIVIDE = np.array([0.25, 0.5, 0.75])  # where a step that bulges is given columns
 MOST_REFINEMENTS = 8
+SMALLEST_STEP = 1.0 / 16.0  # of a step between cutter points that is still given columns
 # fractions to which boxes are solved: what remains of the gap of a path is then that of its track
 PROOF_GAP = 1e-6
 REFINED_GAP = 1e-5
@@ -41,7 +42,7 @@ class OptimalSettings:
     Attributes:
         widen: Fraction by which the joint range sum may exceed the lower bound for the sake of a
             smoother track. It becomes larger only where no track fits.
-        max_contact_change: Largest change of t between neighbouring cutter points in belt units.
+        max_contact_change: Largest change of t between neighbouring columns in belt units.
         costs: What a track is charged for inside the box.
         seconds: After this time no further improvement is begun.
     """
@@ -152,14 +153,8 @@ class _Search:
         """
         branch, problem = self._branches[index], self._refined.problem
         settings = self._settings
-        share = np.diff(self._refined.places)
-        # a fraction of a step between cutter points may take that fraction of the change
-        changes = np.maximum(
-            settings.max_contact_change * share, problem.interpolation.max_contact_step
-        )
-        ladder = replace(
-            branch.ladder, max_contact_change=np.where(problem.off_wheel, np.inf, changes)
-        )
+        changes = np.where(problem.off_wheel, np.inf, settings.max_contact_change)
+        ladder = replace(branch.ladder, max_contact_change=changes)
         allowance = max(self._bound * (1.0 + settings.widen) - box.size, LEAST_WIDENING * box.size)
         for widening in WIDENINGS:
             wide = box.widened(float(widening) * allowance)
@@ -187,7 +182,9 @@ class _Search:
             path = fill_in(problem.cell, problem.points, branch.nodes, rows, problem.interpolation)
         except BrokenStepError:
             return np.empty(0, dtype=int)  # the check will find and block it
-        return np.unique(path.cutter_point[~box.holds(path.q)].astype(int))
+        bulging = np.unique(path.cutter_point[~box.holds(path.q)].astype(int))
+        # where t jumps within a smaller step the robot pivots in place: columns do not change that
+        return bulging[np.diff(self._refined.places)[bulging] > SMALLEST_STEP]
 
     def _refine(self, columns: np.ndarray) -> None:
         """Take in places on the steps that start at these columns."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -55,26 +56,44 @@ def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
         NoPathError: If there is none; says where it ends and why.
     """
     branches = branches_of(problem)
-    robot = problem.cell.robot
-    tracks: Iterator[Track]
-    if start is Start.NEAREST:
-        tracks = tracks_from_nearest_start(branches, problem.pace.home)
-    else:
-        tracks = (
-            twin
-            for track in tracks_from_best_start(branches)
-            for twin in twins(branches, track, robot.lower, robot.upper)
-        )
+    plan = _first_free(problem, branches, _tracks(problem, branches, start))
+    if plan is None:
+        raise no_path(problem, branches)
+    return plan
+
+
+def try_recursive(problem: GrindingProblem, start: Start, most_checks: int) -> Plan | None:
+    """Return what the recursive search finds within a number of checked motions, or None.
+
+    Args:
+        problem: What is to be planned.
+        start: Which start nodes to try.
+        most_checks: How many motions to check at the most.
+    """
+    branches = branches_of(problem)
+    tracks = islice(_tracks(problem, branches, start), most_checks)
     return _first_free(problem, branches, tracks)
 
 
-def _first_free(problem: GrindingProblem, branches: list[Branch], tracks: Iterator[Track]) -> Plan:
+def _tracks(problem: GrindingProblem, branches: list[Branch], start: Start) -> Iterator[Track]:
+    """Yield tracks in the order in which the search wants them checked."""
+    if start is Start.NEAREST:
+        yield from tracks_from_nearest_start(branches, problem.pace.home)
+        return
+    robot = problem.cell.robot
+    for track in tracks_from_best_start(branches):
+        yield from twins(branches, track, robot.lower, robot.upper)
+
+
+def _first_free(
+    problem: GrindingProblem, branches: list[Branch], tracks: Iterator[Track]
+) -> Plan | None:
     """Return the first of the tracks whose motion is free, blocking what is not on the way."""
     for checks, track in enumerate(tracks, start=1):
         plan = check_track(problem, branches[track.branch], track.rows, checks)
         if plan is not None:
             return plan
-    raise no_path(problem, branches)
+    return None
 
 
 def check_track(
@@ -98,7 +117,7 @@ def check_track(
     except UnreachableApproachError as error:
         branch.block_node(error.column, int(rows[error.column]), f"approach: {error.cause}")
         return None
-    faults = find_faults(problem.cell, problem.scene, problem.samples, motion)
+    faults = find_faults(problem.cell, problem.scene, problem.part, motion)
     for fault in faults:
         _block(problem, branch, rows, motion, fault)
     return None if faults else Plan(path, motion, checks)

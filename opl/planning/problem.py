@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.clearance import PartSamples
+from opl.cell.clearance import PartTree
 from opl.cell.collision import CollisionScene
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
@@ -24,17 +24,18 @@ class GrindingProblem:
     Attributes:
         cell: The cell.
         scene: Its collision geometry.
-        samples: Surface samples of the part.
+        part: The triangles of the part.
         points: N cutter points.
         field: The nodes of every branch.
-        wheel_clearance: Signed distance of the part to the wheel in [m], shape (N, M).
+        wheel_clearance: Signed distance of the part to the wheel in [m], exact where it is less
+            than the contact allowance permits, shape (N, M).
         interpolation: How the path between nodes is filled in.
         pace: Speeds, approach and home.
     """
 
     cell: WorkCell
     scene: CollisionScene
-    samples: PartSamples
+    part: PartTree
     points: CutterPoints
     field: NodeField
     wheel_clearance: Array

@@ -68,7 +68,7 @@ def refine(refined: RefinedProblem, places: Array) -> RefinedProblem:
         np.interp(columns, np.arange(len(points)), points.arc_length),
     )
     t = problem.field.contact_positions
-    layer = wheel_layer(problem.cell, problem.samples, added, t)
+    layer = wheel_layer(problem.cell, problem.part, added, t)
     Ts_base_flange = problem.cell.Ts_base_flange(t[None, :], added.Ts_workpiece_cutter[:, None])
     q = inverse(problem.cell.robot.arm, Ts_base_flange)
     at = before + 1
