@@ -18,6 +18,7 @@ from pathlib import Path
 
 from opl.cell.robot import Robot
 from opl.errors import InputError, OplError
+from opl.program.controller import ControllerProfile
 from opl.program.moves import PassTime, Program
 from opl.program.settings import ProgramSettings
 
@@ -56,6 +57,7 @@ class Post:
         template: The layout that comes with the post.
         variables: What its templates get: name and meaning.
         counts_pulses: Whether positions may be written in encoder pulses.
+        profile: The Yaskawa controller whose INFORM jobs it writes, None for other languages.
     """
 
     title: str
@@ -63,6 +65,7 @@ class Post:
     template: Path
     variables: Mapping[str, str]
     counts_pulses: bool = False
+    profile: ControllerProfile | None = None
 
 
 def known_posts() -> list[str]:

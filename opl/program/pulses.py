@@ -26,7 +26,7 @@ class PulseScale:
 
     Attributes:
         joint_names: As people at the pendant call them.
-        pulses_per_radian: Ratio of each joint in [1/rad], shape (6,).
+        pulses_per_radian: Ratio of each joint in [1/rad], shape (6,); NaN where it is not known.
         lower: Lower joint limits in [rad], shape (6,).
         upper: Upper joint limits in [rad], shape (6,).
         unverified: Names of the joints whose ratio nobody has confirmed on a controller.
@@ -47,7 +47,10 @@ class PulseScale:
                 )
             value.setflags(write=False)
             object.__setattr__(self, name, value)
-        if not np.all((self.pulses_per_radian > 0.0) & np.isfinite(self.pulses_per_radian)):
+        unknown_ratio = np.isnan(self.pulses_per_radian)
+        if not np.all(unknown_ratio | (self.pulses_per_radian > 0.0)) or np.any(
+            np.isinf(self.pulses_per_radian)
+        ):
             raise ValueError(f"pulses per radian must be positive, got {self.pulses_per_radian}")
         if unknown := set(self.unverified) - set(self.joint_names):
             raise ValueError(f"no such joints: {sorted(unknown)}; have: {self.joint_names}")
@@ -64,6 +67,11 @@ class PulseScale:
         )
 
     @property
+    def complete(self) -> bool:
+        """Whether the ratio of every joint is known."""
+        return not np.isnan(self.pulses_per_radian).any()
+
+    @property
     def soft_limits(self) -> tuple[Pulses, Pulses]:
         """Lower and upper limits in pulses, as the controller keeps them, shapes (6,)."""
         return self._nearest(self.lower), self._nearest(self.upper)
@@ -78,8 +86,11 @@ class PulseScale:
             Pulses, shape (..., 6).
 
         Raises:
+            InputError: If the ratio of a joint is not known.
             UnsafeError: If a joint is beyond its soft limit; the first such posture is named.
         """
+        if not self.complete:
+            raise InputError("program.pulse_ratios", "the pulses per degree are not known")
         postures = np.atleast_2d(q)
         if not np.all(np.isfinite(postures)):
             raise UnsafeError("a joint position is not a number")
@@ -101,6 +112,26 @@ class PulseScale:
 
     def _nearest(self, q: Array) -> Pulses:
         return np.rint(q * self.pulses_per_radian).astype(np.int64)
+
+
+def require_known(robot: Robot, where: str) -> None:
+    """Refuse to count a robot in pulses that are not known.
+
+    Args:
+        robot: Whose program.
+        where: File and key that would give them.
+
+    Raises:
+        InputError: If the ratio of a joint is missing; tells the ways out.
+    """
+    missing = ", ".join(robot.missing_pulses)
+    if missing:
+        raise InputError(
+            where,
+            f"no pulses per degree are known of {missing} of {robot.title} (robot: {robot.name}), "
+            "so its program cannot be written in pulses; give the controller's own (opl robots "
+            "import-params)",
+        )
 
 
 def require_accepted(unverified: Collection[str], accepted: Collection[str], where: str) -> None:

@@ -25,12 +25,7 @@ def stops_at(motion: Motion, kept: NDArray[np.intp], on_wheel: NDArray[np.bool_]
         kept: Indices of the postures that have a move, shape (n,).
         on_wheel: Which of them touch the wheel, shape (n,).
     """
-    stretch = [Stretch.GRIND if s in ON_WHEEL else s for s in motion.stretch]
-    # the move onto the wheel belongs to the approach, which ends where the part touches
-    touches = (Stretch.APPROACH, Stretch.GRIND)
-    steps_on = list(pairwise(stretch))
-    ends = [here is not after and (here, after) != touches for here, after in steps_on] + [True]
-    stops = np.logical_or.reduceat(ends, kept)
+    stops = np.logical_or.reduceat(ends_of_stretches(motion), kept)
     stops[0] = True
     stops[1:] |= on_wheel[1:] & ~on_wheel[:-1]
     steps = np.diff(motion.q[kept], axis=0)
@@ -38,6 +33,15 @@ def stops_at(motion: Motion, kept: NDArray[np.intp], on_wheel: NDArray[np.bool_]
     cos_turn = np.sum(directions[:-1] * directions[1:], axis=1)
     stops[1:-1] |= ~on_wheel[1:-1] & (cos_turn < np.cos(MAX_BLENDED_TURN))
     return stops.tolist()
+
+
+def ends_of_stretches(motion: Motion) -> list[bool]:
+    """Say which postures end a stretch, the last one too."""
+    stretch = [Stretch.GRIND if s in ON_WHEEL else s for s in motion.stretch]
+    # the move onto the wheel belongs to the approach, which ends where the part touches
+    touches = (Stretch.APPROACH, Stretch.GRIND)
+    steps_on = list(pairwise(stretch))
+    return [here is not after and (here, after) != touches for here, after in steps_on] + [True]
 
 
 def actions_at(

@@ -32,9 +32,10 @@ def render_table(
 
     Passes count from 1 as in the job's comments, cutter points from 0. A cell is empty where a
     quantity is not defined: pass at home, cutter point and t off the wheel, clearance where none
-    was computed. Speed is what the program says, and programmed_s the time of the move at it; both
-    are empty for a posture that repeats the one before and so has no move of its own (the time of
-    that row is in the move that follows), and programmed_s where nobody knows from where it comes.
+    was computed. Columns of pulses are there if all are known. Speed is what the program says, and
+    programmed_s the time of the move at it; both are empty for a posture that repeats the one
+    before and so has no move of its own (the time of that row is in the move that follows), and
+    programmed_s where nobody knows from where it comes.
 
     Args:
         verified: The motion.
@@ -48,11 +49,11 @@ def render_table(
         InputError: If the template is unusable.
     """
     motion = verified.motion
-    pulses = scale.to_pulses(motion.q).tolist()
+    pulses = scale.to_pulses(motion.q).tolist() if scale.complete else [()] * len(motion)
     angles = np.rad2deg(motion.q)
     positions = Ts_base_flange[:, :3, 3] * 1e3
     rotations = np.rad2deg(roll_pitch_yaw(Ts_base_flange))
-    columns = _columns(scale.joint_names)
+    columns = _columns(scale.joint_names, scale.complete)
     rows = [
         (
             str(motion.pass_index[i] + 1) if motion.pass_index[i] >= 0 else "",
@@ -77,11 +78,11 @@ def render_table(
     return fill(TEMPLATE if template is None else template, values)
 
 
-def _columns(joint_names: Sequence[str]) -> tuple[str, ...]:
+def _columns(joint_names: Sequence[str], with_pulses: bool) -> tuple[str, ...]:
     return (
         *("pass", "cutter_point", "kind", "t"),
         *(f"{name}_deg" for name in joint_names),
-        *(f"{name}_pulses" for name in joint_names),
+        *(f"{name}_pulses" for name in joint_names if with_pulses),
         *("x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"),
         *("time_s", "programmed_s", "speed", "clearance_mm"),
     )

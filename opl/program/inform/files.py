@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from opl.errors import InputError
+from opl.findings import Finding, Level
+from opl.program.controller import ControllerProfile
+from opl.program.inform.check import find_faults
 from opl.program.inform.job import InformJob
-from opl.program.inform.parse import read_jobs
+from opl.program.inform.parse import read_jobs, unparse
 
 # Controllers save ASCII and Shift-JIS; copies in repositories are UTF-8. The last takes any byte.
 _ENCODINGS = ("ascii", "utf-8", "cp932", "latin-1")
@@ -36,3 +40,29 @@ def load_jobs(path: Path) -> tuple[InformJob, ...]:
         raise InputError(str(path), f"cannot be read: {error.strerror}") from error
     text, _ = decode(data)
     return read_jobs(text, str(path))
+
+
+def program_jobs(
+    files: Mapping[str, bytes], profile: ControllerProfile
+) -> tuple[dict[str, InformJob], list[Finding]]:
+    """Return the jobs of a program by name, and what a controller would refuse of its files.
+
+    Args:
+        files: Content by what messages call the file.
+        profile: The controller.
+
+    Raises:
+        InputError: If a file holds what is no job, or two jobs have one name.
+    """
+    jobs: dict[str, InformJob] = {}
+    found: list[Finding] = []
+    for source, data in files.items():
+        text, _ = decode(data)
+        several = read_jobs(text, source)
+        for job in several:
+            if job.name in jobs:
+                raise InputError(source, f"a job {job.name} was given before")
+            jobs[job.name] = job
+            faults = find_faults(text if len(several) == 1 else unparse(job), profile)
+            found += [Finding(Level.ERROR, "file", source, fault) for fault in faults]
+    return jobs, found

@@ -48,7 +48,8 @@ def write_positions(
     """
     q = np.array([move.q for move in program.moves]).reshape(-1, 6)
     scale = PulseScale.of(robot)
-    pulses = scale.to_pulses(q)  # checks the soft limits, however positions are written
+    if scale.complete or settings.positions is PositionForm.PULSES:
+        pulses = scale.to_pulses(q)  # checks the soft limits, however positions are written
     if settings.positions is PositionForm.PULSES:
         texts = tuple(",".join(map(str, row)) for row in pulses.tolist())
         return WrittenPositions(texts, (None,) * len(q), scale.to_angles(pulses))

@@ -17,7 +17,7 @@ from opl.program.inform.times import move_times
 from opl.program.moves import Program
 from opl.program.posts import Post, Written, pass_times
 from opl.program.profiles import PROFILES
-from opl.program.pulses import require_accepted
+from opl.program.pulses import require_accepted, require_known
 from opl.program.settings import PositionForm, ProgramSettings
 
 
@@ -44,6 +44,7 @@ def write_jobs(
         OplError: If a pass has more moves than a job can hold, or cannot keep its time.
     """
     if settings.positions is PositionForm.PULSES:
+        require_known(robot, "program.pulse_ratios")
         where = "program.accept_unverified_pulses"
         require_accepted(robot.unverified_pulses, settings.accepted_pulses, where)
     parts = split_for(program, profile)
@@ -75,7 +76,7 @@ def post_of(profile: ControllerProfile) -> Post:
         return write_jobs(program, robot, settings, profile, date)
 
     title = f"Yaskawa {profile.name} (INFORM)"
-    return Post(title, write, TEMPLATE, VARIABLES, counts_pulses=True)
+    return Post(title, write, TEMPLATE, VARIABLES, counts_pulses=True, profile=profile)
 
 
 NX100, DX100, DX200, YRC1000 = (

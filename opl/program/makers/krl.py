@@ -13,7 +13,7 @@ from datetime import datetime
 import numpy as np
 
 from opl import resources
-from opl.cell.robot import Robot, forward
+from opl.cell.robot import Robot, controller_poses
 from opl.geometry.frames import roll_pitch_yaw
 from opl.program.actions import Action, Call, Dwell, SetOutput, WaitInput
 from opl.program.makers.text import VARIABLES, Dialect, angles, write_steps, written
@@ -41,7 +41,7 @@ def write(program: Program, robot: Robot, settings: ProgramSettings, date: datet
     """Return the program in KRL."""
     _DIALECT.require_legal(program, settings)
     q = np.array([move.q for move in program.moves]).reshape(-1, 6)
-    Ts_base_tool = forward(robot, q) @ settings.T_flange_tool
+    Ts_base_tool = controller_poses(robot, q) @ settings.T_flange_tool
     speeds, times = _speeds(program, q, Ts_base_tool, robot)
     moves = [
         (*_move(move, T_base_tool), speed, time)

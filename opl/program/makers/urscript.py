@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from opl import resources
-from opl.cell.robot import Robot, forward
+from opl.cell.robot import Robot, controller_poses
 from opl.program.actions import Action, Call, Dwell, SetOutput, WaitInput
 from opl.program.makers.text import VARIABLES, Dialect, rounded_times, write_steps, written
 from opl.program.moves import Program
@@ -38,7 +38,7 @@ def write(program: Program, robot: Robot, settings: ProgramSettings, date: datet
     _DIALECT.require_legal(program, settings)
     times = rounded_times(program.moves, 4, 0.0001)
     q = np.array([move.q for move in program.moves]).reshape(-1, 6)
-    Ts_base_tool = forward(robot, q) @ settings.T_flange_tool
+    Ts_base_tool = controller_poses(robot, q) @ settings.T_flange_tool
     blends = _blends(program, Ts_base_tool)
     moves = []
     for move, time, blend in zip(program.moves, times, blends, strict=True):

@@ -1,0 +1,44 @@
+"""The postures that positions stand for once they are written: digits are few."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opl.cell.robot import Robot
+from opl.program.controller import ControllerProfile
+from opl.program.inform.motion import write_positions
+from opl.program.moves import Move, Program
+from opl.program.pulses import PulseScale
+from opl.program.settings import PositionForm, ProgramSettings
+
+Array = NDArray[np.float64]
+
+
+def told_postures(
+    q: Array, robot: Robot, settings: ProgramSettings, profile: ControllerProfile
+) -> Array:
+    """Return the postures that a job can tell, nearest to some postures, shape (n, 6).
+
+    Within the limits: a posture at its limit is rounded inwards.
+
+    Args:
+        q: Joint positions in [rad], shape (n, 6).
+        robot: Whose postures.
+        settings: How positions are written.
+        profile: The controller.
+
+    Raises:
+        UnsafeError: If a posture is beyond the limits, or a Cartesian position cannot tell it.
+    """
+    if settings.positions is PositionForm.PULSES:
+        scale = PulseScale.of(robot)
+        ratio = scale.pulses_per_radian
+        slack = 1e-6  # pulses
+        lowest, highest = (
+            np.ceil(scale.lower * ratio - slack),
+            np.floor(scale.upper * ratio + slack),
+        )
+        return scale.to_angles(np.clip(scale.to_pulses(q), lowest, highest))
+    moves = tuple(Move(p, 1.0, exact_stop=True, on_wheel=False, posture=k) for k, p in enumerate(q))
+    return write_positions(Program("TOLD", moves=moves), robot, settings, profile).q

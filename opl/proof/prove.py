@@ -1,0 +1,131 @@
+"""What is proven of a program is what its files say: parsed, played, recognised, replayed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opl.errors import InputError
+from opl.findings import Finding
+from opl.geometry.toolpath import CutterPoints
+from opl.job import Job
+from opl.planning.motion import Motion, Stretch
+from opl.program.controller import ControllerProfile
+from opl.program.inform.files import program_jobs
+from opl.program.inform.playback import play
+from opl.program.posts import find_post
+from opl.proof.written import written_findings
+from opl.verification.recognise import Rule, recognise
+from opl.verification.replay import Verification, replay
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """What was found out about the files of a program.
+
+    Attributes:
+        files: Names of the files.
+        foreign: Names of the user's own jobs that are called and were not looked at.
+        moves: Number of moves.
+        motion: The motion as recognised, None if the files do not tell one.
+        verification: What the replay found, None without a motion.
+        findings: What is wrong.
+    """
+
+    files: tuple[str, ...]
+    foreign: tuple[str, ...]
+    moves: int
+    motion: Motion | None
+    verification: Verification | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def ground(self) -> int:
+        """Number of cutter points that are ground."""
+        stretches = () if self.motion is None else self.motion.stretch
+        return sum(stretch is Stretch.GRIND for stretch in stretches)
+
+    @property
+    def proven(self) -> bool:
+        """Whether the program is safe and complete."""
+        return self.motion is not None and not self.findings
+
+
+def prove(
+    job: Job,
+    points: CutterPoints,
+    files: Mapping[str, bytes],
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> Proof:
+    """Prove job files against the cell of a job, knowing nothing of how they were planned.
+
+    Args:
+        job: Cell, feed and tolerances.
+        points: The cutter points of the job.
+        files: Content of the job files, the master and all parts, by what messages call them.
+        progress: Told the part of the motion that is replayed, 0 to 1.
+
+    Raises:
+        InputError: If the files are no jobs, not those of one program, or of another robot.
+    """
+    jobs, refused = program_jobs(files, profile_of(job))
+    playback, doubtful = play(jobs, job.cell.robot, job.program)
+    foreign = tuple(sorted({name for one in jobs.values() for name in one.calls} - jobs.keys()))
+    if playback is None:
+        return Proof(tuple(files), foreign, 0, None, None, (*refused, *doubtful))
+    search = job.search
+    rule = Rule(
+        search.max_contact_error, search.interpolation.max_contact_step, job.pace.approach_length
+    )
+    found = recognise(job.cell, points, playback.q, playback.duration, playback.stations, rule)
+    replayed = replay(job.cell, points, found.motion, search.max_contact_error, progress)
+    written = at_stations(found.motion, found.source, playback.stations)
+    findings = (
+        *refused,
+        *doubtful,
+        *replayed.findings,
+        *found.findings,
+        *written_findings(job, points, written, playback),
+    )
+    moves = len(playback.visits)
+    return Proof(tuple(files), foreign, moves, found.motion, replayed, findings)
+
+
+def profile_of(job: Job) -> ControllerProfile:
+    """Return the Yaskawa controller that a job is for.
+
+    Raises:
+        InputError: If it is for another one.
+    """
+    post = find_post(job.program.controller, f"{job.path}: program.controller")
+    if post.profile is None:
+        raise InputError(
+            f"{job.path}: program.controller",
+            f"programs of Yaskawa controllers can be read, not those for {post.title}",
+        )
+    return post.profile
+
+
+def at_stations(motion: Motion, source: NDArray[np.intp], stations: NDArray[np.intp]) -> Motion:
+    """Return a motion with nothing but the written postures, the time between them summed.
+
+    Args:
+        motion: All postures.
+        source: Index of each in the postures that were played, ascending.
+        stations: Which of those are written.
+    """
+    # of a posture that grinds several cutter points, the last: there its move has come to
+    rows = np.searchsorted(source, stations, side="right") - 1
+    time = np.diff(np.cumsum(motion.duration)[rows], prepend=0.0)
+    return Motion(
+        motion.q[rows],
+        time,
+        tuple(motion.stretch[row] for row in rows),
+        motion.contact_position[rows],
+        motion.cutter_point[rows],
+        motion.pass_index[rows],
+        motion.clearance[rows],
+    )

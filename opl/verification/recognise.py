@@ -1,0 +1,245 @@
+"""What a robot grinds, recognised from its postures alone: nobody tells where the passes are.
+
+Postures and cutter points are aligned like two texts: both keep their order, a posture may lie
+between two cutter points or off the wheel, and a cutter point that no posture brings to the wheel
+is left out, which is dear. Between two cutter points the frame changes evenly; postures there are
+placed where they come nearest to the contact model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opl.cell.workcell import WorkCell
+from opl.findings import Finding, Level
+from opl.geometry.frames import Array, inverse
+from opl.geometry.toolpath import CutterPoints
+from opl.planning.motion import Motion, Stretch
+from opl.verification.align import align
+from opl.verification.between import place_between
+from opl.verification.contact import ALIGNED, Touches, find_touches
+from opl.verification.place import where
+from opl.verification.world import World
+
+# [m] that a posture may be off the contact model at the cutter point it grinds: what the digits of
+# a position leave. Farther off it passes by; that is for the way between cutter points.
+AT_POINT = 5e-5
+ASIDE = 2e-4  # [m] that a posture of an approach may be beside the contact normal
+FARTHER = 1e-3  # [m] than the approach is long that still is approach
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What a motion over the wheel has to keep to be recognised as one.
+
+    Attributes:
+        max_contact_error: Farthest that a ground point may be from where the contact model has it,
+            in [m].
+        max_contact_step: Largest change of t between neighbouring postures on the wheel.
+        approach_length: Of approach and retract along the contact normal in [m].
+    """
+
+    max_contact_error: float
+    max_contact_step: float
+    approach_length: float
+
+
+@dataclass(frozen=True, eq=False)
+class Recognition:
+    """A motion with its meaning.
+
+    Attributes:
+        motion: The postures, labelled; one that grinds several cutter points at once is repeated.
+        source: Index of each of them in the postures that were given, shape (n,).
+        findings: Postures that leave the way between two cutter points.
+    """
+
+    motion: Motion
+    source: NDArray[np.intp]
+    findings: tuple[Finding, ...]
+
+
+def recognise(
+    cell: WorkCell,
+    points: CutterPoints,
+    q: Array,
+    duration: Array,
+    stations: NDArray[np.intp],
+    rule: Rule,
+) -> Recognition:
+    """Find out which cutter points a motion grinds, where on the wheel, and what the rest is.
+
+    Args:
+        cell: The cell.
+        points: The cutter points that may be ground.
+        q: Joint positions in [rad], joined by linear joint interpolation, shape (n, 6).
+        duration: Time of the move that ends at each posture in [s], shape (n,).
+        stations: Indices of the postures at which a cutter point may be ground, in order.
+        rule: What a motion over the wheel has to keep.
+    """
+    with World(cell) as world:
+        Ts_base_workpiece = np.array([world.move_to(posture) for posture in q])
+    Ts_contact0_workpiece = inverse(cell.wheel.T_base_contact0) @ Ts_base_workpiece
+    tolerance = min(AT_POINT, rule.max_contact_error)
+    touches = find_touches(cell.wheel, points, Ts_contact0_workpiece[stations], tolerance)
+    ground = align(touches, points.pass_index, tolerance, rule.max_contact_step)
+    labels = _Labels(cell, points, Ts_contact0_workpiece, rule)
+    labels.grind(touches, ground, stations)
+    return labels.recognition(q, duration)
+
+
+class _Labels:
+    """What each posture is, being found out."""
+
+    def __init__(
+        self, cell: WorkCell, points: CutterPoints, Ts_contact0_workpiece: Array, rule: Rule
+    ) -> None:
+        n = len(Ts_contact0_workpiece)
+        self._wheel = cell.wheel
+        self._points = points
+        self._Ts = Ts_contact0_workpiece
+        self._rule = rule
+        self._stretch = [Stretch.HOME] * n
+        self._t = np.full(n, np.nan)
+        self._place = np.full(n, np.nan)
+        self._pass = np.full(n, -1)
+        self._also: dict[int, list[tuple[int, float]]] = {}  # more cutter points at a posture
+        self._astray: list[tuple[int, float]] = []
+
+    def grind(self, touches: Touches, ground: NDArray[np.intp], stations: NDArray[np.intp]) -> None:
+        """Label everything, given which touches are the ground cutter points."""
+        posture, point = stations[touches.posture[ground]], touches.point[ground]
+        t = touches.contact_position[ground]
+        pass_index = self._points.pass_index[point]
+        for k, i, position in zip(posture, point, t, strict=True):
+            if self._stretch[k] is Stretch.GRIND:
+                self._also.setdefault(int(k), []).append((int(i), float(position)))
+                continue
+            self._mark(k, Stretch.GRIND, self._points.pass_index[i], position, i)
+        self._fill_between(posture, point, t, np.diff(pass_index) == 0)
+        first, last = self._lead_ins(posture, point, t, pass_index)
+        self._name_the_air(first, last)
+
+    def recognition(self, q: Array, duration: Array) -> Recognition:
+        """Return the labelled motion."""
+        rows = [(k, 0) for k in range(len(q))]
+        rows += [(k, 1 + m) for k, more in self._also.items() for m in range(len(more))]
+        rows.sort()
+        source = np.array([k for k, _ in rows])
+        t, place, time = self._t[source], self._place[source], duration[source]
+        for row, (k, again) in enumerate(rows):
+            if again:
+                place[row], t[row] = self._also[k][again - 1]
+                time[row] = 0.0
+        motion = Motion(
+            q=q[source],
+            duration=time,
+            stretch=tuple(self._stretch[k] for k in source),
+            contact_position=t,
+            cutter_point=place,
+            pass_index=self._pass[source],
+            clearance=np.full(len(source), np.nan),
+        )
+        findings = tuple(
+            Finding(
+                Level.ERROR,
+                "contact",
+                where(motion, int(np.searchsorted(source, k))),
+                f"{1e3 * amount:.3f} mm off the way to the next cutter point, "
+                f"{1e3 * self._rule.max_contact_error:g} mm allowed",
+            )
+            for k, amount in self._astray
+        )
+        return Recognition(motion, source, findings)
+
+    def _mark(self, k: int, stretch: Stretch, pass_index: int, t: float, place: float) -> None:
+        self._stretch[k], self._pass[k] = stretch, pass_index
+        self._t[k], self._place[k] = t, place
+
+    def _fill_between(
+        self,
+        posture: NDArray[np.intp],
+        point: NDArray[np.intp],
+        t: Array,
+        goes_on: NDArray[np.bool_],
+    ) -> None:
+        """Label the postures between those that grind cutter points.
+
+        Args:
+            posture: Those that do, shape (n,).
+            point: The cutter points, shape (n,).
+            t: The contact positions, shape (n,).
+            goes_on: After which of them the pass goes on, shape (n - 1,).
+        """
+        gaps = {m: range(posture[m] + 1, posture[m + 1]) for m in np.flatnonzero(goes_on)}
+        inside = np.array([k for gap in gaps.values() for k in gap], dtype=int)
+        steps = np.array([m for m, gap in gaps.items() for _ in gap], dtype=int)
+        if not len(inside):
+            return
+        ends = np.stack([point[steps], point[steps + 1]], axis=1).astype(float)
+        t_ends = np.stack([t[steps], t[steps + 1]], axis=1)
+        place, position, apart = place_between(
+            self._wheel, self._points, self._Ts[inside], ends, t_ends
+        )
+        for row, k in enumerate(inside):
+            pass_index = int(self._points.pass_index[point[steps[row]]])
+            self._mark(k, Stretch.BETWEEN, pass_index, position[row], place[row])
+            if apart[row] > self._rule.max_contact_error:
+                self._astray.append((int(k), float(apart[row])))
+
+    def _lead_ins(
+        self,
+        posture: NDArray[np.intp],
+        point: NDArray[np.intp],
+        t: Array,
+        pass_index: NDArray[np.int64],
+    ) -> tuple[list[int], list[int]]:
+        """Label approaches and retracts; return where each pass begins and ends, leads included."""
+        firsts, lasts = [], []
+        for index in np.unique(pass_index):
+            on_pass = np.flatnonzero(pass_index == index)
+            begin, end = on_pass[0], on_pass[-1]
+            reach = self._leading(posture[begin], point[begin], t[begin], -1)
+            for k in reach[:-1]:  # the move to the farthest of them is free
+                self._mark(k, Stretch.APPROACH, index, np.nan, np.nan)
+            firsts.append(min(reach, default=int(posture[begin])))
+            away = self._leading(posture[end], point[end], t[end], 1)
+            for k in away:
+                self._mark(k, Stretch.RETRACT, index, np.nan, np.nan)
+            lasts.append(max(away, default=int(posture[end])))
+        return firsts, lasts
+
+    def _leading(self, k: int, point: int, t: float, step: int) -> list[int]:
+        """Return the postures off the wheel along the normal next to posture k, nearest first."""
+        T_cutter = self._points.Ts_workpiece_cutter[point]
+        to_contact = inverse(self._wheel.T_contact0_contact(t))
+        height, found = 0.0, []
+        j = int(k) + step
+        while 0 <= j < len(self._Ts) and self._stretch[j] is Stretch.HOME:
+            T_contact_cutter = to_contact @ self._Ts[j] @ T_cutter
+            aside = np.hypot(*T_contact_cutter[:2, 3])
+            above = -float(T_contact_cutter[2, 3])  # z of the contact frame points into the wheel
+            turned = np.linalg.norm(T_contact_cutter[:3, :3] - np.eye(3)) / np.sqrt(2.0)
+            if aside > ASIDE or turned > ALIGNED or not above > height:
+                break
+            if above > self._rule.approach_length + FARTHER:
+                break
+            height = above
+            found.append(j)
+            j += step
+        return found
+
+    def _name_the_air(self, firsts: list[int], lasts: list[int]) -> None:
+        """Tell the ways from and to home from the links between passes."""
+        for k in range(len(self._stretch)):
+            if self._stretch[k] is not Stretch.HOME or not firsts:
+                continue
+            following = next((m for m, first in enumerate(firsts) if k <= first), None)
+            if following is None or k == 0:
+                continue  # on the way home, or at home
+            self._pass[k] = self._pass[lasts[following]]
+            if following > 0:
+                self._stretch[k] = Stretch.LINK

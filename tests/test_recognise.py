@@ -1,0 +1,168 @@
+"""What is ground is recognised from postures alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cells import small_job, small_motion, small_problem, tiny_motion, tiny_problem
+
+from opl.geometry.frames import inverse
+from opl.planning.motion import Stretch
+from opl.verification.align import align
+from opl.verification.between import frames_at, place_between
+from opl.verification.contact import Touches, contact_positions, find_touches
+from opl.verification.recognise import Rule, recognise
+from opl.verification.replay import replay
+
+RULE = Rule(
+    1e-4, small_job().search.interpolation.max_contact_step, small_job().pace.approach_length
+)
+
+
+def recognised(problem, q, duration=None):
+    """Recognise postures, all of them written."""
+    time = np.ones(len(q)) if duration is None else duration
+    return recognise(problem.cell, problem.points, q, time, np.arange(len(q)), RULE)
+
+
+def test_the_labels_of_a_planned_motion_are_found_again():
+    motion = small_motion()
+    found = recognised(small_problem(), motion.q, motion.duration).motion
+    assert found.stretch == motion.stretch
+    np.testing.assert_array_equal(found.pass_index, motion.pass_index)
+    at_points = [k for k, s in enumerate(motion.stretch) if s is Stretch.GRIND]
+    np.testing.assert_array_equal(found.cutter_point[at_points], motion.cutter_point[at_points])
+    np.testing.assert_allclose(
+        found.contact_position[at_points], motion.contact_position[at_points], atol=0.01
+    )
+    on_wheel = ~np.isnan(motion.cutter_point)
+    np.testing.assert_array_equal(on_wheel, ~np.isnan(found.cutter_point))
+    np.testing.assert_allclose(
+        found.cutter_point[on_wheel], motion.cutter_point[on_wheel], atol=0.1
+    )
+
+
+def test_what_was_recognised_is_proven_by_the_same_replay():
+    problem = tiny_problem()
+    found = recognised(problem, tiny_motion().q, tiny_motion().duration)
+    assert found.findings == ()
+    assert replay(problem.cell, problem.points, found.motion, 1e-4).verified is not None
+
+
+def about_an_edge():
+    """Return a posture about an edge; flat on the flat, those beside it touch the same points."""
+    motion, wheel = small_motion(), small_problem().cell.wheel
+    at_edge = np.abs(motion.contact_position) > wheel.flat_end + 5.0
+    grinds = [k for k, s in enumerate(motion.stretch) if s is Stretch.GRIND and at_edge[k]]
+    return grinds[len(grinds) // 4]
+
+
+def test_a_posture_off_the_wheel_costs_its_cutter_point_alone():
+    motion, problem, k = small_motion(), small_problem(), about_an_edge()
+    q = motion.q.copy()
+    q[k, 5] += 0.02
+    found = recognised(problem, q, motion.duration)
+    labels = zip(found.motion.cutter_point, found.motion.stretch, strict=True)
+    ground = [int(point) for point, stretch in labels if stretch is Stretch.GRIND]
+    assert ground == [p for p in range(len(problem.points)) if p != motion.cutter_point[k]]
+    assert found.motion.stretch[k] is Stretch.BETWEEN
+    assert any("off the way" in one.message for one in found.findings)
+
+
+def test_nothing_is_recognised_where_nothing_is_ground():
+    found = recognised(tiny_problem(), tiny_motion().q[:2])
+    assert set(found.motion.stretch) == {Stretch.HOME}
+    assert (found.motion.pass_index == -1).all()
+
+
+def test_an_approach_from_the_side_is_no_approach():
+    motion, problem = tiny_motion(), tiny_problem()
+    k = next(k for k, s in enumerate(motion.stretch) if s is Stretch.APPROACH)
+    q = motion.q.copy()
+    q[k, 0] += 0.01
+    found = recognised(problem, q, motion.duration).motion
+    assert found.stretch[k] is Stretch.HOME
+    # the next one is now where the approach begins: the move to it is free
+    assert found.stretch[k + 1] is Stretch.HOME
+    assert found.stretch[k + 2 : k + 4] == motion.stretch[k + 2 : k + 4]
+
+
+@pytest.mark.parametrize("t", [-69.0, -40.0, -25.0, -24.9, 0.0, 3.0, 25.0, 26.0, 70.0])
+def test_contact_positions_are_those_of_the_contact_model(t):
+    wheel = small_job().cell.wheel
+    noise = np.eye(4)
+    noise[:3, 3] = [2e-6, -3e-6, 1e-6]
+    found = contact_positions(wheel, wheel.T_contact0_contact(t) @ noise)
+    assert found == pytest.approx(t, abs=0.01)
+
+
+def test_a_place_between_two_cutter_points_is_found():
+    problem = small_problem()
+    wheel, points = problem.cell.wheel, problem.points
+    place, t = 20.3, 12.5
+    Ts_cutter = frames_at(points, np.array([place]))
+    Ts = wheel.T_contact0_contact(t) @ inverse(Ts_cutter)
+    found, position, apart = place_between(
+        wheel, points, Ts, np.array([[20.0, 21.0]]), np.array([[t, t]])
+    )
+    assert found[0] == pytest.approx(place, abs=1e-3)
+    assert position[0] == pytest.approx(t, abs=0.01)
+    assert apart[0] < 1e-6
+
+
+def test_only_points_at_their_place_on_the_wheel_touch():
+    problem = small_problem()
+    wheel, points = problem.cell.wheel, problem.points
+    T = wheel.T_contact0_contact(5.0) @ inverse(points.Ts_workpiece_cutter[20])
+    lifted = T.copy()
+    lifted[2, 3] -= 2e-4
+    found = find_touches(wheel, points, np.stack([T, lifted]), 1e-4)
+    assert 20 in found.point[found.posture == 0]
+    assert not (found.posture == 1).any()
+
+
+# alignment: a flat part touches in many places at once
+
+
+def touches(*rows):
+    posture, point, t, distance = (np.array(column) for column in zip(*rows, strict=True))
+    return Touches(posture, point, t.astype(float), distance * 1e-5)
+
+
+def test_of_many_touches_the_way_that_moves_least_is_taken():
+    # the part lies flat on the wheel: each of three postures touches all three points
+    rows = [(k, i, 4.0 * (i - k), 0.0) for k in range(3) for i in range(3)]
+    found = touches(*rows)
+    chosen = align(found, np.zeros(3, dtype=int), 1e-4, 1.0)
+    assert found.posture[chosen].tolist() == [0, 1, 2]
+    assert found.point[chosen].tolist() == [0, 1, 2]
+
+
+def test_one_posture_may_grind_two_points():
+    found = touches((0, 0, 0.0, 0.0), (0, 1, 4.0, 0.0), (3, 2, 4.0, 0.0))
+    assert len(align(found, np.zeros(3, dtype=int), 1e-4, 1.0)) == 3
+
+
+def test_order_is_kept_and_jumps_over_the_wheel_are_not_made():
+    turned = touches((0, 0, 0.0, 0.0), (1, 2, 0.0, 0.0), (2, 1, 0.0, 0.0), (3, 3, 0.0, 0.0))
+    assert len(align(turned, np.zeros(4, dtype=int), 1e-4, 1.0)) == 3
+    jump = touches((0, 0, 0.0, 0.0), (1, 1, 9.0, 0.0), (2, 2, 0.0, 0.0))
+    assert jump.point[align(jump, np.zeros(3, dtype=int), 1e-4, 1.0)].tolist() == [0, 2]
+
+
+def test_nothing_aligned_is_nothing():
+    nothing = Touches(*(np.empty(0, dtype=int) for _ in range(2)), np.empty(0), np.empty(0))
+    assert len(align(nothing, np.zeros(3, dtype=int), 1e-4, 1.0)) == 0
+
+
+def test_postures_that_grind_several_points_are_repeated():
+    motion, problem, k = small_motion(), small_problem(), about_an_edge()
+    point = int(motion.cutter_point[k])
+    Ts = problem.points.Ts_workpiece_cutter.copy()
+    Ts[point + 1] = Ts[point]
+    twice = replace(problem.points, Ts_workpiece_cutter=Ts)
+    found = recognise(problem.cell, twice, motion.q, motion.duration, np.arange(len(motion)), RULE)
+    rows = np.flatnonzero(found.source == k)
+    assert found.motion.cutter_point[rows].tolist() == [point, point + 1]
+    assert [found.motion.stretch[row] for row in rows] == [Stretch.GRIND] * 2
+    assert found.motion.duration[rows[1]] == 0.0
