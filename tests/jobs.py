@@ -28,7 +28,6 @@ QUICK = {
     "search.max_contact_step": 5,
     "search.max_contact_error_mm": 0.5,
     "wheel.contact_allowance_mm": 1.0,
-    "workpiece.sample_spacing_mm": 4.0,
     "process.approach_mm": 20,
 }
 

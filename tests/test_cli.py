@@ -153,7 +153,7 @@ def test_the_times_of_search_and_clearance_are_told_and_add_up(result):
 def test_figures_of_the_path_follow_from_the_table(result, table):
     rows, q, passes = on_wheel(table)
     path = result["path"]
-    rounding = np.deg2rad(1e-4)  # of an angle in the table
+    rounding = np.deg2rad(2.5e-3)  # the table tells whole pulses, as the program does
     assert np.ptp(q, axis=0) == pytest.approx(path["joint_ranges_rad"], abs=rounding)
     assert path["joint_range_sum_rad"] == pytest.approx(sum(path["joint_ranges_rad"]), abs=1e-5)
     within = np.diff(passes) == 0
@@ -197,7 +197,9 @@ def test_job_and_table_agree_to_the_pulse(v_run, result, table):
 def test_home_and_limits_are_kept_in_the_table(table):
     home = document()["process"]["home_deg"]
     for row in (table[0], table[-1]):
-        assert [float(row[f"{name}_deg"]) for name in JOINTS] == pytest.approx(home)
+        # to half a pulse, as the program tells it
+        angles = [float(row[f"{name}_deg"]) for name in JOINTS]
+        assert angles == pytest.approx(home, abs=1.5e-3)
     t = [float(row["t"]) for row in table if row["t"]]
     assert max(map(abs, t)) <= 25 + 45
 
@@ -355,7 +357,7 @@ def test_the_schema_accepts_the_v_job_and_refuses_others():
 def test_robots_are_listed_with_units_and_what_is_unverified():
     ended = opl("robots")
     assert (ended.status, ended.err) == (0, "")
-    assert "reach [mm]" in ended.out
+    assert "reach" in ended.out and "mm" in ended.out and "kg" in ended.out
     (line,) = (line for line in ended.out.splitlines() if "mh24" in line)
     assert "Motoman MH24" in line and "1730" in line and "R B T" in line
     told = {robot["name"]: robot for robot in json.loads(opl("robots", "--json").out)}

@@ -139,7 +139,8 @@ def run_without_path(job, out):
     result = result_in(out)
     assert result["status"] == "no_path"
     assert result["program"] is None and result["path"] is None and result["verification"] is None
-    assert ended.err == "error: " + "\n  ".join(result["reasons"]) + "\n"
+    told = [*result["reasons"], *result["remedies"]]
+    assert ended.err == "error: " + "\n  ".join(told) + "\n"
     return result["reasons"]
 
 
@@ -168,8 +169,8 @@ def test_a_joint_that_ends_short_is_named(tmp_path):
     write_robot(tmp_path / "j" / "tight", {"S": (60, 180)})
     changes = {"robot": "tight", "process.home_deg": [90, -45, -50, 0, 50, -180]}
     first, *why = run_without_path(write_job(tmp_path / "j", changes), tmp_path / "out")
-    assert first.startswith("no path: no free posture at cutter point 0 (0 of 18 reached)")
-    assert why == ["cutter points 0 to 17 (pass 1): nothing is free: 100 % beyond the limits of S"]
+    assert first.startswith("no path: no free posture at cutter point 0 (0 of 19 reached)")
+    assert why == ["cutter points 0 to 18 (pass 1): nothing is free: 100 % beyond the limits of S"]
 
 
 def test_an_obstacle_in_the_way_is_named_with_what_hits_it(tmp_path):
@@ -197,7 +198,7 @@ def test_what_the_planner_overlooks_pybullet_finds_and_no_program_is_written(tmp
     assert result["status"] == "unsafe"
     assert result["program"] is None
     assert result["verification"]["collisions"] > 0
-    assert result["path"]["nodes"] == 18
+    assert result["path"]["nodes"] == 19
     assert any("part and post: " in reason for reason in result["reasons"])
     first, *further = ended.err.splitlines()
     assert first == "error: planned, but not proven safe; no program was written"

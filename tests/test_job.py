@@ -7,6 +7,7 @@ import pytest
 import trimesh
 from jobs import GONE, V_JOB, V_SHAPE, document, opl, write_job, write_robot, write_surface
 
+from opl.cell.robot import known_robots
 from opl.errors import InputError
 from opl.geometry.frames import inverse
 from opl.job import load
@@ -126,8 +127,9 @@ def test_every_job_that_comes_with_opl_is_valid():
             "wheel.T_base_contact0_mm: must be a list, got {'x': 1}",
         ),
         (
-            {"robot": "kr16"},
-            "robot: unknown robot 'kr16'; known: mh24, or a folder with a robot.yaml",
+            {"robot": "mh99"},
+            f"robot: unknown robot 'mh99'; known: {', '.join(known_robots())}, or a folder with a "
+            "robot.yaml",
         ),
         (
             {"process.home_deg": [15, -45, -50, 0, 50, 500]},
@@ -139,7 +141,10 @@ def test_every_job_that_comes_with_opl_is_valid():
             "there is room for 5",
         ),
         ({"passes.plane_normal": [0, 0, 0]}, "passes.plane_normal: must not be zero"),
-        ({"passes.order": "spiral"}, "passes.order: must be 'one_way' or 'zigzag', got 'spiral'"),
+        (
+            {"passes.order": "spiral"},
+            "passes.order: must be 'one_way', 'zigzag', 'both' or 'shortest', got 'spiral'",
+        ),
         (
             {"search.max_contact_error_mm": 0.3},
             "search.max_contact_error_mm: must be larger than passes.bow_height_mm, which is part "
@@ -178,7 +183,7 @@ def test_a_surface_out_of_reach_is_refused(tmp_path):
     message = one_message(write_job(tmp_path, {"wheel.T_base_contact0_mm": far}))
     assert message == (
         "workpiece.surface: out of reach of Motoman MH24 at every contact position: cutter points "
-        "0-17 of 18; check wheel.T_base_contact0_mm and fixture.T_flange_workpiece_mm"
+        "0-18 of 19; check wheel.T_base_contact0_mm and fixture.T_flange_workpiece_mm"
     )
 
 
@@ -234,20 +239,18 @@ def test_a_file_that_is_no_mesh_is_refused(tmp_path):
 
 def test_a_surface_without_a_normal_is_refused_with_the_place(tmp_path):
     job = write_job(tmp_path)
-    line = [[[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]], [[25.0, 0.0, 0.0], [25.0, 30.0, 0.0]]]
+    # on the flat bottom of the solid; the surface stands still where v begins
+    edges = [[[x, -54.0, 18.5654], [x, -54.0, 18.5654], [x, -26.0, 18.5654]] for x in (-12.5, 12.5)]
     write_surface(
         tmp_path / "surface.json",
-        degree_v=1,
         knots_u=[0, 0, 1, 1],
-        knots_v=[0, 0, 1, 1],
-        control_points_mm=line,
-        weights=[[1.0, 1.0], [1.0, 1.0]],
+        knots_v=[0, 0, 0, 1, 1, 1],
+        control_points_mm=edges,
+        weights=[[1.0] * 3, [1.0] * 3],
     )
-    # planes along x, the first of them through the corner where both ends of v meet
-    job = write_job_with_surface(job, {"passes.plane_normal": [0, 1, 0], "passes.margin_mm": 0})
-    message = one_message(job)
+    message = one_message(write_job_with_surface(job, {}))
     assert message.startswith("workpiece.surface: the surface has no normal at (u, v) = (")
-    assert "point (0, 0, 0) mm: du x dv is zero" in message
+    assert "-54, 18.57) mm: du x dv is zero" in message
 
 
 def write_job_with_surface(job, changes):

@@ -8,7 +8,7 @@ from surfaces import profile_distance
 
 from opl.errors import InputError
 from opl.geometry.mesh import TriangleMesh, load_mesh, surface_samples
-from opl.geometry.nurbs import load_surface
+from opl.geometry.surface_file import load_surface
 from opl.resources import folder
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [30.0, 0.0, 0.0], [0.0, 20.0, 0.0], [0.0, 0.0, 10.0]])

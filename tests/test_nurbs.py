@@ -2,7 +2,7 @@ import json
 
 import numpy as np
 import pytest
-from geomdl import NURBS
+from geomdl.evaluators import SurfaceEvaluatorRational
 from surfaces import (
     cylinder_patch,
     graph,
@@ -14,7 +14,8 @@ from surfaces import (
 )
 
 from opl.errors import InputError
-from opl.geometry.nurbs import DegenerateNormalError, NurbsSurface, load_surface
+from opl.geometry.nurbs import DegenerateNormalError, NurbsSurface
+from opl.geometry.surface_file import load_faces, load_surface
 from opl.resources import folder
 
 GOOD_FILE = {
@@ -67,24 +68,38 @@ def test_a_hollow_has_negative_curvature():
     assert (bowl.principal_curvatures(np.array([0.5, 0.5])) < 0.0).all()
 
 
-@pytest.mark.parametrize("seed", range(8))
-def test_points_and_derivatives_agree_with_geomdl_on_random_rational_surfaces(seed):
-    rng = np.random.default_rng(seed)
-    surface = random_surface(rng)
-    other = NURBS.Surface(normalize_kv=False)
-    other.degree_u, other.degree_v = surface.degree_u, surface.degree_v
-    homogeneous = np.concatenate(
-        [surface.control_points * surface.weights[..., None], surface.weights[..., None]], axis=-1
-    )
-    other.ctrlpts2d = homogeneous.tolist()
-    other.knotvector_u, other.knotvector_v = surface.knots_u.tolist(), surface.knots_v.tolist()
-    for uv in rng.random((10, 2)):
-        derivatives = surface.derivatives(uv, 2)
-        np.testing.assert_allclose(surface.point(uv), other.evaluate_single(tuple(uv)), rtol=1e-9)
-        expected = np.array(other.derivatives(*uv, order=2))
+def homogeneous(surface):
+    """Return the control net of geomdl: weighted points and weights."""
+    weights = surface.weights[..., None]
+    return np.concatenate([surface.control_points * weights, weights], axis=-1)
+
+
+def test_points_and_derivatives_agree_with_geomdl_on_a_thousand_random_rational_surfaces():
+    rng = np.random.default_rng(0)
+    worst = 0.0
+    for _ in range(1000):
+        surface = random_surface(rng)
+        uv = rng.random(2)
+        # the algorithm itself: building a geomdl surface costs more than asking it
+        found = SurfaceEvaluatorRational().derivatives(
+            {
+                "degree": (surface.degree_u, surface.degree_v),
+                "knotvector": (surface.knots_u.tolist(), surface.knots_v.tolist()),
+                "control_points": tuple(homogeneous(surface).reshape(-1, 4).tolist()),
+                "size": surface.weights.shape,
+                "dimension": 3,
+                "pdimension": 2,
+                "rational": True,
+                "precision": 18,
+            },
+            parpos=tuple(uv),
+            deriv_order=2,
+        )
+        expected, derivatives = np.array(found), surface.derivatives(uv, 2)
         for k, m in [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]:
             scale = 1.0 + np.abs(expected[k, m]).max()
-            np.testing.assert_allclose(derivatives[k, m] / scale, expected[k, m] / scale, atol=1e-9)
+            worst = max(worst, np.abs(derivatives[k, m] - expected[k, m]).max() / scale)
+    assert worst < 1e-10
 
 
 def test_results_have_the_shape_of_the_parameters():
@@ -170,20 +185,20 @@ def test_a_file_in_millimetres_becomes_a_surface_in_metres(tmp_path):
     [
         ({"knots_u": None}, "knots_u: is missing"),
         ({"degree": 2}, "degree: unknown key"),
-        ({"knots_u": [0, 0, "1", 1]}, r"knots_u\.2: input should be a valid number, got '1'"),
+        ({"knots_u": [0, 0, "1", 1]}, r"knots_u\.2: .*'1'"),
         ({"knots_u": [0, 0, 1]}, r"knots_u: must be 4 values"),
         ({"weights": [[1, 1], [1]]}, r"weights: must be rows of one length, got \[2, 1\]"),
         ({"weights": [[1, 1], [1, -3]]}, "weights: must be positive, got -3"),
         (
             {"control_points_mm": [[[0, 0, 0], [0, 20]], [[10, 0, 0], [10, 20, 0]]]},
-            r"control_points_mm\.0\.1: .* 3 items",
+            r"control_points_mm\.0\.1: .* 3 ",
         ),
         (
             {"control_points_mm": [[[0, 0, 0]], [[10, 0, 0], [10, 20, 0]]]},
             r"control_points_mm: must be rows of one length, got \[1, 2\]",
         ),
-        ({"control_points_mm": []}, "control_points_mm: .*at least 1 item"),
-        ({"control_points_mm": [[], []]}, r"control_points_mm\.1: .*at least 1 item"),
+        ({"control_points_mm": []}, "control_points_mm: .*at least 1"),
+        ({"control_points_mm": [[], []]}, r"control_points_mm\.1: .*at least 1"),
     ],
 )
 def test_a_bad_file_is_refused_with_file_and_key(tmp_path, change, message):
@@ -198,6 +213,49 @@ def test_a_bad_file_is_refused_with_file_and_key(tmp_path, change, message):
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         load_surface(tmp_path / "none.json")
+
+
+def test_a_periodic_surface_closes_smoothly(tmp_path):
+    angles = 2.0 * np.pi * np.arange(8) / 8
+    ring = [[[20 * np.cos(a), 20 * np.sin(a), z] for z in (0.0, 30.0)] for a in angles]
+    content = {
+        "degree_u": 3,
+        "degree_v": 1,
+        "knots_u": list(range(9)),
+        "knots_v": [0, 0, 1, 1],
+        "periodic_u": True,
+        "control_points_mm": ring,
+        "weights": np.ones((8, 2)).tolist(),
+    }
+    path = tmp_path / "ring.json"
+    path.write_text(json.dumps(content))
+    surface = load_surface(path)
+    np.testing.assert_array_equal(surface.domain, [[0.0, 0.0], [8.0, 1.0]])
+    start, end = (surface.derivatives(np.array([u, 0.5]), 2) for u in (0.0, 8.0))
+    np.testing.assert_allclose(start, end, atol=1e-15)
+    # turned by one control point it is the same surface
+    first, second = surface.point(np.array([[0.3, 0.0], [1.3, 0.0]]))
+    c = np.cos(np.pi / 4)
+    np.testing.assert_allclose(
+        [c * first[0] - c * first[1], c * first[0] + c * first[1]], second[:2], atol=1e-15
+    )
+    path.write_text(json.dumps({**content, "knots_u": list(range(12))}))
+    with pytest.raises(InputError, match=r"knots_u: must be 9 values, one more .*periodic.*got 12"):
+        load_surface(path)
+
+
+def test_a_file_may_hold_several_faces_and_holes(tmp_path):
+    path = tmp_path / "faces.json"
+    loops = [[[0, 0], [1, 0], [1, 1], [0, 1]], [[0.4, 0.4], [0.6, 0.4], [0.5, 0.6]]]
+    path.write_text(json.dumps({"faces": [GOOD_FILE, {**GOOD_FILE, "trim_loops": loops}]}))
+    whole, holed = load_faces(path)
+    assert whole.trim is None
+    inside = holed.trim.contains(np.array([[0.1, 0.1], [0.5, 0.5], [1.1, 0.5]]))
+    np.testing.assert_array_equal(inside, [True, False, False])
+    bad = {**GOOD_FILE, "weights": [[1, 1], [1, -3]]}
+    path.write_text(json.dumps({"faces": [GOOD_FILE, bad]}))
+    with pytest.raises(InputError, match=r"faces\.1\.weights: must be positive, got -3"):
+        load_faces(path)
 
 
 def test_the_v_part_has_the_stated_profile():

@@ -5,8 +5,11 @@ import pytest
 from surfaces import cylinder_patch, graph, plane_patch, sphere_patch
 
 from opl.geometry.frames import inverse, rotation_angle
-from opl.geometry.nurbs import DegenerateNormalError, NurbsSurface, load_surface
-from opl.geometry.toolpath import CutterPoints, equal_section_passes
+from opl.geometry.nurbs import DegenerateNormalError, NurbsSurface
+from opl.geometry.passes import Order, Passes, lay_passes
+from opl.geometry.patchwork import Face, Patchwork
+from opl.geometry.surface_file import load_surface
+from opl.geometry.toolpath import CutterPoints
 from opl.resources import folder
 
 X, Y, Z = np.eye(3)
@@ -17,13 +20,14 @@ DEFAULTS = {
     "rows": None,
     "max_bow_height": 0.05e-3,
     "largest_step": 4e-3,
-    "zigzag": False,
-    "reversed_normal": False,
 }
 
 
-def passes(surface, plane_normal, **changes):
-    return equal_section_passes(surface, plane_normal, **{**DEFAULTS, **changes})
+def passes(surface, plane_normal, zigzag=False, reversed_normal=False, **changes):
+    order = Order.ZIGZAG if zigzag else Order.ONE_WAY
+    plan = Passes(plane_normal, order=order, **{**DEFAULTS, **changes})
+    whole = Patchwork((Face(surface, -1.0 if reversed_normal else 1.0),))
+    return lay_passes(whole, plan).points
 
 
 def v_part():
@@ -281,15 +285,25 @@ def test_zigzag_travels_all_the_curves_of_a_row_backwards():
     )
 
 
-def test_a_pass_through_a_pole_is_refused_and_the_place_named():
+def test_a_pass_through_a_pole_keeps_the_normals_of_the_sphere():
     cap = sphere_patch(0.05, longitude=(0.0, 2.0), latitude=(0.2, np.pi / 2))
     bisector = np.array([-np.sin(1.0), np.cos(1.0), 0.0])
-    with pytest.raises(
-        DegenerateNormalError, match=r"no normal at \(u, v\) = \(.*, 1\), .*50\) mm"
-    ):
-        passes(cap, bisector, rows=1)
-    # beside the pole there is nothing to refuse
+    Ts = passes(cap, bisector, rows=1).Ts_workpiece_cutter
+    np.testing.assert_allclose(Ts[:, :3, 2], Ts[ORIGINS] / 0.05, atol=1e-5)
+    assert np.linalg.norm(Ts[ORIGINS] - 0.05 * Z, axis=1).min() < 1e-5
     assert passes(cap, Z, rows=3).n_passes == 3
+
+
+def test_a_pass_through_a_cusp_is_refused_and_the_place_named():
+    # both control points of the middle row coincide with their neighbours: du vanishes there
+    net = np.array(
+        [[[0.0, y, 0.0], [0.02, y, 0.01], [0.02, y, 0.01], [0.03, y, 0.0]] for y in (0.0, 0.03)]
+    )
+    knots = np.array([0.0, 0.0, 0.4, 0.6, 1.0, 1.0])
+    line = np.array([0.0, 0.0, 1.0, 1.0])
+    cusp = NurbsSurface(1, 1, line, knots, net, np.ones((2, 4)))
+    with pytest.raises(DegenerateNormalError, match=r"no normal at \(u, v\) = \(.*, 0\.4\)"):
+        passes(cusp, Y, rows=1)
 
 
 def test_a_plane_that_only_touches_the_surface_is_refused():

@@ -19,6 +19,9 @@ _SUFFIXES = (".stl", ".ply", ".obj")
 # a closed mesh with less than this fraction of the volume of its bounding cube is flat
 _FLAT_VOLUME = 1e-9
 
+# a triangle with less than this fraction of the square of its longest edge has no area
+_FLAT_AREA = 1e-12
+
 
 @dataclass(frozen=True, eq=False)
 class TriangleMesh:
@@ -74,6 +77,46 @@ def load_mesh(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
         InputError: If the file cannot be read, has no triangles, or if they do not enclose a
             volume.
     """
+    mesh = _read(path)
+    if not mesh.is_watertight:
+        raise InputError(str(path), "is not closed: a solid without holes is needed")
+    if not mesh.is_winding_consistent:
+        raise InputError(str(path), "has neighbouring triangles that face opposite sides")
+    solid = TriangleMesh(_METRES[unit] * np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    if abs(solid.volume) <= _FLAT_VOLUME * np.ptp(solid.vertices, axis=0).max() ** 3:
+        raise InputError(str(path), "encloses no volume")
+    return solid if solid.volume > 0.0 else TriangleMesh(solid.vertices, solid.faces[:, ::-1])
+
+
+def load_triangles(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
+    """Read triangles, which need not enclose anything, from an STL, PLY or OBJ file.
+
+    Corners at the same place become one vertex; triangles without area are left out.
+
+    Args:
+        path: The file.
+        unit: What one unit of the file is; mesh files do not say.
+
+    Raises:
+        InputError: If the file cannot be read, has no triangles with an area, or if neighbouring
+            triangles face opposite sides.
+    """
+    mesh = _read(path)
+    a, b, c = np.moveaxis(np.asarray(mesh.triangles), 1, 0)
+    longest = np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=2).max(axis=0)
+    twice_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    flat = twice_area <= _FLAT_AREA * longest**2
+    if flat.all():
+        raise InputError(str(path), "holds no triangle with an area")
+    faces = np.asarray(mesh.faces)[~flat]
+    directed = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    if len(np.unique(directed, axis=0)) < len(directed):
+        raise InputError(str(path), "has neighbouring triangles that face opposite sides")
+    return TriangleMesh(_METRES[unit] * np.asarray(mesh.vertices), faces)
+
+
+def _read(path: Path) -> trimesh.Trimesh:
+    """Return what a file holds, in its own unit, corners at the same place merged."""
     if path.suffix.lower() not in _SUFFIXES:
         raise InputError(str(path), f"must be one of {', '.join(_SUFFIXES)}")
     try:
@@ -89,14 +132,7 @@ def load_mesh(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
         raise InputError(str(path), "holds no triangles")
     if not np.isfinite(mesh.vertices).all():
         raise InputError(str(path), "has corners that are not finite")
-    if not mesh.is_watertight:
-        raise InputError(str(path), "is not closed: a solid without holes is needed")
-    if not mesh.is_winding_consistent:
-        raise InputError(str(path), "has neighbouring triangles that face opposite sides")
-    solid = TriangleMesh(_METRES[unit] * np.asarray(mesh.vertices), np.asarray(mesh.faces))
-    if abs(solid.volume) <= _FLAT_VOLUME * np.ptp(solid.vertices, axis=0).max() ** 3:
-        raise InputError(str(path), "encloses no volume")
-    return solid if solid.volume > 0.0 else TriangleMesh(solid.vertices, solid.faces[:, ::-1])
+    return mesh
 
 
 def surface_samples(mesh: TriangleMesh, spacing: float) -> Array:

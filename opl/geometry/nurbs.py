@@ -1,4 +1,4 @@
-"""Rational B-spline (NURBS) surfaces and the file they are read from.
+"""Rational B-spline (NURBS) surfaces.
 
 Equation numbers are those of Piegl and Tiller, The NURBS Book, 2nd edition.
 """
@@ -7,15 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import comb
-from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 from scipy.interpolate import NdBSpline
 
-from opl import documents
-from opl.errors import InputError
 from opl.geometry.frames import Array
 
 # du x dv below this fraction of its average over the surface is taken for zero
@@ -157,9 +152,9 @@ class NurbsSurface:
                 outside the domain.
         """
         S = self.derivatives(uv, 1)
-        return self._unit_normal(uv, S)
+        return self.unit_normal(uv, S)
 
-    def principal_curvatures(self, uv: Array) -> Array:
+    def principal_curvatures(self, uv: Array, S: Array | None = None) -> Array:
         """Return the smallest and the largest normal curvature in [1/m], shape (..., 2).
 
         They are the eigenvalues of the second fundamental form in the first (do Carmo, Differential
@@ -168,12 +163,14 @@ class NurbsSurface:
 
         Args:
             uv: Parameters, shape (..., 2).
+            S: What `derivatives` of order 2 returned for them, if that is known.
 
         Raises:
             DegenerateNormalError: Where the surface has no normal.
         """
-        S = self.derivatives(uv, 2)
-        n = self._unit_normal(uv, S)
+        if S is None:
+            S = self.derivatives(uv, 2)
+        n = self.unit_normal(uv, S)
         du, dv = S[..., 1, 0, :], S[..., 0, 1, :]
         E, F, G = (np.sum(a * b, axis=-1) for a, b in ((du, du), (du, dv), (dv, dv)))
         # sign turned: positive means bending away from the normal
@@ -184,7 +181,16 @@ class NurbsSurface:
         half_difference = np.sqrt(np.maximum(mean * mean - gauss, 0.0))
         return np.stack([mean - half_difference, mean + half_difference], axis=-1)
 
-    def _unit_normal(self, uv: Array, S: Array) -> Array:
+    def unit_normal(self, uv: Array, S: Array) -> Array:
+        """Return the unit normals of known derivatives.
+
+        Args:
+            uv: Parameters, shape (..., 2).
+            S: What `derivatives` returned for them.
+
+        Raises:
+            DegenerateNormalError: Where du x dv is zero.
+        """
         normal = np.cross(S[..., 1, 0, :], S[..., 0, 1, :])
         area = np.linalg.norm(normal, axis=-1, keepdims=True)
         degenerate = ~(area[..., 0] > self._smallest_area)  # catches nan too
@@ -218,45 +224,3 @@ def _check_knots(axis: str, degree: int, knots: Array, n_points: int) -> None:
             f"knots_{axis}: inner knots may occur at most {degree} times or the surface tears, got "
             f"{inner[multiplicity > degree][0]:g} more often"
         )
-
-
-_Point = Annotated[list[float], Field(min_length=3, max_length=3)]
-_Row = Annotated[list[_Point], Field(min_length=1)]
-
-
-class _SurfaceFile(documents.Document):
-    """A surface as it is written in a file."""
-
-    degree_u: int
-    degree_v: int
-    knots_u: list[float]
-    knots_v: list[float]
-    control_points_mm: Annotated[list[_Row], Field(min_length=1)]
-    weights: list[list[float]]
-
-
-def load_surface(path: Path) -> NurbsSurface:
-    """Read a surface from a JSON or YAML file.
-
-    Its keys are the attributes of `NurbsSurface`, with ``control_points_mm`` in millimetres for
-    ``control_points``: a list along u of lists along v of [x, y, z].
-
-    Raises:
-        InputError: If the file cannot be read or does not hold a surface.
-    """
-    content = documents.read(path, _SurfaceFile)
-    for key in ("control_points_mm", "weights"):
-        lengths = [len(row) for row in getattr(content, key)]
-        if len(set(lengths)) > 1:
-            raise InputError(str(path), f"{key}: must be rows of one length, got {lengths}")
-    try:
-        return NurbsSurface(
-            degree_u=content.degree_u,
-            degree_v=content.degree_v,
-            knots_u=np.array(content.knots_u),
-            knots_v=np.array(content.knots_v),
-            control_points=1e-3 * np.array(content.control_points_mm),
-            weights=np.array(content.weights),
-        )
-    except ValueError as error:
-        raise InputError(str(path), str(error)) from error

@@ -12,107 +12,22 @@ from typing import cast
 
 import numpy as np
 from contourpy import LineType, contour_generator
+from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from opl.geometry.frames import Array, from_axes
-from opl.geometry.nurbs import NurbsSurface
+from opl.geometry.curves import curvature_jumps
+from opl.geometry.frames import Array
+from opl.geometry.section import CONVERGED, MAX_NEWTON_STEPS, ON_PLANE, Section
 from opl.geometry.surface_grid import SurfaceGrid
 
-# points of a curve lie this near to their plane [m], on the surface they lie exactly; the search
-# for them ends well below
-_ON_PLANE = 1e-9
-_CONVERGED = 1e-12
-_MAX_NEWTON_STEPS = 60
+# how far beside a knot its two sides are looked at, as a fraction of the way to the next node
+_BESIDE = 1e-6
 
-# sine of the angle between surface and plane below which they touch rather than cut
-_TOUCHING = 1e-6
+# normals on both sides of a knot that differ by more than this make a kink [rad]
+_KINK = 1e-3
 
 # largest turn of the tangent between two nodes of a curve [rad]
 _LARGEST_TURN = 0.5
-
-
-@dataclass(frozen=True, eq=False)
-class Section:
-    """A plane n . p = offset through a surface whose outside is known.
-
-    Attributes:
-        surface: The surface.
-        plane_normal: Unit normal n of the plane, shape (3,).
-        offset: Distance of the plane from the origin along n in [m].
-        outward: 1.0 if du x dv points outward, -1.0 if inward.
-    """
-
-    surface: NurbsSurface
-    plane_normal: Array
-    offset: float
-    outward: float
-
-    def frames(self, uv: Array) -> Array:
-        """Return Ts_workpiece_cutter, shape (..., 4, 4): z outward normal, x = z cross n.
-
-        The tangent of the curve is normal to both the surface's and the plane's normal, so x is
-        exact where z is.
-
-        Args:
-            uv: Parameters of points of the section, shape (..., 2).
-
-        Raises:
-            DegenerateNormalError: Where the surface has no normal.
-            ValueError: Where the plane touches the surface, so that the curve has no tangent.
-        """
-        z = self.outward * self.surface.normal(uv)
-        x = np.cross(z, self.plane_normal)
-        points = self.surface.point(uv)
-        touching = np.linalg.norm(x, axis=-1) < _TOUCHING
-        if touching.any():
-            place = 1e3 * points[touching][0]
-            raise ValueError(
-                f"the plane {1e3 * self.offset:.4g} mm along its normal touches the surface at "
-                f"({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}) mm and does not cut it there"
-            )
-        return from_axes(z, x, points)
-
-    def closest(self, uv: Array, targets: Array, tangents: Array) -> Array:
-        """Return the parameters of the points of the section abreast of given points.
-
-        Newton's method on two equations: the point lies on the plane, and its difference to the
-        target is normal to the tangent.
-
-        Args:
-            uv: First guesses, shape (k, 2).
-            targets: Points near the section in [m], shape (k, 3).
-            tangents: Directions of the curve there, shape (k, 3).
-
-        Raises:
-            ValueError: Where there is no such point in the domain.
-        """
-        lower, upper = self.surface.domain
-        for _ in range(_MAX_NEWTON_STEPS):
-            S = self.surface.derivatives(uv, 1)
-            points, gradients = S[:, 0, 0], np.stack([S[:, 1, 0], S[:, 0, 1]], axis=1)
-            along = np.sum((points - targets) * tangents, axis=1)
-            residuals = np.stack([points @ self.plane_normal - self.offset, along], axis=1)
-            jacobian = np.stack(
-                [gradients @ self.plane_normal, np.einsum("kij,kj->ki", gradients, tangents)],
-                axis=1,
-            )
-            # the pseudo-inverse, as the matrix may be singular at a guess
-            step = np.linalg.pinv(jacobian) @ residuals[..., None]
-            previous, uv = uv, np.clip(uv - step[..., 0], lower, upper)
-            if np.all(np.abs(uv - previous) <= _CONVERGED * (upper - lower)):
-                break
-        distance = np.abs(self.surface.point(uv) @ self.plane_normal - self.offset)
-        if (distance > _ON_PLANE).any():
-            raise self.lost(targets[np.argmax(distance)])
-        return uv
-
-    def lost(self, point: Array) -> ValueError:
-        """Return the error that a curve cannot be followed near a point [m]."""
-        x, y, z = 1e3 * point
-        return ValueError(
-            f"the plane {1e3 * self.offset:.4g} mm along its normal: its curve on the surface "
-            f"cannot be followed near ({x:.4g}, {y:.4g}, {z:.4g}) mm; is the surface smooth there?"
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,32 +39,44 @@ class SectionCurve:
         uv: Parameters of its nodes, shape (k, 2).
         arc_length: Arc length at its nodes in [m], from 0, shape (k,).
         positions: The curve as a function of its arc length, (...,) to (..., 3).
+        breaks: Inner arc lengths in [m] where the curvature jumps, shape (b,).
     """
 
     section: Section
     uv: Array
     arc_length: Array
     positions: CubicHermiteSpline
+    breaks: Array
 
     @property
     def length(self) -> float:
         """Return the length in [m]."""
         return float(self.arc_length[-1])
 
-    def frames(self, arc_length: Array) -> Array:
-        """Return the exact Ts_workpiece_cutter at given arc lengths [m], shape (k, 4, 4)."""
+    def parameters(self, arc_length: Array) -> Array:
+        """Return the exact (u, v) at given arc lengths [m], shape (k, 2)."""
         uv = np.stack([np.interp(arc_length, self.arc_length, p) for p in self.uv.T], axis=1)
-        # the ends are nodes, and one on the border may not be moved across it
-        inner = (arc_length > 0.0) & (arc_length < self.length)
+        # a node may not be moved: not across the border, nor off the knot on which a break lies
+        after = np.minimum(self.arc_length.searchsorted(arc_length), len(self.arc_length) - 1)
+        inner = self.arc_length[after] != arc_length
         targets, tangents = self.positions(arc_length), self.positions(arc_length, nu=1)
         uv[inner] = self.section.closest(uv[inner], targets[inner], tangents[inner])
-        return self.section.frames(uv)
+        return uv
+
+    def frames(self, arc_length: Array) -> Array:
+        """Return the exact Ts_workpiece_cutter at given arc lengths [m], shape (k, 4, 4)."""
+        return self.section.frames(self.parameters(arc_length))
+
+    def bending(self, arc_length: Array) -> Array:
+        """Return the curvature of the surface in [1/m] in axes x and y, shape (k, 2, 2)."""
+        return self.section.bending(self.parameters(arc_length))
 
 
 def section_curves(section: Section, grid: SurfaceGrid, tolerance: float) -> list[SectionCurve]:
-    """Return the curves in which a plane cuts a surface, in order along their direction.
+    """Return the curves in which a plane cuts a surface.
 
-    A curve that crosses the seam of a closed surface is two curves that meet there.
+    A curve that crosses the seam of a closed surface is two curves that meet there. They come in
+    no order.
 
     Args:
         section: Plane and surface.
@@ -165,15 +92,11 @@ def section_curves(section: Section, grid: SurfaceGrid, tolerance: float) -> lis
     hair = 1e-7 * np.ptp(heights)
     level = np.clip(section.offset, heights.min() + hair, heights.max() - hair)
     contours = contour_generator(grid.u, grid.v, heights.T, line_type=LineType.Separate)
-    curves = [
+    return [
         _refined(section, uv, tolerance)
         for line in cast(list[Array], contours.lines(level))
         if len(uv := _crossings(section, grid, line)) > 1
     ]
-    if not curves:
-        return []
-    along = sum(curve.positions(curve.length) - curve.positions(0.0) for curve in curves)
-    return sorted(curves, key=lambda curve: float(along @ curve.positions(0.5 * curve.length)))
 
 
 def _crossings(section: Section, grid: SurfaceGrid, line: Array) -> Array:
@@ -205,11 +128,11 @@ def _crossings(section: Section, grid: SurfaceGrid, line: Array) -> Array:
     left_height = height(left)[0]
     # where two grid lines meet may be the root but for a rounding error: no change of sign
     end = np.where(x - left < right - x, left, right)
-    at_end = np.abs(height(end)[0]) <= _ON_PLANE
+    at_end = np.abs(height(end)[0]) <= ON_PLANE
     x, left, right = (np.where(at_end, end, values) for values in (x, left, right))
-    for _ in range(_MAX_NEWTON_STEPS):
+    for _ in range(MAX_NEWTON_STEPS):
         heights, slopes = height(x)
-        searching = np.abs(heights) > _CONVERGED
+        searching = np.abs(heights) > CONVERGED
         if not searching.any():
             break
         on_left = heights * left_height > 0.0
@@ -219,9 +142,9 @@ def _crossings(section: Section, grid: SurfaceGrid, line: Array) -> Array:
         inside = (newton > left) & (newton < right)
         x = np.where(searching, np.where(inside, newton, 0.5 * (left + right)), x)
     # a plane sought just inside the border may not cross it at all
-    uv = uv[np.abs(height(x)[0]) <= _ON_PLANE]
+    uv = uv[np.abs(height(x)[0]) <= ON_PLANE]
     chords = np.linalg.norm(np.diff(section.surface.point(uv), axis=0), axis=1)
-    return uv[np.append(chords > _ON_PLANE, True)] if len(uv) else uv
+    return uv[np.append(chords > ON_PLANE, True)] if len(uv) else uv
 
 
 def _refined(section: Section, uv: Array, tolerance: float) -> SectionCurve:
@@ -252,10 +175,48 @@ def _refined(section: Section, uv: Array, tolerance: float) -> SectionCurve:
         # a segment as short as the tolerance is a kink of the surface: nothing to refine
         bad = ((error > tolerance) | (turns > _LARGEST_TURN)) & (chords > tolerance)
         if not bad.any():
-            return SectionCurve(section, uv, arc_length, positions)
+            breaks = arc_length[_breaks(section, uv)]
+            return SectionCurve(section, uv, arc_length, positions, breaks)
         # halves must be shorter than the whole, or the refinement would never end
         halves = np.linalg.norm(np.stack([points[:-1], points[1:]]) - exact[:, :3, 3], axis=2)
         astray = bad & (halves.max(axis=0) >= chords)
         if astray.any():
             raise section.lost(targets[np.argmax(astray)])
         uv = np.insert(uv, np.flatnonzero(bad) + 1, middles[bad], axis=0)
+
+
+def _breaks(section: Section, uv: Array) -> NDArray[np.int64]:
+    """Return which inner nodes lie on a knot where the curvature of the curve jumps, shape (b,).
+
+    Every crossing of a knot is a node. A knot tells nothing by itself: that of an exact circle in
+    several rational pieces is smooth.
+    """
+    surface = section.surface
+    weak = [
+        _weak_knots(knots, degree)
+        for knots, degree in (
+            (surface.knots_u, surface.degree_u),
+            (surface.knots_v, surface.degree_v),
+        )
+    ]
+    span = np.ptp(surface.domain, axis=0)
+    on_knot = np.zeros(len(uv), dtype=bool)
+    for axis, knots in enumerate(weak):
+        if len(knots):
+            gap = np.abs(uv[:, axis, None] - knots).min(axis=1)
+            on_knot |= gap <= 1e-9 * span[axis]
+    nodes = np.flatnonzero(on_knot[1:-1]) + 1
+    if not len(nodes):
+        return nodes
+    before = uv[nodes] + _BESIDE * (uv[nodes - 1] - uv[nodes])
+    after = uv[nodes] + _BESIDE * (uv[nodes + 1] - uv[nodes])
+    jumps = curvature_jumps(section.bending(before)[:, 0, 0], section.bending(after)[:, 0, 0])
+    turns = np.linalg.norm(surface.normal(after) - surface.normal(before), axis=1)
+    return nodes[jumps | (turns > _KINK)]
+
+
+def _weak_knots(knots: Array, degree: int) -> Array:
+    """Return the inner knots across which a spline may have no continuous second derivative."""
+    inner = knots[(knots > knots[degree]) & (knots < knots[-degree - 1])]
+    values, multiplicity = np.unique(inner, return_counts=True)
+    return values[multiplicity > degree - 2]

@@ -7,16 +7,25 @@ changes within a step.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
+from opl.geometry.curves import SurfaceCurve
 from opl.geometry.frames import Array
-from opl.geometry.sections import SectionCurve
 
 # a bow is measured at its curve's own nodes and at this many more points; the largest distance may
 # lie between two of them and be larger by the fraction 1 / n^2 of a parabola
 _BOW_SAMPLES = 32
 _BOW_FRACTIONS = np.linspace(0.0, 1.0, _BOW_SAMPLES + 1)
 _MEASURED = 1.0 - 1.0 / _BOW_SAMPLES**2
+
+# rounds in which steps are shared out anew before they are laid one after the other
+_SHARINGS = 10
+
+# after half of them this fraction of the steps may be more than the fewest: a long curve over the
+# facets of a mesh has no even steps
+_SPARE = 0.02
 
 # the last step of a pass uses this fraction of what the others may use, within so many trials
 _BALANCED = 0.97
@@ -25,22 +34,73 @@ _BALANCING_TRIALS = 8
 # a step this near to its limits, as a fraction of them, needs no better one
 _LONGEST = 0.9995
 
-# fraction of the largest step that is not worth a step of its own
+# nor is it sought more finely than this fraction of its length
+_SEARCHED = 1e-5
+
+# fraction of a step that is not worth a step of its own
 _ROUNDING = 1e-9
 
 
-def balanced_steps(curve: SectionCurve, max_bow_height: float, largest_step: float) -> Array:
+def balanced_steps(curve: SurfaceCurve, max_bow_height: float, largest_step: float) -> Array:
     """Return the arc lengths of the fewest points that keep both limits, shape (k,).
 
-    The longest possible steps give the number. Then all are made smaller by the same scale as long
-    as the number stays, until the last one, which took what was left over, is like the others.
+    Both ends are points, and so is every place where the curvature jumps; the steps in between use
+    about as much of the limits as each other.
 
     Args:
         curve: What to step along.
         max_bow_height: Largest distance in [m] of the curve from the chord of a step.
         largest_step: Largest length in [m] of a step along the curve.
     """
-    best = _longest_steps(curve, max_bow_height, largest_step)
+    ends = [0.0, *curve.breaks.tolist(), curve.length]
+    spans = [
+        _balanced(curve, start, stop, max_bow_height, largest_step)
+        for start, stop in pairwise(ends)
+    ]
+    return np.concatenate([spans[0], *(span[1:] for span in spans[1:])])
+
+
+def _balanced(
+    curve: SurfaceCurve, start: float, stop: float, max_bow_height: float, largest_step: float
+) -> Array:
+    shared = _shared_out(curve, start, stop, max_bow_height, largest_step)
+    if shared is not None:
+        return shared
+    return _one_after_another(curve, start, stop, max_bow_height, largest_step)
+
+
+def _shared_out(
+    curve: SurfaceCurve, start: float, stop: float, max_bow_height: float, largest_step: float
+) -> Array | None:
+    """Return balanced steps where a few looks at all of them at once are enough, else None.
+
+    A step's size is what it uses of the limits. On a circle, and nearly so elsewhere, sizes add up
+    along the curve: their sum tells the number of steps, and steps that share it evenly are
+    balanced.
+    """
+    nodes = np.linspace(start, stop, _count((stop - start) / largest_step) + 1)
+    for trial in range(_SHARINGS):
+        sizes = _sizes(curve, nodes, max_bow_height, largest_step)
+        n = _count(float(sizes.sum()))
+        if trial >= _SHARINGS // 2:
+            n += int(_SPARE * n)
+        if sizes.max() <= 1.0 and len(sizes) <= n:
+            return nodes
+        shared = np.append(0.0, np.cumsum(sizes))
+        nodes = np.interp(np.linspace(0.0, shared[-1], n + 1), shared, nodes)
+        nodes[0], nodes[-1] = start, stop
+    return None
+
+
+def _one_after_another(
+    curve: SurfaceCurve, start: float, stop: float, max_bow_height: float, largest_step: float
+) -> Array:
+    """Return the fewest steps, balanced as well as they may be.
+
+    The longest possible steps give the number. Then all are made smaller by the same scale as long
+    as the number stays, until the last one, which took what was left over, is like the others.
+    """
+    best = _longest_steps(curve, start, stop, max_bow_height, largest_step)
     n = len(best) - 1
     # n - 1 steps of full length fall short of the end, so n steps of this scale do too
     low, high = (n - 1) / n, 1.0
@@ -52,7 +112,7 @@ def balanced_steps(curve: SectionCurve, max_bow_height: float, largest_step: flo
         scale = high * (n - 1.0 + fill + 0.01) / n
         if scale <= low:
             scale = 0.5 * (low + high)
-        nodes = _longest_steps(curve, scale**2 * max_bow_height, scale * largest_step)
+        nodes = _longest_steps(curve, start, stop, scale**2 * max_bow_height, scale * largest_step)
         if len(nodes) <= len(best):
             best, high = nodes, scale
         else:
@@ -60,32 +120,34 @@ def balanced_steps(curve: SectionCurve, max_bow_height: float, largest_step: flo
     return best
 
 
-def _longest_steps(curve: SectionCurve, max_bow_height: float, largest_step: float) -> Array:
+def _longest_steps(
+    curve: SurfaceCurve, start: float, stop: float, max_bow_height: float, largest_step: float
+) -> Array:
     """Return the arc lengths of points along a curve, each as far from the last as it may be."""
-    nodes = [0.0]
-    while nodes[-1] < curve.length:
-        nodes.append(_farthest(curve, nodes[-1], max_bow_height, largest_step))
+    nodes = [start]
+    while nodes[-1] < stop:
+        nodes.append(_farthest(curve, nodes[-1], stop, max_bow_height, largest_step))
     return np.array(nodes)
 
 
 def _farthest(
-    curve: SectionCurve, start: float, max_bow_height: float, largest_step: float
+    curve: SurfaceCurve, start: float, stop: float, max_bow_height: float, largest_step: float
 ) -> float:
-    """Return the end of the longest step from ``start``.
+    """Return the end of the longest step from ``start``, ``stop`` at most.
 
     The root of size = 1 is sought by linear interpolation; every third time the bracket is halved,
     so that it shrinks on any curve.
     """
     near, near_size = start, 0.0
     far = start + largest_step
-    if far > curve.length - _ROUNDING * largest_step:
-        far = curve.length
+    if far > stop - _ROUNDING * largest_step:
+        far = stop
     far_size = _size(curve, start, far, max_bow_height, largest_step)
-    if far_size <= 1.0 + 2.0 * _ROUNDING:
+    if far_size <= 1.0:
         return far
     trial = 0
     # the measured bow jumps a little where one more node of the curve comes in: the root may not be
-    while near_size < _LONGEST and far - near > _ROUNDING * largest_step:
+    while near_size < _LONGEST and far - near > _SEARCHED * (far - start):
         trial += 1
         aim = 0.5 * (1.0 + _LONGEST)
         fraction = (aim - near_size) / (far_size - near_size) if trial % 3 else 0.5
@@ -99,22 +161,41 @@ def _farthest(
 
 
 def _size(
-    curve: SectionCurve, start: float, end: float, max_bow_height: float, largest_step: float
+    curve: SurfaceCurve, start: float, end: float, max_bow_height: float, largest_step: float
 ) -> float:
-    """Return how much of its limits a step uses, 1.0 where one is reached; linear on a circle."""
-    bow_height = _bow_height(curve, start, end)
-    return max((end - start) / largest_step, np.sqrt(bow_height / (_MEASURED * max_bow_height)))
+    return float(_sizes(curve, np.array([start, end]), max_bow_height, largest_step)[0])
 
 
-def _bow_height(curve: SectionCurve, start: float, end: float) -> float:
-    """Return the largest distance in [m] of a curve from its chord, measured."""
-    nodes = curve.arc_length
-    inside = nodes[nodes.searchsorted(start) : nodes.searchsorted(end)]
-    points = curve.positions(np.concatenate([start + (end - start) * _BOW_FRACTIONS, inside]))
-    points -= points[0]
-    chord = points[_BOW_SAMPLES]
+def _count(size: float) -> int:
+    return max(int(np.ceil(size - _ROUNDING * max(size, 1.0))), 1)
+
+
+def _sizes(curve: SurfaceCurve, nodes: Array, max_bow_height: float, largest_step: float) -> Array:
+    """Return how much of its limits each step uses, 1.0 where one is reached; linear on a circle.
+
+    A hair over the largest step is rounding and not counted.
+    """
+    lengths = np.diff(nodes) / (largest_step * (1.0 + 2.0 * _ROUNDING))
+    return np.maximum(lengths, np.sqrt(_bow_heights(curve, nodes) / (_MEASURED * max_bow_height)))
+
+
+def _bow_heights(curve: SurfaceCurve, nodes: Array) -> Array:
+    """Return the largest distance in [m] of a curve from the chord of each step, measured."""
+    looks = nodes[:-1, None] + np.diff(nodes)[:, None] * _BOW_FRACTIONS
+    points = curve.positions(looks)
+    origins, chords = points[:, 0], points[:, -1] - points[:, 0]
+    away = _away(points - origins[:, None], chords[:, None]).max(axis=1)
+    own = curve.arc_length
+    inner = own[own.searchsorted(nodes[0], "right") : own.searchsorted(nodes[-1])]
+    step = nodes.searchsorted(inner, "right") - 1
+    np.maximum.at(away, step, _away(curve.positions(inner) - origins[step], chords[step]))
+    return np.sqrt(away)
+
+
+def _away(points: Array, chords: Array) -> Array:
+    """Return the squared distance of points from chords that begin at the origin."""
     # a closed curve may come back to where it started: no chord to divide by
-    square = max(float(chord @ chord), np.finfo(float).tiny)
-    fraction = np.minimum(np.maximum(points @ chord / square, 0.0), 1.0)
-    away = points - fraction[:, None] * chord
-    return float(np.sqrt(np.einsum("ij,ij->i", away, away).max()))
+    square = np.maximum(np.sum(chords * chords, axis=-1), np.finfo(float).tiny)
+    fraction = np.clip(np.sum(points * chords, axis=-1) / square, 0.0, 1.0)
+    away = points - fraction[..., None] * chords
+    return np.sum(away * away, axis=-1)

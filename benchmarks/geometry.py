@@ -1,0 +1,53 @@
+"""How long surface points and cutter points take. By hand: python benchmarks/geometry.py."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from opl.geometry.passes import Passes, lay_passes
+from opl.geometry.patchwork import Patchwork
+from opl.geometry.surface_file import load_faces
+
+WORKPIECES = Path(__file__).resolve().parent.parent / "workpieces"
+
+
+def best(work: Callable[[], object], repeats: int = 3) -> float:
+    """Return the shortest time of a few runs in [s]."""
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def main() -> None:
+    """Print the times."""
+    (blade,) = load_faces(WORKPIECES / "turbine_blade" / "surface.json")
+    surface = blade.surface
+    lower, upper = surface.domain
+    uv = np.random.default_rng(0).uniform(lower, upper, (100_000, 2))
+
+    def points() -> None:
+        S = surface.derivatives(uv, 2)  # the points are S[:, 0, 0]
+        surface.unit_normal(uv, S)
+        surface.principal_curvatures(uv, S)
+
+    print(f"100 000 surface points, normals, curvatures: {best(points):.3f} s")
+
+    plan = Passes(np.array([1.0, 0.0, 0.0]), 0.4e-3, 0.005e-3, 1e-3)
+    laid = lay_passes(Patchwork((blade,)), plan)
+    spent = best(lambda: lay_passes(Patchwork((blade,)), plan), 1)
+    count = len(laid.points)
+    print(
+        f"{count} cutter points with frames in {laid.points.n_passes} passes: {spent:.2f} s, "
+        f"{1e4 * spent / count:.2f} s for 10 000"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,58 @@
+"""The smooth regions of a triangle mesh: what a person calls its faces."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from opl.geometry.frames import Array
+from opl.geometry.mesh import TriangleMesh
+
+
+def face_normals(mesh: TriangleMesh) -> tuple[Array, Array]:
+    """Return the unit normal and the area in [m^2] of each triangle, shapes (m, 3) and (m,)."""
+    a, b, c = np.moveaxis(mesh.triangles, 1, 0)
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    return normals / lengths[:, None], 0.5 * lengths
+
+
+def neighbours(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pairs of triangles that share an edge, and that edge.
+
+    Args:
+        faces: Vertices of each triangle, shape (m, 3).
+
+    Returns:
+        Indices of both triangles, shape (k, 2), and of the edge's vertices, shape (k, 2).
+    """
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    owner = np.repeat(np.arange(len(faces)), 3)
+    order = np.lexsort(edges.T[::-1])
+    edges, owner = edges[order], owner[order]
+    same = (edges[1:] == edges[:-1]).all(axis=1)
+    # where three triangles meet the first pairs are as good as any
+    return np.stack([owner[:-1][same], owner[1:][same]], axis=1), edges[:-1][same]
+
+
+def smooth_regions(mesh: TriangleMesh, crease: float) -> np.ndarray:
+    """Return the region of each triangle, 0, 1, ..., the largest area first, shape (m,).
+
+    Neighbours belong together unless the edge between them is a crease.
+
+    Args:
+        mesh: The mesh; its triangles have areas.
+        crease: Angle in [rad] between two normals that makes an edge a crease.
+    """
+    normals, areas = face_normals(mesh)
+    pairs, _ = neighbours(mesh.faces)
+    cosine = np.sum(normals[pairs[:, 0]] * normals[pairs[:, 1]], axis=1)
+    first, second = pairs[cosine >= np.cos(crease)].T
+    graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(areas), len(areas)))
+    count, labels = connected_components(graph, directed=False)
+    sizes = np.bincount(labels, weights=areas, minlength=count)
+    # equal areas in the order of their first triangle, whatever the last digit says
+    rank = np.empty(count, dtype=np.int64)
+    rank[np.argsort(-np.round(sizes / sizes.max(), 6), kind="stable")] = np.arange(count)
+    return rank[labels]

@@ -1,0 +1,109 @@
+"""The file that NURBS faces are read from: JSON or YAML, millimetres."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from opl import documents
+from opl.errors import InputError
+from opl.geometry.frames import Array
+from opl.geometry.nurbs import NurbsSurface
+from opl.geometry.patchwork import Face
+from opl.geometry.trim import Trim
+
+_Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+_Parameters = Annotated[list[float], Field(min_length=2, max_length=2)]
+_Row = Annotated[list[_Point], Field(min_length=1)]
+_Loop = Annotated[list[_Parameters], Field(min_length=3)]
+
+
+class _SurfaceFile(documents.Document):
+    """A face as it is written in a file."""
+
+    degree_u: int
+    degree_v: int
+    knots_u: list[float]
+    knots_v: list[float]
+    control_points_mm: Annotated[list[_Row], Field(min_length=1)]
+    weights: list[list[float]]
+    periodic_u: bool = False
+    periodic_v: bool = False
+    trim_loops: Annotated[list[_Loop], Field(min_length=1)] | None = None
+
+
+class _FacesFile(documents.Document):
+    """Several faces that are ground as one surface."""
+
+    faces: Annotated[list[_SurfaceFile], Field(min_length=1)]
+
+
+def load_faces(path: Path) -> tuple[Face, ...]:
+    """Read faces from a JSON or YAML file: the keys of one, or a list of such under ``faces``.
+
+    The keys are the attributes of `NurbsSurface`, with ``control_points_mm`` in millimetres for
+    ``control_points``: a list along u of lists along v of [x, y, z]. With ``periodic_u`` the
+    control points along u are given once round and ``knots_u`` over one period, one more than
+    there are control points; likewise along v. ``trim_loops`` are closed polygons of [u, v]; what
+    an odd number of them encloses is there.
+
+    Raises:
+        InputError: If the file cannot be read or does not hold faces.
+    """
+    if "faces" in documents.keys(path):
+        listed = documents.read(path, _FacesFile).faces
+        return tuple(_face(path, content, f"faces.{i}.") for i, content in enumerate(listed))
+    return (_face(path, documents.read(path, _SurfaceFile), ""),)
+
+
+def load_surface(path: Path) -> NurbsSurface:
+    """Read the surface of a file that holds a single face; see `load_faces`.
+
+    Raises:
+        InputError: If the file cannot be read or does not hold a surface.
+    """
+    return load_faces(path)[0].surface
+
+
+def _face(path: Path, content: _SurfaceFile, key: str) -> Face:
+    for name in ("control_points_mm", "weights"):
+        lengths = [len(row) for row in getattr(content, name)]
+        if len(set(lengths)) > 1:
+            raise InputError(str(path), f"{key}{name}: must be rows of one length, got {lengths}")
+    net, weights = 1e-3 * np.array(content.control_points_mm), np.array(content.weights)
+    knots_u, knots_v = np.array(content.knots_u), np.array(content.knots_v)
+    try:
+        if content.periodic_u:
+            knots_u, net, weights = _unrolled("u", content.degree_u, knots_u, net, weights, 0)
+        if content.periodic_v:
+            knots_v, net, weights = _unrolled("v", content.degree_v, knots_v, net, weights, 1)
+        surface = NurbsSurface(content.degree_u, content.degree_v, knots_u, knots_v, net, weights)
+        trim = None
+        if content.trim_loops is not None:
+            trim = Trim(tuple(np.array(loop) for loop in content.trim_loops))
+    except ValueError as error:
+        raise InputError(str(path), f"{key}{error}") from error
+    return Face(surface, trim=trim)
+
+
+def _unrolled(
+    name: str, degree: int, knots: Array, net: Array, weights: Array, axis: int
+) -> tuple[Array, Array, Array]:
+    """Return knots, control points and weights of a periodic direction as of an open one."""
+    n = net.shape[axis]
+    if len(knots) != n + 1:
+        raise ValueError(
+            f"knots_{name}: must be {n + 1} values, one more than control points (periodic), "
+            f"got {len(knots)}"
+        )
+    if not 1 <= degree <= n or weights.shape != net.shape[:2]:
+        return knots, net, weights  # refused by the surface itself
+    period = knots[-1] - knots[0]
+    knots = np.concatenate(
+        [knots[-degree - 1 : -1] - period, knots, knots[1 : degree + 1] + period]
+    )
+    again = np.arange(n + degree) % n
+    return knots, np.take(net, again, axis), np.take(weights, again, axis)

@@ -1,0 +1,54 @@
+"""From the surface of a job to its cutter points, and what is doubtful about them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from opl.errors import InputError
+from opl.findings import Finding
+from opl.geometry.inspection import inspect
+from opl.geometry.nurbs import DegenerateNormalError
+from opl.geometry.passes import LaidPasses, lay_passes
+from opl.geometry.toolpath import CutterPoints
+from opl.job import Job
+
+# what errors of the geometry begin with and a job can change
+_KEYS = ("plane_normal", "rows", "kind")
+
+
+@dataclass(frozen=True)
+class Surfacing:
+    """Cutter points of a job.
+
+    Attributes:
+        laid: The cutter points, and how the surface bends there.
+        warnings: What is doubtful about them.
+    """
+
+    laid: LaidPasses
+    warnings: tuple[Finding, ...]
+
+    @property
+    def points(self) -> CutterPoints:
+        """Return the cutter points."""
+        return self.laid.points
+
+
+def cut_surface(job: Job) -> Surfacing:
+    """Cut the surface of a job into passes and look at them.
+
+    Raises:
+        InputError: If that cannot be done; names the key that is to blame.
+    """
+    try:
+        laid = lay_passes(job.surface, job.passes)
+    except DegenerateNormalError as error:
+        raise InputError(f"{job.path}: workpiece.surface", str(error)) from error
+    except ValueError as error:
+        key, _, message = str(error).partition(": ")
+        if key in _KEYS:
+            raise InputError(f"{job.path}: passes.{key}", message) from error
+        raise InputError(f"{job.path}: passes", str(error)) from error
+    cell = job.cell
+    found = inspect(job.surface, job.passes, laid, cell.wheel, cell.contact_allowance)
+    return Surfacing(laid, found)
