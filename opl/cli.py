@@ -13,16 +13,20 @@ import click
 
 from opl import __version__
 from opl import batch as batch_jobs
-from opl.cli_programs import robots, show, templates
+from opl.cli_programs import show, templates
+from opl.cli_robots import robots
+from opl.cli_surfaces import faces, points
+from opl.cli_verify import verify
 from opl.console import progress_bar, show_batch, show_check, show_outcome
 from opl.deliver import check_folder, deliver
-from opl.errors import InputError, OplError, UnsafeError
+from opl.errors import InputError, NoPathError, OplError, UnsafeError
 from opl.job import JobFile, load
 from opl.job_search import Method
 from opl.outcome import Outcome
-from opl.pipeline import cutter_points, run
+from opl.pipeline import run
 from opl.resources import folder as resource
 from opl.result import reasons, render
+from opl.surfacing import cut_surface
 
 # what cannot be read is told in one voice, by those who read it
 ANY = click.Path(path_type=Path, readable=False)
@@ -86,7 +90,8 @@ def run_job(
 def _refusal(outcome: Outcome) -> OplError:
     """Return the error that a run without a program ends with."""
     if outcome.refusal is not None:
-        return outcome.refusal
+        refusal = outcome.refusal
+        return NoPathError(refusal.message, [*refusal.reasons, *outcome.remedies])
     lines = ["planned, but not proven safe; no program was written", *reasons(outcome)]
     return UnsafeError("\n".join(lines))
 
@@ -100,18 +105,19 @@ def check(job: Path, as_json: bool) -> None:
     Example: opl check workpieces/v_shape/job.yaml
     """
     loaded = load(job)
-    points = cutter_points(loaded)
+    surfacing = cut_surface(loaded)
     if as_json:
         figures = {
             "job": loaded.name,
             "robot": loaded.cell.robot.name,
-            "cutter_points": len(points),
-            "passes": points.n_passes,
+            "cutter_points": len(surfacing.points),
+            "passes": surfacing.points.n_passes,
             "contact_positions": loaded.search.n_contact_positions,
+            "warnings": [str(finding) for finding in surfacing.warnings],
         }
         click.echo(json.dumps(figures, indent=2))
     else:
-        show_check(loaded, len(points), points.n_passes)
+        show_check(loaded, surfacing)
 
 
 @main.command()
@@ -182,5 +188,5 @@ def schema() -> None:
     click.echo(json.dumps(JobFile.model_json_schema(), indent=2))
 
 
-for _command in (robots, show, templates):
+for _command in (robots, show, templates, faces, points, verify):
     main.add_command(_command)

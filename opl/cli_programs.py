@@ -1,23 +1,19 @@
-"""Commands around programs: show and compare them, templates, robots and their pulses."""
+"""Commands around programs: show and compare them, templates."""
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 
 import click
 
-from opl.cell.robot import known_robots, load_robot
-from opl.console import show_robots
-from opl.errors import InputError
+from opl.cell.robot import load_robot
 from opl.program.inform import InformJob
 from opl.program.inform.compare import differences_in_meaning
 from opl.program.inform.files import load_jobs
 from opl.program.inform.summary import describe
-from opl.program.parameters import read_parameters
 from opl.program.posts import find_post, known_posts
-from opl.program.ratios import mismatches, ratio_file, with_ratios
+from opl.program.ratios import with_ratios
 
 FILE = click.Path(dir_okay=False, path_type=Path)
 
@@ -80,57 +76,3 @@ def template_vars(controller: str | None) -> None:
         width = max(len(variable) for variable in post.variables)
         for variable, meaning in post.variables.items():
             click.echo(f"  {variable:{width}}  {meaning}")
-
-
-@click.group(invoke_without_command=True)
-@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
-@click.pass_context
-def robots(context: click.Context, as_json: bool) -> None:
-    """List the robots that come with opl.
-
-    Example: opl robots
-    """
-    if context.invoked_subcommand is not None:
-        return
-    known = [load_robot(name) for name in known_robots()]
-    if as_json:
-        told = [
-            {
-                "name": robot.name,
-                "title": robot.title,
-                "unverified_pulse_ratios": list(robot.unverified_pulses),
-            }
-            for robot in known
-        ]
-        click.echo(json.dumps(told, indent=2))
-    else:
-        show_robots(known)
-
-
-@robots.command("import-params")
-@click.argument("file", type=FILE)
-@click.option("--robot", required=True, help="Whose controller the file is from.")
-@click.option("--out", type=FILE, help="File to write; default <robot>_pulses.yaml.")
-def import_params(file: Path, robot: str, out: Path | None) -> None:
-    """Read pulse ratios and soft limits from a controller's RC.PRM or ALL.PRM.
-
-    Writes a small file that a job names as program.pulse_ratios.
-
-    Example: opl robots import-params RC.PRM --robot mh24 --out pulses.yaml
-    """
-    owner = load_robot(robot)
-    try:
-        text = file.read_text(encoding="latin-1")
-    except OSError as error:
-        raise InputError(str(file), f"cannot be read: {error.strerror}") from error
-    parameters = read_parameters(text, str(file))
-    path = out or Path(f"{owner.name}_pulses.yaml")
-    try:
-        path.write_text(ratio_file(owner, parameters, file.name), encoding="utf-8")
-    except OSError as error:
-        raise InputError(str(path), f"cannot be written: {error.strerror}") from error
-    for name, ratio in zip(owner.joint_names, parameters.pulses_per_degree, strict=True):
-        click.echo(f"{name} {ratio:.2f} pulses per degree")
-    for line in mismatches(owner, parameters):
-        click.echo(f"caution: {line}", err=True)
-    click.echo(f"wrote {path}; name it in the job as program.pulse_ratios")

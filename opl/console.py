@@ -15,10 +15,11 @@ from rich.text import Text
 
 from opl.batch import Row
 from opl.cell.inverse import branch_name
-from opl.cell.robot import Robot
+from opl.geometry.toolpath import CutterPoints
 from opl.job import Job
 from opl.outcome import Outcome
 from opl.pipeline import Progress as Watch
+from opl.proof.prove import Proof
 from opl.result import search_seconds
 from opl.surfacing import Surfacing
 
@@ -30,9 +31,11 @@ STAGES = {
     "clearance": "clearance to the wheel",
     "comparison": "comparison with fixed contact",
     "search": "search",
+    "remedies": "what would help",
     "motion": "motion",
     "verification": "verification in PyBullet",
     "export": "program and pictures",
+    "read_back": "proof of the written files",
 }
 
 
@@ -133,6 +136,11 @@ def _facts(outcome: Outcome) -> Iterator[str]:
             f"{found.max_contact_error * 1e3:.3f} mm at most, "
             f"{found.limit_violations} limit violations"
         )
+    if outcome.file is not None and outcome.file.proven:
+        yield (
+            f"read back from {', '.join(outcome.file.files)}: {outcome.file.postures} postures, "
+            "moves and speeds as proven"
+        )
     if outcome.program is not None and found is not None and found.verified is not None:
         duration = found.verified.motion.duration.sum()
         worst = max((abs(time.error) for time in outcome.program.pass_times), default=0.0)
@@ -145,6 +153,32 @@ def _facts(outcome: Outcome) -> Iterator[str]:
                 f"caution: the pulse ratios of {', '.join(robot.unverified_pulses)} of "
                 f"{robot.title} are not verified; compare a posture at the pendant before playing"
             )
+
+
+def show_proof(job: Job, points: CutterPoints, proof: Proof) -> None:
+    """Print what was proven of a program, or how far the proof came."""
+    console = _console()
+    lines = [f"read {path}" for path in proof.files]
+    lines += [f"calls {name}, which was not looked at" for name in proof.foreign]
+    found, motion = proof.verification, proof.motion
+    if found is not None and motion is not None:
+        lines += [
+            f"{proof.moves} positions, {motion.duration.sum():.1f} s, for {job.cell.robot.title}",
+            f"{proof.ground} of {len(points)} cutter points recognised in order, "
+            f"{points.n_passes} passes",
+            f"replayed in {found.engine}: {found.poses} poses, {found.collisions} collisions, "
+            f"clearance {found.min_clearance * 1e3:.1f} mm or more, contact error "
+            f"{found.max_contact_error * 1e3:.3f} mm at most, "
+            f"{found.limit_violations} limit violations",
+        ]
+    if job.cell.robot.unverified_pulses:
+        lines.append(
+            f"caution: the pulse ratios of {', '.join(job.cell.robot.unverified_pulses)} of "
+            f"{job.cell.robot.title} are not verified; the proof rests on them"
+        )
+    lines.append("proven" if proof.proven else f"not proven: {len(proof.findings)} findings")
+    for line in lines:
+        console.print(line, markup=False)
 
 
 def show_check(job: Job, surfacing: Surfacing) -> None:
@@ -200,15 +234,3 @@ def _table(*headings: str) -> Table:
         # as Text: rich would take a unit in brackets for markup and leave it out
         table.add_column(Text(heading), overflow="fold")
     return table
-
-
-def show_robots(robots: Sequence[Robot]) -> None:
-    """Print the robots that are known."""
-    console = _console()
-    table = _table("name", "robot", "reach [mm]", "pulse ratios not verified")
-    for robot in robots:
-        arm = robot.arm
-        reach = arm.a1 + arm.c2 + np.hypot(arm.a2, arm.c3)
-        cells = (robot.name, robot.title, f"{reach * 1e3:.0f}", " ".join(robot.unverified_pulses))
-        table.add_row(*(Text(cell) for cell in cells))
-    console.print(table)

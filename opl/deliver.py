@@ -51,6 +51,19 @@ def deliver(outcome: Outcome, folder: Path) -> list[Path]:
         raise InputError(str(folder), f"cannot be written to: {error.strerror}") from error
 
 
+def write_texts(folder: Path, texts: Mapping[str, str]) -> list[Path]:
+    """Write files by name into a folder, which is made if needed; all of them or none.
+
+    Raises:
+        InputError: If the folder cannot be written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return _write(folder, texts)
+    except OSError as error:
+        raise InputError(str(folder), f"cannot be written to: {error.strerror}") from error
+
+
 def _files_of_earlier_run(folder: Path) -> set[str]:
     try:
         program = json.loads((folder / RESULT).read_text(encoding="utf-8"))["program"]

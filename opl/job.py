@@ -123,7 +123,6 @@ class Job:
         name: Name of the program.
         cell: Robot, wheel, part and surroundings.
         surface: The surface to be ground, in the workpiece frame.
-        sample_spacing: Of the part's surface samples in [m].
         passes: How the surface is cut.
         search: How the path is sought.
         pace: Speeds, approach and home.
@@ -134,7 +133,6 @@ class Job:
     name: str
     cell: WorkCell
     surface: MachinedSurface
-    sample_spacing: float
     passes: Passes
     search: Search
     pace: Pace
@@ -189,7 +187,6 @@ def load(path: Path, method: str | None = None) -> Job:
         name=file.name,
         cell=cell,
         surface=surface,
-        sample_spacing=file.workpiece.sample_spacing_mm * MM,
         passes=file.passes.in_si(path, surface, wheel.radius),
         search=search,
         pace=file.process.in_si(),

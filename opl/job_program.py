@@ -13,11 +13,13 @@ from opl.documents import Document
 from opl.errors import InputError, OplError
 from opl.geometry.frames import Array, NotARotationError, nearest_pose
 from opl.program.actions import Action, Actions, Call, Dwell, Remark, SetOutput, WaitInput
-from opl.program.posts import Post, find_post
-from opl.program.pulses import require_accepted
+from opl.program.posts import Post, find_post, known_posts
+from opl.program.pulses import require_accepted, require_known
 from opl.program.ratios import with_ratios
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
 from opl.program.write import try_out
+
+_MAY_COUNT_PULSES = ("Yaskawa", "unknown")  # makers
 
 _Row = Annotated[list[float], Field(min_length=4, max_length=4)]
 
@@ -152,13 +154,14 @@ class ProgramSection(Document):
             InputError: If something in it is unknown, or the controller does not take it.
         """
         post = find_post(self.controller, f"{path}: program.controller")
-        self._require_possible(path, post)
+        self._require_possible(path, post, robot)
         where = f"{path}: program.accept_unverified_pulses"
         for joint in self.accept_unverified_pulses:
             if joint not in robot.joint_names:
                 known = ", ".join(robot.joint_names)
                 raise InputError(where, f"no such joint {joint!r}; have: {known}")
         if post.counts_pulses and self.positions == "pulses":
+            require_known(robot, f"{path}: program.pulse_ratios")
             require_accepted(robot.unverified_pulses, self.accept_unverified_pulses, where)
         settings = self._settings(path)
         try:
@@ -193,9 +196,16 @@ class ProgramSection(Document):
             template=None if self.template is None else path.parent / self.template,
         )
 
-    def _require_possible(self, path: Path, post: Post) -> None:
-        """Refuse keys that the post would pass over in silence."""
+    def _require_possible(self, path: Path, post: Post, robot: Robot) -> None:
+        """Refuse another maker's arm, and keys that the post would pass over in silence."""
         if post.counts_pulses:
+            if robot.missing_pulses and robot.maker not in _MAY_COUNT_PULSES:
+                raise InputError(
+                    f"{path}: program.controller",
+                    f"{self.controller} counts pulses, of which {robot.title} (robot: "
+                    f"{robot.name}, made by {robot.maker}) has none; name the controller of that "
+                    f"arm: {', '.join(_without_pulses())}",
+                )
             return
         own = ("positions", "user_frame", "levels", "acceleration_percent", "deceleration_percent")
         for key in own:
@@ -203,6 +213,10 @@ class ProgramSection(Document):
                 raise InputError(
                     f"{path}: program.{key}", f"is for Yaskawa controllers, not for {post.title}"
                 )
+
+
+def _without_pulses() -> list[str]:
+    return [name for name in known_posts() if not find_post(name).counts_pulses]
 
 
 def _pose(matrix_mm: list[list[float]] | None) -> Array:

@@ -60,7 +60,7 @@ class SearchSection(Document):
     contact_positions: Annotated[int, Field(ge=2)]
     max_contact_step: Positive
     max_contact_error_mm: Positive = 0.1
-    max_contact_change: Positive = 30.0
+    max_contact_change: Positive = 100.0
     widen_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 0.1
     seconds: Positive = 60.0
     weights: WeightsSection = WeightsSection()

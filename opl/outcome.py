@@ -12,6 +12,7 @@ from opl.planning.figures import Figures
 from opl.planning.fixed import FixedContact
 from opl.planning.plan import Plan
 from opl.program.moves import Program
+from opl.proof.read_back import FileProof
 from opl.verification.replay import Verification
 
 
@@ -33,7 +34,9 @@ class Outcome:
         compared: The figures of every path, by what it is.
         verification: What the replay found.
         program: The moves of the program.
+        file: What was found when its files were read back; None where opl cannot.
         refusal: Why there is no path, if so.
+        remedies: Single changes of the job that would make it possible.
         files: Texts to be written, by file name.
     """
 
@@ -49,5 +52,7 @@ class Outcome:
     compared: dict[str, Figures] = field(default_factory=dict)
     verification: Verification | None = None
     program: Program | None = None
+    file: FileProof | None = None
     refusal: NoPathError | None = None
+    remedies: list[str] = field(default_factory=list)
     files: dict[str, str] = field(default_factory=dict)

@@ -6,13 +6,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from opl.cell.clearance import PartSamples, sample_tree, wheel_clearance
+from opl.cell.clearance import PartTree, part_tree, wheel_clearance
 from opl.cell.collision import CollisionScene
 from opl.cell.robot import forward
 from opl.cell.workcell import PART, WHEEL
 from opl.errors import InputError, NoPathError
 from opl.export import draw, job_date, write_program
-from opl.geometry.mesh import surface_samples
 from opl.geometry.toolpath import CutterPoints
 from opl.job import Job
 from opl.outcome import Outcome
@@ -22,6 +21,8 @@ from opl.planning.nodes import build_nodes
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import unreachable_points
 from opl.planning.timing import timed
+from opl.proof.read_back import as_told, read_back
+from opl.remedies import find_remedies
 from opl.searches import compare, from_paper_start, search_path
 from opl.surfacing import cut_surface
 from opl.verification.replay import replay
@@ -55,12 +56,16 @@ def run(job: Job, progress: Progress = lambda stage, fraction: None) -> Outcome:
             outcome.plan = plan = search_path(outcome, problem)
     except NoPathError as error:
         outcome.status, outcome.refusal = "no_path", error
+        with clock("remedies"):
+            outcome.remedies = find_remedies(job, points)
         return outcome
     with clock("comparison"):
         outcome.paper_start = from_paper_start(problem)
         outcome.compared = compare(outcome)
     with clock("motion"):
-        motion = timed(plan.motion, points, job.pace, job.cell.robot.max_speed)
+        # what is proven is what the digits of the program can say
+        told = as_told(plan.motion, job)
+        motion = timed(told, points, job.pace, job.cell.robot.max_speed)
     with clock("verification"):
         outcome.verification = verification = replay(
             job.cell, points, motion, job.search.max_contact_error, clock.share
@@ -71,6 +76,14 @@ def run(job: Job, progress: Progress = lambda stage, fraction: None) -> Outcome:
     with clock("export"):
         outcome.program = write_program(outcome, verification.verified)
         draw(outcome, problem)
+    with clock("read_back"):
+        outcome.file = proof = read_back(
+            job, points, plan.motion, verification.verified, outcome.program, outcome.files
+        )
+    if proof is not None and not proof.proven:
+        outcome.status = "unsafe"
+        outcome.files.clear()
+        outcome.program = None
     return outcome
 
 
@@ -94,11 +107,11 @@ def pose_problem(job: Job, points: CutterPoints, clock: _Clock) -> GrindingProbl
     with clock("nodes"):
         field = build_nodes(job.cell, points, contact_positions)
     with clock("clearance"):
-        samples = sample_tree(surface_samples(job.cell.part, job.sample_spacing))
-        layer = wheel_layer(job.cell, samples, points, contact_positions)
+        part = part_tree(job.cell.part)
+        layer = wheel_layer(job.cell, part, points, contact_positions)
         scene = CollisionScene(job.cell)
     problem = GrindingProblem(
-        job.cell, scene, samples, points, field, layer, job.search.interpolation, job.pace
+        job.cell, scene, part, points, field, layer, job.search.interpolation, job.pace
     )
     unreachable = unreachable_points(problem)
     if len(unreachable):
@@ -108,7 +121,7 @@ def pose_problem(job: Job, points: CutterPoints, clock: _Clock) -> GrindingProbl
             f"{runs_of(unreachable)} of {len(points)}; check wheel.T_base_contact0_mm and "
             "fixture.T_flange_workpiece_mm",
         )
-    hits = [*scene.colliding_pairs(job.pace.home), *_part_near_wheel(job, samples)]
+    hits = [*scene.colliding_pairs(job.pace.home), *_part_near_wheel(job, part)]
     if hits:
         pairs = ", ".join(" and ".join(pair) for pair in hits)
         raise InputError(
@@ -119,11 +132,11 @@ def pose_problem(job: Job, points: CutterPoints, clock: _Clock) -> GrindingProbl
     return problem
 
 
-def _part_near_wheel(job: Job, samples: PartSamples) -> list[tuple[str, str]]:
+def _part_near_wheel(job: Job, part: PartTree) -> list[tuple[str, str]]:
     """Return part and wheel if they are too near at home, where they do not touch on purpose."""
     home = job.pace.home[None]
     Ts_contact0_workpiece = job.cell.Ts_contact0_workpiece(forward(job.cell.robot, home))
-    distance = wheel_clearance(samples, job.cell.wheel, Ts_contact0_workpiece)[0]
+    distance = wheel_clearance(part, job.cell.wheel, Ts_contact0_workpiece, job.cell.clearance)[0]
     return [(PART, WHEEL)] if distance < job.cell.clearance else []
 
 

@@ -11,6 +11,7 @@ from opl.cell.inverse import branch_name
 from opl.outcome import Outcome
 from opl.planning.figures import Figures
 from opl.planning.plan import Plan
+from opl.proof.read_back import FileProof
 
 MM = 1e3
 
@@ -26,6 +27,7 @@ def result(outcome: Outcome) -> dict[str, Any]:
         "passes": None if points is None else points.n_passes,
         "warnings": [str(finding) for finding in outcome.warnings],
         "reasons": reasons(outcome),
+        "remedies": outcome.remedies,
         "fixed": _fixed(outcome),
         "path": _path(outcome, outcome.plan),
         "compared": {name: _figures(figures) for name, figures in outcome.compared.items()},
@@ -45,7 +47,8 @@ def reasons(outcome: Outcome) -> list[str]:
     if outcome.refusal is not None:
         return [outcome.refusal.message, *outcome.refusal.reasons]
     if outcome.verification is not None:
-        return [str(finding) for finding in outcome.verification.findings]
+        read_back = () if outcome.file is None else outcome.file.findings
+        return [str(finding) for finding in (*outcome.verification.findings, *read_back)]
     return []
 
 
@@ -121,6 +124,20 @@ def _verification(outcome: Outcome) -> dict[str, Any] | None:
         "min_clearance_mm": round(found.min_clearance * MM, 3),
         "max_contact_error_mm": round(found.max_contact_error * MM, 4),
         "limit_violations": found.limit_violations,
+        "file": _file(outcome.file),
+    }
+
+
+def _file(proof: FileProof | None) -> dict[str, Any] | None:
+    if proof is None:
+        return None
+    return {
+        "proven": proof.proven,
+        "files": list(proof.files),
+        "postures": proof.postures,
+        "largest_rounding_mm": round(proof.largest_rounding * MM, 4),
+        "largest_difference_mm": round(proof.largest_difference * MM, 4),
+        "replayed": proof.replayed,
     }
 
 

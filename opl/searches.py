@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from opl.errors import NoPathError
 from opl.job_search import Method, Objective
 from opl.outcome import Outcome
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.figures import Figures, figures_of_path, figures_of_points
 from opl.planning.optimal import plan_optimal
-from opl.planning.plan import Plan, plan_recursive
+from opl.planning.plan import Plan, plan_recursive, try_recursive
 from opl.planning.problem import GrindingProblem
 from opl.planning.starts import Start
+
+# of motions from the paper's start node, which are sought for comparison only
+MOST_CHECKS = 20
 
 
 def search_path(outcome: Outcome, problem: GrindingProblem) -> Plan:
@@ -53,7 +55,4 @@ def compare(outcome: Outcome) -> dict[str, Figures]:
 
 def from_paper_start(problem: GrindingProblem) -> Plan | None:
     """Return what the paper's search finds from the paper's own start node, None if nothing."""
-    try:
-        return plan_recursive(problem, Start.NEAREST)
-    except NoPathError:
-        return None
+    return try_recursive(problem, Start.NEAREST, MOST_CHECKS)
