@@ -14,6 +14,7 @@ from opl.geometry.wheel import ContactWheel
 
 WHEEL = "wheel"
 PART = "part"
+SECOND_OPINION = 1e-4  # [m]; PyBullet was seen to differ by 0.08 mm at the rim of the wheel
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,15 @@ class WorkCell:
     T_flange_workpiece: Array
     contact_allowance: float
     clearance: float
+
+    @property
+    def planned_allowance(self) -> float:
+        """How deep the planner lets the part sink into the belt in [m].
+
+        Less than the contact allowance, so that the second opinion, whose distances differ by up to
+        `SECOND_OPINION`, agrees.
+        """
+        return max(self.contact_allowance - SECOND_OPINION, self.contact_allowance / 2.0)
 
     def Ts_base_flange(self, t: Array | float, Ts_workpiece_cutter: Array) -> Array:
         """Return the flange poses that bring cutter points onto contact positions.

@@ -13,7 +13,7 @@ from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.planning.motion import Motion, Stretch
 
-RESOLUTION = np.deg2rad(1.0)  # largest joint change between two postures that are asked
+RESOLUTION = np.deg2rad(0.5)  # largest joint change between two postures that are asked
 
 FREE_MOVES = (Stretch.HOME, Stretch.LINK)
 
@@ -69,7 +69,7 @@ def find_faults(
     q, move = densify(motion.q, RESOLUTION)
     Ts_base_flange = forward(cell.robot, q)
     free_move = np.array([stretch in FREE_MOVES for stretch in motion.stretch])
-    needed = np.where(free_move[move], cell.clearance, -cell.contact_allowance)
+    needed = np.where(free_move[move], cell.clearance, -cell.planned_allowance)
     Ts_contact0_workpiece = cell.Ts_contact0_workpiece(Ts_base_flange)
     cuts = wheel_clearance(part, cell.wheel, Ts_contact0_workpiece, needed) < needed
     # a move that is refused for the wheel need not be asked about the rest

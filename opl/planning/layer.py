@@ -24,4 +24,4 @@ def wheel_layer(
     Ts_contact0_contact = cell.wheel.T_contact0_contact(contact_positions)
     # cutter and contact coincide, whatever robot brings the part there
     Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[:, None]
-    return wheel_clearance(part, cell.wheel, Ts_contact0_workpiece, -cell.contact_allowance)
+    return wheel_clearance(part, cell.wheel, Ts_contact0_workpiece, -cell.planned_allowance)

@@ -49,7 +49,7 @@ class GrindingProblem:
 
     def free_nodes(self, nodes: NodeMatrix) -> np.ndarray:
         """Return which nodes exist and do not cut into the wheel, shape (N, n_rows)."""
-        free = self.wheel_clearance >= -self.cell.contact_allowance
+        free = self.wheel_clearance >= -self.cell.planned_allowance
         return np.ascontiguousarray(nodes.exists & free[:, nodes.position_index])
 
     def ladder(self, nodes: NodeMatrix, free: np.ndarray) -> Ladder:
