@@ -167,11 +167,8 @@ def _nearest_on_triangle(  # type: ignore[no-untyped-def]
                 + T[i, 2] * triangles[index, k, 2]
                 + T[i, 3]
             )
-        value, _, _, _ = _distance(
-            room[0, 3 * k], room[0, 3 * k + 1], room[0, 3 * k + 2], half_width, radius
-        )
-        best = min(best, value)
     n = 1
+    whole = True
     while n > 0:
         n -= 1
         ax, ay, az = room[n, 0], room[n, 1], room[n, 2]
@@ -205,6 +202,13 @@ def _nearest_on_triangle(  # type: ignore[no-untyped-def]
             bound = max(bound, mean - half_width)
         if bound >= enough or n + 2 > DEEPEST:
             continue
+        if whole:  # it has to be halved: its corners may be the nearest points
+            whole = False
+            for k in range(3):
+                value, _, _, _ = _distance(
+                    room[0, 3 * k], room[0, 3 * k + 1], room[0, 3 * k + 2], half_width, radius
+                )
+                best = min(best, value)
         ab = (ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2
         bc = (bx - cx) ** 2 + (by - cy) ** 2 + (bz - cz) ** 2
         ca = (cx - ax) ** 2 + (cy - ay) ** 2 + (cz - az) ** 2
