@@ -15,7 +15,7 @@ import trimesh
 from numpy.typing import NDArray
 
 RADIUS, WALL = 22.0, 3.0
-AXIS_Z = -58.0
+AXIS_Z = 10.0
 STRAIGHT = (-30.0, 8.0)  # along y
 BEND_RADIUS, BEND = 60.0, 0.65
 SEEN = 0.9  # half of the sector about the top that is ground
