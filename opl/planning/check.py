@@ -13,7 +13,7 @@ from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.planning.motion import Motion, Stretch
 
-RESOLUTION = np.deg2rad(0.5)  # largest joint change between two postures that are asked
+RESOLUTION = np.deg2rad(1.0)  # largest joint change between two postures that are asked
 
 FREE_MOVES = (Stretch.HOME, Stretch.LINK)
 
