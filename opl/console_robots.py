@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from opl.cell.robot import Robot
+from opl.cell.robot import ASSUMED_RAMP, Robot
 from opl.cell.robot_file import N_JOINTS, RobotFile, Sourced
 
 WIDTH = 80  # columns
@@ -55,6 +55,11 @@ def show_robot(robot: Robot, file: RobotFile) -> None:
         f"{' '.join(f'{offset:g}' for offset in arm.offsets_deg)} deg; signs "
         f"{' '.join('+' if sign > 0 else '-' for sign in arm.signs)} {notes.mark(arm)}",
     ]
+    if file.acceleration is None:
+        lines.append(f"acceleration not known: top speed is taken to need {ASSUMED_RAMP:g} s")
+    else:
+        most = " ".join(f"{value:g}" for value in file.acceleration.max_deg_s2)
+        lines.append(f"acceleration {most} deg/s2 {notes.mark(file.acceleration)}")
     if file.shapes is not None:
         lines.append(f"shapes for collision checks {notes.mark(file.shapes)}")
     for line in lines:

@@ -151,7 +151,7 @@ def load(path: Path, method: str | None = None) -> Job:
     """
     file = read(path, JobFile)
     robot = _robot(path, file.robot)
-    robot = file.program.robot_as_counted(path, robot)
+    robot = file.process.robot_as_limited(file.program.robot_as_counted(path, robot))
     home = np.deg2rad(file.process.home_deg)
     _check_home(path, robot, home)
     if file.search.max_contact_error_mm <= file.passes.bow_height_mm:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
+from opl.cell.robot import Robot
 from opl.documents import Document
 from opl.planning.costs import Costs
 from opl.planning.optimal import OptimalSettings
@@ -22,6 +23,7 @@ MAX_JOINT_STEP = np.deg2rad(15.0)  # between adjacent nodes; more is a jump thro
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Six = Annotated[list[float], Field(min_length=6, max_length=6)]
+SixPositive = Annotated[list[Positive], Field(min_length=6, max_length=6)]
 SixNotNegative = Annotated[list[NotNegative], Field(min_length=6, max_length=6)]
 
 
@@ -103,6 +105,14 @@ class ProcessSection(Document):
     approach_mm_s: Positive = 50.0
     air_speed_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 10.0
     contact_speed: Positive = 40.0
+    max_acceleration_deg_s2: SixPositive | None = None
+
+    def robot_as_limited(self, robot: Robot) -> Robot:
+        """Return the robot with the joint accelerations that the job names, if it does."""
+        if self.max_acceleration_deg_s2 is None:
+            return robot
+        limits = np.deg2rad(self.max_acceleration_deg_s2)
+        return replace(robot, max_acceleration=limits, acceleration_assumed=False)
 
     def in_si(self) -> Pace:
         """Return the section's values."""

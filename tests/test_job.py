@@ -75,6 +75,14 @@ def test_every_job_that_comes_with_opl_is_valid():
     assert V_JOB.is_file()
 
 
+def test_a_job_may_name_its_own_joint_accelerations(tmp_path):
+    assert load(write_job(tmp_path)).cell.robot.acceleration_assumed
+    own = {"process.max_acceleration_deg_s2": [100, 200, 300, 400, 500, 600]}
+    robot = load(write_job(tmp_path, own)).cell.robot
+    assert np.rad2deg(robot.max_acceleration) == pytest.approx([100, 200, 300, 400, 500, 600])
+    assert not robot.acceleration_assumed
+
+
 # what is refused
 
 

@@ -105,6 +105,9 @@ def test_numbers_arrive_in_si_units():
     np.testing.assert_allclose(np.degrees(MH24.lower), [-180, -105, -86, -200, -150, -455])
     np.testing.assert_allclose(np.degrees(MH24.upper), [180, 155, 160, 200, 150, 455])
     np.testing.assert_allclose(np.degrees(MH24.max_speed), [197, 190, 210, 410, 410, 620])
+    most = [492.5, 475, 525, 1025, 1025, 1550]
+    np.testing.assert_allclose(np.degrees(MH24.max_acceleration), most)
+    assert MH24.acceleration_assumed
     assert MH24.pulses_per_radian[0] * np.pi == pytest.approx(180 * 1341.383)
     assert MH24.arm.c2 == 0.76
     assert MH24.arm.c1 == 0.0
@@ -115,8 +118,22 @@ def test_pulses_of_the_hand_axes_are_marked_unverified():
     assert MH24.unverified_pulses == ("R", "B", "T")
 
 
+def test_unknown_accelerations_are_assumed_and_sourced_ones_are_not(copied_robot):
+    text = (copied_robot / "robot.yaml").read_text(encoding="utf-8")
+    start, end = text.index("acceleration:"), text.index("joints:")
+    spoil(copied_robot / "robot.yaml", text[start:end], "")
+    without = load_robot(str(copied_robot))
+    assert without.acceleration_assumed
+    np.testing.assert_allclose(without.max_acceleration, without.max_speed / 0.4)
+    known = "acceleration:\n  max_deg_s2: [1, 2, 3, 4, 5, 6]\n  source: me\n  certainty: medium\n"
+    spoil(copied_robot / "robot.yaml", "joints:", f"{known}joints:")
+    told = load_robot(str(copied_robot))
+    assert not told.acceleration_assumed
+    np.testing.assert_allclose(told.max_acceleration, np.radians([1, 2, 3, 4, 5, 6]))
+
+
 def test_arrays_are_read_only():
-    for values in (MH24.lower, MH24.upper, MH24.max_speed, MH24.pulses_per_radian):
+    for values in (MH24.lower, MH24.max_speed, MH24.max_acceleration, MH24.pulses_per_radian):
         with pytest.raises(ValueError, match="read-only"):
             values[0] = 0.0
 

@@ -24,6 +24,10 @@ from opl.errors import InputError
 from opl.geometry.frames import Array
 from opl.resources import folder
 
+# In which a joint is taken to reach its top speed where nobody knows its acceleration, in [s].
+# Integrators guess 0.1 s for arms of this kind; slower is the safe side.
+ASSUMED_RAMP = 0.4
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:
@@ -37,6 +41,8 @@ class Robot:
         lower: Smallest joint positions in [rad], shape (6,).
         upper: Largest joint positions in [rad], shape (6,).
         max_speed: Largest joint speeds in [rad/s], shape (6,).
+        max_acceleration: Largest joint accelerations in [rad/s^2], shape (6,).
+        acceleration_assumed: Whether these are a guess.
         pulses_per_radian: Encoder counts as programs give them in [1/rad], shape (6,); NaN where
             they are not known.
         unverified_pulses: Joints whose pulses are known, but were never confirmed on this robot.
@@ -54,6 +60,8 @@ class Robot:
     lower: Array
     upper: Array
     max_speed: Array
+    max_acceleration: Array
+    acceleration_assumed: bool
     pulses_per_radian: Array
     unverified_pulses: tuple[str, ...]
     arm: SphericalWristArm
@@ -63,7 +71,7 @@ class Robot:
     payload: float | None
 
     def __post_init__(self) -> None:
-        for name in ("lower", "upper", "max_speed", "pulses_per_radian"):
+        for name in ("lower", "upper", "max_speed", "max_acceleration", "pulses_per_radian"):
             copy = np.array(getattr(self, name), dtype=float)
             if copy.shape != (N_JOINTS,):
                 raise ValueError(f"{name} has shape {copy.shape}, must have ({N_JOINTS},)")
@@ -191,6 +199,8 @@ def _robot(document: RobotFile, home: Path) -> Robot:
     """Return the robot in SI units."""
     arm, base, joints = document.arm, document.base, document.joints
     controller = base.controller_height_mm
+    speed = np.radians([joint.speed.max_deg_s for joint in joints])
+    known = document.acceleration
     counts = [joint.pulses.per_degree if joint.pulses else math.nan for joint in joints]
     return Robot(
         name=document.name,
@@ -199,7 +209,9 @@ def _robot(document: RobotFile, home: Path) -> Robot:
         joint_names=tuple(joint.name for joint in joints),
         lower=np.radians([joint.limits.lower_deg for joint in joints]),
         upper=np.radians([joint.limits.upper_deg for joint in joints]),
-        max_speed=np.radians([joint.speed.max_deg_s for joint in joints]),
+        max_speed=speed,
+        max_acceleration=speed / ASSUMED_RAMP if known is None else np.radians(known.max_deg_s2),
+        acceleration_assumed=known is None or known.certainty == "low",
         pulses_per_radian=np.array(counts) / np.radians(1.0),
         unverified_pulses=tuple(
             joint.name for joint in joints if joint.pulses and not joint.pulses.verified

@@ -75,6 +75,12 @@ class Speed(Sourced):
     max_deg_s: Positive
 
 
+class Acceleration(Sourced):
+    """Largest acceleration of each joint, base first; makers hardly ever publish it."""
+
+    max_deg_s2: Annotated[list[Positive], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
+
+
 class Pulses(Sourced):
     """Encoder counts of a joint, as Yaskawa programs give them."""
 
@@ -101,6 +107,7 @@ class RobotFile(Document):
     base: Base
     arm: Arm
     payload: Payload | None = None
+    acceleration: Acceleration | None = None  # None: as `opl.cell.robot` assumes it
     shapes: Sourced | None = None  # of the shapes in the URDF
     joints: Annotated[list[Joint], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
 
