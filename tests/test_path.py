@@ -226,7 +226,7 @@ def test_a_step_beyond_the_limits_is_refused():
     upper = cell.robot.upper.copy()
     upper[joint] = between[joint] - 1e-6
     error = broken(replace(cell, robot=replace(cell.robot, upper=upper)), points, nodes, rows)
-    assert error.cause == "limits"
+    assert error.cause == "limits of B"
 
 
 def test_a_jump_is_refused():

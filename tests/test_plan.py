@@ -471,7 +471,7 @@ def test_a_retract_beyond_a_limit_is_refused():
     cell = replace(problem.cell, robot=replace(robot, lower=lower))
     with pytest.raises(UnreachableApproachError) as caught:
         whole_motion(cell, problem.points, plan.path, problem.pace)
-    assert caught.value.cause == "limits"
+    assert caught.value.cause == "limits of U"
 
 
 def test_an_approach_from_out_of_reach_is_refused():

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from opl.cell.limits import Limit, broken, within
 from opl.cell.robot import Robot
 from opl.geometry.frames import Array, inverse, pose
 from opl.geometry.mesh import TriangleMesh
@@ -30,6 +31,7 @@ class WorkCell:
         T_flange_workpiece: How the fixture holds the part, shape (4, 4).
         contact_allowance: How deep the part may sink into the belt in [m].
         clearance: Distance to keep from everything else in [m].
+        limits: Limits of joints and sums of joints beside the robot's own.
     """
 
     robot: Robot
@@ -40,6 +42,7 @@ class WorkCell:
     T_flange_workpiece: Array
     contact_allowance: float
     clearance: float
+    limits: tuple[Limit, ...] = ()
 
     @property
     def planned_allowance(self) -> float:
@@ -49,6 +52,14 @@ class WorkCell:
         `SECOND_OPINION`, agrees.
         """
         return max(self.contact_allowance - SECOND_OPINION, self.contact_allowance / 2.0)
+
+    def within_limits(self, q: Array) -> np.ndarray:
+        """Return which postures, shape (..., 6) in [rad], keep every joint limit, shape (...)."""
+        return within(self.robot, self.limits, q)
+
+    def broken_limits(self, q: Array) -> list[str]:
+        """Return the names of the limits that postures, shape (..., 6) in [rad], break."""
+        return broken(self.robot, self.limits, q)
 
     def Ts_base_flange(self, t: Array | float, Ts_workpiece_cutter: Array) -> Array:
         """Return the flange poses that bring cutter points onto contact positions.

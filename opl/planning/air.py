@@ -22,7 +22,7 @@ class UnreachableApproachError(Exception):
 
     Args:
         column: The cutter point.
-        cause: ``reach`` or ``limits``.
+        cause: ``reach``, or ``limits of`` those by name.
     """
 
     def __init__(self, column: int, cause: str) -> None:
@@ -125,6 +125,7 @@ def _along_normal(
         - np.pi,
         axis=0,
     )
-    if ((q < cell.robot.lower) | (q > cell.robot.upper)).any():
-        raise UnreachableApproachError(column, "limits")
+    if not cell.within_limits(q).all():
+        names = " ".join(cell.broken_limits(q))
+        raise UnreachableApproachError(column, f"limits of {names}")
     return q

@@ -84,7 +84,7 @@ def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) 
         for sheet in sheets:
             # (N, copies, M, 6)
             turned = lifted[:, None] + sheet + copies[:, None]
-            within = ((turned >= robot.lower) & (turned <= robot.upper)).all(axis=-1)
+            within = cell.within_limits(turned)
             copy, position_index = np.nonzero(within.any(axis=0))
             if len(position_index):
                 q_sheet = np.ascontiguousarray(

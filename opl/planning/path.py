@@ -69,7 +69,7 @@ class BrokenStepError(Exception):
 
     Args:
         column: The cutter point the step starts from.
-        cause: ``reach``, ``limits`` or ``continuity``.
+        cause: ``reach``, ``limits of`` those by name, or ``continuity``.
     """
 
     def __init__(self, column: int, cause: str) -> None:
@@ -167,9 +167,10 @@ def _solve(
     lost = np.isnan(q).any(axis=1)
     if lost.any():
         raise BrokenStepError(int(place[lost][0]), "reach")
-    beyond = ((q < cell.robot.lower) | (q > cell.robot.upper)).any(axis=1)
+    beyond = ~cell.within_limits(q)
     if beyond.any():
-        raise BrokenStepError(int(place[beyond][0]), "limits")
+        names = " ".join(cell.broken_limits(q))
+        raise BrokenStepError(int(place[beyond][0]), f"limits of {names}")
     return q
 
 

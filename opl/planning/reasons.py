@@ -71,7 +71,7 @@ def _describe_run(problem: GrindingProblem, first: int, last: int) -> str:
 
 def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
     """Weigh, over the contact positions of a column, what rules each out."""
-    robot = problem.cell.robot
+    cell, robot = problem.cell, problem.cell.robot
     allowed = problem.wheel_clearance[column] >= -problem.cell.planned_allowance
     counts: Counter[str] = Counter()
     n_positions = len(problem.field.contact_positions)
@@ -79,15 +79,13 @@ def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
         q = problem.field.q[column, position]
         q = q[~np.isnan(q[:, 0])]
         turned = q[:, None] + turns(robot.lower, robot.upper)
-        outside = (turned < robot.lower) | (turned > robot.upper)
-        within = ~outside.any(axis=2)
+        within = cell.within_limits(turned)
         if not len(q):
             counts["out of reach"] += 1
         elif not within.any():
-            outside = outside.reshape(-1, outside.shape[2])
-            nearest = outside[np.argmin(outside.sum(axis=1))]
-            joints = " ".join(np.array(robot.joint_names)[nearest])
-            counts[f"beyond the limits of {joints}"] += 1
+            # the posture that breaks the fewest tells best what is in the way
+            names = min(map(cell.broken_limits, turned.reshape(-1, 6)), key=len)
+            counts[f"beyond the limits of {' '.join(names)}"] += 1
         elif not allowed[position]:
             counts[f"{PART} cuts into {WHEEL}"] += 1
         else:

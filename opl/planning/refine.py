@@ -107,8 +107,7 @@ def _insert(
     near = nodes.q[before]
     near = np.where(np.isnan(near), nodes.q[before + 1], near)
     added = added + 2.0 * np.pi * np.round((near - added) / (2.0 * np.pi))
-    robot = problem.cell.robot
-    within = ((added >= robot.lower) & (added <= robot.upper)).all(axis=-1)
+    within = problem.cell.within_limits(added)
     added = np.where(within[..., None], added, np.nan)
     return replace(nodes, q=np.insert(nodes.q, before + 1, added, axis=0))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from opl.cell.workcell import WorkCell
@@ -21,6 +23,7 @@ def limit_findings(cell: WorkCell, motion: Motion) -> list[Finding]:
         amount = f"{np.rad2deg(beyond[move, joint]):.3f} deg beyond its limit"
         place, name = where(motion, move), robot.joint_names[joint]
         found.append(Finding(Level.ERROR, "limit", place, f"joint {name}: {amount}"))
+    found += _limits_of_cell(cell, motion)
     for move in range(1, len(motion)):
         turned = np.abs(motion.q[move] - motion.q[move - 1])
         allowed = robot.max_speed * motion.duration[move] * SPEED_TOLERANCE
@@ -30,6 +33,24 @@ def limit_findings(cell: WorkCell, motion: Motion) -> list[Finding]:
             told = f"joint {robot.joint_names[joint]}: {speed:.1f} deg/s, {most:.1f} allowed"
             found.append(Finding(Level.ERROR, "speed", where(motion, move), told))
     return found
+
+
+def _limits_of_cell(cell: WorkCell, motion: Motion) -> Iterator[Finding]:
+    """Yield a finding for each posture beyond a limit that the cell adds.
+
+    Joints move linearly between the postures and what is limited is linear in them, so between two
+    postures it lies between its values at both.
+    """
+    for limit in cell.limits:
+        for move, q in enumerate(motion.q):
+            total = sum(float(c * angle) for c, angle in zip(limit.coefficients, q, strict=True))
+            if limit.lower - 1e-9 <= total <= limit.upper + 1e-9:
+                continue
+            told = (
+                f"{limit.name}: {np.rad2deg(total):.3f} deg, must be in "
+                f"{np.rad2deg(limit.lower):g} to {np.rad2deg(limit.upper):g}"
+            )
+            yield Finding(Level.ERROR, "limit", where(motion, move), told)
 
 
 def missing_points(points: CutterPoints, motion: Motion) -> list[Finding]:
