@@ -234,8 +234,8 @@ def test_an_open_mesh_is_refused(tmp_path):
     box = trimesh.creation.box((50, 50, 50))
     trimesh.Trimesh(box.vertices, box.faces[:-1]).export(tmp_path / "v_shape.stl")
     assert one_message(job) == (
-        f"workpiece.mesh: {tmp_path / 'v_shape.stl'}: is not closed: a solid without holes is "
-        "needed"
+        f"workpiece.mesh: {tmp_path / 'v_shape.stl'}: is not closed: 3 edges are not those of "
+        "two triangles, one of them near (25, 0, 25) mm; a solid without holes is needed"
     )
 
 

@@ -1,4 +1,4 @@
-"""Triangle meshes of solids: reading them, and points that cover their surface."""
+"""Triangle meshes, and reading them: solids, and triangles that enclose nothing."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from opl.errors import InputError
+from opl.geometry.crossings import crossing_triangles
 from opl.geometry.frames import Array
 
 _METRES = {"mm": 1e-3, "m": 1.0}
@@ -75,16 +76,19 @@ def load_mesh(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
 
     Raises:
         InputError: If the file cannot be read, has no triangles, or if they do not enclose a
-            volume.
+            volume or cross each other.
     """
     mesh = _read(path)
     if not mesh.is_watertight:
-        raise InputError(str(path), "is not closed: a solid without holes is needed")
+        raise InputError(str(path), f"is not closed: {_open_edges(mesh, unit)}")
     if not mesh.is_winding_consistent:
         raise InputError(str(path), "has neighbouring triangles that face opposite sides")
     solid = TriangleMesh(_METRES[unit] * np.asarray(mesh.vertices), np.asarray(mesh.faces))
     if abs(solid.volume) <= _FLAT_VOLUME * np.ptp(solid.vertices, axis=0).max() ** 3:
         raise InputError(str(path), "encloses no volume")
+    crossing = crossing_triangles(solid.triangles)
+    if len(crossing):
+        raise InputError(str(path), f"crosses itself: {_crossing(solid, crossing)}")
     return solid if solid.volume > 0.0 else TriangleMesh(solid.vertices, solid.faces[:, ::-1])
 
 
@@ -135,70 +139,31 @@ def _read(path: Path) -> trimesh.Trimesh:
     return mesh
 
 
-def surface_samples(mesh: TriangleMesh, spacing: float) -> Array:
-    """Return points that cover the surface of a mesh, the same ones every time.
-
-    Triangles are halved across their longest edge until no point of any is further than ``spacing``
-    from its nearest corner (see `_covering_radius`); the samples are all their corners. Hence every
-    point of the surface has a sample within ``spacing``, and a clearance measured at the samples
-    is at most ``spacing`` larger than that of the whole surface.
-
-    Args:
-        mesh: The surface.
-        spacing: Largest distance in [m] of a point of the surface from its nearest sample.
-
-    Returns:
-        The samples in [m], in lexicographic order, shape (k, 3).
-
-    Raises:
-        ValueError: If ``spacing`` is not positive.
-    """
-    if not spacing > 0.0:
-        raise ValueError(f"spacing: must be positive, got {spacing:g}")
-    triangles = mesh.triangles
-    samples = []
-    while len(triangles):
-        covered = _covering_radius(triangles) <= spacing
-        samples.append(triangles[covered].reshape(-1, 3))
-        triangles = _halved(triangles[~covered])
-    if not samples:
-        return np.empty((0, 3))
-    # neighbours halve a shared edge at bitwise the same point, so equal corners are found exactly
-    corners = np.concatenate(samples)
-    corners = corners[np.lexsort(corners.T[::-1])]  # np.unique along an axis is far slower
-    return corners[np.append(True, (corners[1:] != corners[:-1]).any(axis=1))]
-
-
-def _edges(triangles: Array) -> Array:
-    """Return the lengths of the edges opposite each corner, shape (m, 3)."""
-    return np.linalg.norm(np.roll(triangles, -1, axis=1) - np.roll(triangles, 1, axis=1), axis=2)
-
-
-def _covering_radius(triangles: Array) -> Array:
-    """Return the largest distance of a point of each triangle from its nearest corner, shape (m,).
-
-    In an acute triangle that point is the centre of the circumscribed circle. In an obtuse one the
-    circle's centre lies outside, and the point is where the perpendicular bisector of a short edge
-    meets the longest: at c / (2 cos B) from B, and at b / (2 cos C) from C. The first is at most
-    a / sqrt(3), the second at most a / 2, which holds where a sliver leaves no digits.
-    """
-    c, b, a = np.sort(_edges(triangles), axis=1).T
-    ac_cos_B = 0.5 * (a * a + c * c - b * b)
-    ab_cos_C = 0.5 * (a * a + b * b - c * c)
-    bc_cos_A = 0.5 * (b * b + c * c - a * a)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        acute = a * b * c / (2.0 * np.sqrt((b * c) ** 2 - bc_cos_A**2))
-        obtuse = 0.5 * a * np.fmax(c * c / ac_cos_B, b * b / ab_cos_C)
-    # fmin passes over nan
-    return np.where(bc_cos_A > 0.0, np.fmin(acute, a / np.sqrt(3.0)), np.fmin(obtuse, 0.5 * a))
-
-
-def _halved(triangles: Array) -> Array:
-    """Return two triangles for each, split at the middle of its longest edge, shape (2 m, 3, 3)."""
-    longest = np.argmax(_edges(triangles), axis=1)
-    order = (longest[:, None] + np.arange(3)) % 3
-    apex, left, right = np.moveaxis(np.take_along_axis(triangles, order[..., None], 1), 1, 0)
-    middle = 0.5 * (left + right)
-    return np.concatenate(
-        [np.stack([apex, left, middle], axis=1), np.stack([apex, middle, right], axis=1)]
+def _open_edges(mesh: trimesh.Trimesh, unit: Literal["mm", "m"]) -> str:
+    """Return where a mesh that is not closed is open."""
+    edges, counts = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)
+    wrong = edges[counts != 2]
+    middle = _METRES[unit] * np.asarray(mesh.vertices)[wrong[0]].mean(axis=0)
+    return (
+        f"{len(wrong)} edges are not those of two triangles, one of them near {_place(middle)}; a "
+        "solid without holes is needed"
     )
+
+
+def _crossing(solid: TriangleMesh, pairs: NDArray[np.int64]) -> str:
+    """Return which triangles of a solid cross each other, and where the first ones do."""
+    one, other = solid.triangles[pairs[0]]
+    # the middle of what their boxes share
+    low = np.maximum(one.min(axis=0), other.min(axis=0))
+    high = np.minimum(one.max(axis=0), other.max(axis=0))
+    more = f", and {len(pairs) - 1} more pairs" if len(pairs) > 1 else ""
+    return (
+        f"triangles {pairs[0, 0] + 1} and {pairs[0, 1] + 1} of {len(solid.faces)} near "
+        f"{_place(0.5 * (low + high))}{more}; a solid with an inside is needed, so unite its "
+        "bodies before it is exported"
+    )
+
+
+def _place(point: Array) -> str:
+    x, y, z = 1e3 * point + 0.0  # no negative zero
+    return f"({x:.4g}, {y:.4g}, {z:.4g}) mm"
