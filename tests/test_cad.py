@@ -1,4 +1,5 @@
 import json
+import re
 
 import numpy as np
 import pytest
@@ -10,12 +11,12 @@ from solids import ORIGINS, lay
 from opl.errors import InputError
 from opl.geometry import cad
 from opl.geometry.machined import load_machined
-from opl.geometry.mesh import load_triangles
+from opl.geometry.mesh import load_mesh, load_triangles
 from opl.geometry.patchwork import Patchwork
 
 pytest.importorskip("OCP", reason="the optional extra opl[cad] is not installed")
 
-from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut
+from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
 from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepPrimAPI import (
@@ -59,6 +60,20 @@ def block():
     return BRepAlgoAPI_Cut(
         fillet.Shape(), BRepPrimAPI_MakeCylinder(drill, 5.0, 40.0).Shape()
     ).Shape()
+
+
+def tilted_pipe():
+    """A pipe with a thin wall, a branch through it at an angle, and both bores."""
+    lying = gp_Ax2(gp_Pnt(-40, 0, 0), gp_Dir(1, 0, 0))
+    rising = gp_Ax2(gp_Pnt(0, 0, 0), gp_Dir(0.4, 0.1, 1))
+    outer, inner = (
+        BRepAlgoAPI_Fuse(
+            BRepPrimAPI_MakeCylinder(lying, radius, 80.0).Shape(),
+            BRepPrimAPI_MakeCylinder(rising, 0.7 * radius, 40.0).Shape(),
+        ).Shape()
+        for radius in (12.0, 10.5)
+    )
+    return BRepAlgoAPI_Cut(outer, inner).Shape()
 
 
 def write_stl(shape, path, deflection=0.006, angle=0.5):
@@ -169,6 +184,49 @@ def test_an_iges_file_has_the_same_faces(tmp_path):
     assert len(found) == 3
     lengths = [np.ptp(Patchwork((one.face,)).extent_along(Z)) for one in found]
     assert max(lengths) == pytest.approx(0.05, abs=1e-9)
+
+
+def test_the_meshes_of_cad_parts_do_not_cross_themselves(tmp_path):
+    shapes = (block(), BRepPrimAPI_MakeTorus(24.0, 8.0).Shape(), tilted_pipe())
+    for number, shape in enumerate(shapes):
+        for deflection, angle in ((0.01, 0.2), (0.1, 0.5)):
+            stl = write_stl(shape, tmp_path / f"{number}_{deflection}.stl", deflection, angle)
+            assert load_mesh(stl, "mm").volume > 0.0
+
+
+def test_a_cut_file_or_one_with_a_face_of_no_area_ends_with_status_2(tmp_path):
+    step = write_step(block(), tmp_path / "block.step").read_text()
+    writer = IGESControl_Writer()
+    writer.AddShape(block())
+    writer.Write(str(tmp_path / "block.igs"))
+    iges = (tmp_path / "block.igs").read_text()
+    box = write_step(BRepPrimAPI_MakeBox(60.0, 40.0, 20.0).Shape(), tmp_path / "box.step")
+    flat = re.sub(r"(\(\S+?,\S+?,)20\.\)", r"\g<1>0.)", box.read_text())
+    write_stl(block(), tmp_path / "block.stl", 0.05, 0.2)
+    cases = [("step", step[: len(step) * part // 100], "whole STEP file") for part in (5, 50, 99)]
+    cases += [("igs", iges[: len(iges) * part // 100], "whole IGES file") for part in (5, 50, 99)]
+    cases += [("step", flat, "face 1: has no area"), ("step", "", "is empty")]
+    content = document({"workpiece.mesh": "block.stl"})
+    for suffix, text, message in cases:
+        bad = tmp_path / f"bad.{suffix}"
+        bad.write_text(text)
+        content["workpiece"]["surface"] = bad.name
+        (tmp_path / "job.yaml").write_text(yaml.safe_dump(content))
+        for ended in (opl("faces", bad), opl("check", tmp_path / "job.yaml")):
+            assert ended.status == 2
+            assert bad.name in ended.err and message in ended.err
+    assert "workpiece.surface" in ended.err
+
+
+@pytest.mark.parametrize("size", [30.0 * 1000.0, 30.0 / 1000.0])
+def test_a_step_file_a_thousand_times_off_ends_with_status_2(tmp_path, size):
+    write_step(BRepPrimAPI_MakeBox(2 * size, size, size).Shape(), tmp_path / "box.step")
+    write_stl(BRepPrimAPI_MakeBox(60.0, 30.0, 30.0).Shape(), tmp_path / "box.stl")
+    content = document({"workpiece.mesh": "box.stl", "workpiece.surface": "box.step"})
+    (tmp_path / "job.yaml").write_text(yaml.safe_dump(content))
+    ended = opl("check", tmp_path / "job.yaml")
+    assert ended.status == 2
+    assert "workpiece.surface: is" in ended.err and "unit" in ended.err
 
 
 def test_bad_files_are_refused(tmp_path):

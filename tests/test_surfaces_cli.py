@@ -131,29 +131,67 @@ def test_a_surface_that_is_a_thousand_times_off_is_refused(tmp_path, scale):
     assert "workpiece.surface: is" in ended.err and "unit" in ended.err
 
 
+def through(mesh):
+    """Return a solid and a second one that goes through it, in one mesh."""
+    vertices = np.vstack([mesh.vertices, mesh.vertices + np.array([3.0, 4.0, 5.0])])
+    faces = np.vstack([mesh.faces, mesh.faces + len(mesh.vertices)])
+    return trimesh.Trimesh(vertices, faces, process=False)
+
+
 @pytest.mark.parametrize(
     ("break_mesh", "message"),
     [
+        (through, "workpiece.mesh: {path}: crosses itself: triangles"),
         (lambda m: trimesh.Trimesh(m.vertices, m.faces[:-1], process=False), "is not closed"),
         (lambda m: trimesh.Trimesh(m.vertices * [1, 1, 0], m.faces, process=False),
          "not closed|encloses no volume|no triangle"),
     ],
 )  # fmt: skip
-def test_a_solid_that_is_open_or_flat_is_refused(tmp_path, break_mesh, message):
+def test_a_solid_that_is_open_flat_or_crosses_itself_is_refused(tmp_path, break_mesh, message):
     path = write_job(tmp_path)
     mesh = trimesh.load(tmp_path / "v_shape.stl")
     break_mesh(mesh).export(tmp_path / "v_shape.stl")
     ended = opl("check", path)
     assert ended.status == 2
+    message = message.format(path=tmp_path / "v_shape.stl")
     assert any(part in ended.err for part in message.split("|"))
 
 
-def test_an_empty_surface_file_is_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("name", "key", "message"),
+    [("surface.json", "surface", "is empty"), ("v_shape.stl", "mesh", "holds no triangles")],
+)
+def test_an_empty_file_is_refused(tmp_path, name, key, message):
     path = write_job(tmp_path)
-    (tmp_path / "surface.json").write_text("")
+    (tmp_path / name).write_text("")
     ended = opl("check", path)
     assert ended.status == 2
-    assert "workpiece.surface" in ended.err and "is empty" in ended.err
+    assert f"workpiece.{key}: {tmp_path / name}: {message}" in ended.err
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"control_points_mm": [[[0, y, 0] for y in (0, 5, 9)]] * 3}, "control_points: span no"),
+        ({"control_points_mm": [[[x, 2 * x, 0]] * 3 for x in (1, 2, 9)]}, "control_points: span"),
+        ({"trim_loops": [[[0, 0], [0.5, 0.5], [1, 1]]]}, "trim_loops: enclose no area"),
+        ({"trim_loops": [[[2, 2], [3, 2], [3, 3]]]}, "trim_loops: lie outside the parameters"),
+    ],
+)
+def test_a_face_without_area_is_refused(tmp_path, changes, message):
+    path = write_job(tmp_path)
+    face = {
+        "degree_u": 2,
+        "degree_v": 2,
+        "knots_u": [0, 0, 0, 1, 1, 1],
+        "knots_v": [0, 0, 0, 1, 1, 1],
+        "control_points_mm": [[[x, y, 0] for y in (0, 5, 9)] for x in (0, 5, 9)],
+        "weights": np.ones((3, 3)).tolist(),
+    }
+    (tmp_path / "surface.json").write_text(json.dumps({"faces": [face, {**face, **changes}]}))
+    ended = opl("check", path)
+    assert ended.status == 2
+    assert f"{tmp_path / 'surface.json'}: faces.1.{message}" in ended.err
 
 
 @pytest.mark.parametrize(

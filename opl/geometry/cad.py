@@ -29,6 +29,9 @@ _BORDER_POINTS = (8, 400)
 # a border that follows the sides of the parameters' rectangle this closely is no trim
 _SIDE = 1e-6
 
+# a face with less area is none [mm^2]
+_LEAST_AREA = 1e-6
+
 _TYPES = (
     "plane",
     "cylinder",
@@ -104,10 +107,10 @@ def _read(path: Path) -> Any:
     from OCP.STEPControl import STEPControl_Reader
 
     try:
-        head = path.read_bytes()[:1]
+        content = path.read_bytes().rstrip()
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror}") from error
-    if not head:
+    if not content:
         raise InputError(str(path), "is empty")
     # OpenCASCADE tells its troubles on standard output
     printers = Message.DefaultMessenger_s().ChangePrinters()
@@ -115,6 +118,9 @@ def _read(path: Path) -> Any:
     is_step = path.suffix.lower() in (".step", ".stp")
     reader = STEPControl_Reader() if is_step else IGESControl_Reader()
     what = "STEP" if is_step else "IGES"
+    # the last record of an IGES file says T in column 73; a file cut short is read without a word
+    if not is_step and content.splitlines()[-1][72:73] != b"T":
+        raise InputError(str(path), "is not a whole IGES file")
     try:
         if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
             raise InputError(str(path), f"is not a whole {what} file")
@@ -143,12 +149,13 @@ def _converted(path: Path, raw: Any, number: int, in_solid: bool) -> CadFace:
     from OCP.TopAbs import TopAbs_Orientation
     from OCP.TopoDS import TopoDS
 
-    kind = int(BRepAdaptor_Surface(raw).GetType())
-    properties = GProp_GProps()
-    BRepGProp.SurfaceProperties_s(raw, properties)
-    if not abs(properties.Mass()) > 1e-6:  # [mm^2]
-        raise InputError(str(path), f"face {number} has no area")
+    outward = -1.0 if raw.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else 1.0
     try:
+        kind = int(BRepAdaptor_Surface(raw).GetType())
+        properties = GProp_GProps()
+        BRepGProp.SurfaceProperties_s(raw, properties)
+        if not abs(properties.Mass()) > _LEAST_AREA:
+            raise ValueError("has no area")
         converted = TopoDS.Face_s(BRepBuilderAPI_NurbsConvert(raw, True).Shape())
         geometry = BRep_Tool.Surface_s(converted)
         if isinstance(geometry, Geom_RectangularTrimmedSurface):
@@ -158,17 +165,22 @@ def _converted(path: Path, raw: Any, number: int, in_solid: bool) -> CadFace:
         placed = geometry.Transformed(converted.Location().Transformation())
         loops = tuple(_loops(converted))
         surface, trim = _surface(placed, loops)
-    except ValueError as error:
+        face = Face(surface, outward, trim)
+    except Exception as error:
+        # OpenCASCADE raises many kinds, which have nothing in common but where they come from
+        if not isinstance(error, ValueError) and not type(error).__module__.startswith("OCP"):
+            raise
         raise InputError(str(path), f"face {number}: {error}") from error
-    outward = -1.0 if raw.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else 1.0
     name = _TYPES[kind] if kind < len(_TYPES) else "other"
-    return CadFace(name, Face(surface, outward, trim), in_solid)
+    return CadFace(name, face, in_solid)
 
 
 def _surface(spline: Any, loops: tuple[Array, ...]) -> tuple[NurbsSurface, Trim | None]:
     """Return the part of a B-spline surface that its loops span, and the trim if there is one."""
     from OCP.Geom import Geom_BSplineSurface
 
+    if not loops:
+        raise ValueError("has no border that can be read")
     corners = np.concatenate(loops)
     low, high = corners.min(axis=0), corners.max(axis=0)
     spline = (

@@ -21,6 +21,9 @@ from opl.geometry.trim import Trim, parts_inside
 # a plane this near to a point where the surface has no normal is moved off it by as much [m]
 _BESIDE_POLE = 2e-7
 
+# a face with less than this fraction of the square of its size has no area
+_LEAST_AREA = 1e-9
+
 # shorter curves are what trimming leaves at corners [m]
 _SHORTEST = 1e-6
 
@@ -33,11 +36,23 @@ class Face:
         surface: The surface.
         outward: 1.0 if du x dv points outward, -1.0 if inward.
         trim: What of it there is, None for all.
+
+    Raises:
+        ValueError: If it has no area; the message begins with what is to blame.
     """
 
     surface: NurbsSurface
     outward: float = 1.0
     trim: Trim | None = None
+
+    def __post_init__(self) -> None:
+        across, along = (np.diff(self.grid.points, axis=axis) for axis in (0, 1))
+        area = np.linalg.norm(np.cross(across[:, :-1], along[:-1]), axis=2).sum()
+        size = np.ptp(self.surface.control_points.reshape(-1, 3), axis=0).max()
+        if not area > _LEAST_AREA * size**2:
+            raise ValueError("control_points: span no area")
+        if self.trim is not None:
+            self.trim.check_against(self.surface.domain)
 
     @cached_property
     def grid(self) -> SurfaceGrid:

@@ -84,9 +84,9 @@ def _face(path: Path, content: _SurfaceFile, key: str) -> Face:
         trim = None
         if content.trim_loops is not None:
             trim = Trim(tuple(np.array(loop) for loop in content.trim_loops))
+        return Face(surface, trim=trim)
     except ValueError as error:
         raise InputError(str(path), f"{key}{error}") from error
-    return Face(surface, trim=trim)
 
 
 def _unrolled(

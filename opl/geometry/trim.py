@@ -10,6 +10,9 @@ import numpy as np
 from opl.geometry.curves import SurfaceCurve, clipped
 from opl.geometry.frames import Array
 
+# loops with less than this fraction of the area of all parameters enclose nothing
+_LEAST_AREA = 1e-12
+
 # what is narrower than this along a curve is not seen [m]; no more looks than this at one curve
 _LOOK = 0.1e-3
 _MAX_LOOKS = 4000
@@ -38,6 +41,29 @@ class Trim:
             own.flags.writeable = False
             loops.append(own)
         object.__setattr__(self, "loops", tuple(loops))
+
+    def check_against(self, domain: Array) -> None:
+        """Refuse loops that leave nothing of a surface.
+
+        Args:
+            domain: Smallest and largest (u, v) of the surface, shape (2, 2).
+
+        Raises:
+            ValueError: If no loop has an area, or none reaches into the domain.
+        """
+        areas = [
+            0.5 * abs(float(np.sum(u * np.roll(v, -1) - np.roll(u, -1) * v)))
+            for u, v in (loop.T for loop in self.loops)
+        ]
+        if not max(areas) > _LEAST_AREA * float(np.ptp(domain, axis=0).prod()):
+            raise ValueError("trim_loops: enclose no area")
+        low, high = (of(np.concatenate(self.loops), axis=0) for of in (np.min, np.max))
+        if (low >= domain[1]).any() or (high <= domain[0]).any():
+            (u0, v0), (u1, v1) = domain
+            raise ValueError(
+                f"trim_loops: lie outside the parameters of the surface, {u0:g} to {u1:g} along u "
+                f"and {v0:g} to {v1:g} along v"
+            )
 
     def contains(self, uv: Array) -> np.ndarray:
         """Return whether parameters are inside, shape (...)."""
