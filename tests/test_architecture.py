@@ -51,7 +51,8 @@ HOMES = {
     "rich": {"console", "console_robots"},
     "matplotlib": {"report"},
     "trimesh": {"geometry/mesh"},
-    "contourpy": {"geometry"},
+    "contourpy": {"geometry/sections"},
+    "OCP": {"geometry/cad"},
     "numba": {"cell/clearance", "planning"},
 }
 
