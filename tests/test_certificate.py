@@ -1,5 +1,6 @@
 """The certified least box and the smoothest track against exhaustive enumeration."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 from opl.planning.box import JointBox
 from opl.planning.certificate import least_box
 from opl.planning.ladder import Ladder
-from opl.planning.smooth import Roughness, smoothest
+from opl.planning.smooth import Roughness, Travel, smoothest, smoothest_within
 
 
 def random_field(seed):
@@ -77,7 +78,9 @@ def cost_of(ladder, rows, roughness):
     t = ladder.contact_position[list(rows)]
     turned = np.abs(np.diff(q, axis=0))
     on_wheel = ~ladder.off_wheel
-    seconds = np.maximum(roughness.step_seconds, (turned / roughness.max_speed).max(axis=1))
+    sliding = np.abs(np.diff(t)) / roughness.contact_speed
+    turning = (turned / roughness.max_speed).max(axis=1)
+    seconds = np.maximum(np.maximum(roughness.step_seconds, turning), sliding)
     return float(
         (turned @ roughness.joint_weights).sum()
         + roughness.contact_weight * np.abs(np.diff(t))[on_wheel].sum()
@@ -94,6 +97,7 @@ def random_roughness(ladder, seed):
         time_weight=float(random.uniform(0.0, 0.5)),
         step_seconds=np.where(ladder.off_wheel, 0.0, random.uniform(0.0, 1.0)),
         max_speed=random.uniform(0.5, 2.0, 6),
+        contact_speed=float(random.uniform(1.0, 10.0)),
         node_cost=random.uniform(0.0, 0.5, ladder.free.shape),
     )
 
@@ -168,6 +172,48 @@ def test_the_smoothest_track_is_the_one_that_enumeration_finds(block):
         assert tuple(found.rows) in set(tracks)
 
 
+def travel_of(ladder, rows):
+    """Joint travel and travel of t on the wheel, written from their description."""
+    on_wheel = [c for c in range(len(rows) - 1) if not ladder.off_wheel[c]]
+    joints = sum(
+        np.abs(ladder.q[c + 1, rows[c + 1]] - ladder.q[c, rows[c]]).sum() for c in on_wheel
+    )
+    t = ladder.contact_position
+    return float(joints), float(sum(abs(t[rows[c + 1]] - t[rows[c]]) for c in on_wheel))
+
+
+def test_a_track_that_moves_no_further_than_another_is_found_where_a_dearer_t_leads_to_one():
+    kept = 0
+    for seed in range(300):
+        ladder, blocked = random_field(seed)
+        roughness = random_roughness(ladder, seed)
+        keys, inside = keys_of(ladder, blocked), np.ones_like(ladder.free)
+        cheapest = smoothest(ladder, keys, inside, roughness)
+        calm = smoothest(ladder, keys, inside, replace(roughness, contact_weight=10.0))
+        if cheapest is None:
+            assert smoothest_within(ladder, keys, inside, roughness, Travel(9.0, 9.0)) is None
+            continue
+        # all the room in the joints, none in t but what the calmest track needs
+        most = Travel(np.inf, travel_of(ladder, calm.rows)[1])
+        found = smoothest_within(ladder, keys, inside, roughness, most)
+        if travel_of(ladder, cheapest.rows)[1] <= most.contact:
+            np.testing.assert_array_equal(found.rows, cheapest.rows)
+        elif (found.rows != cheapest.rows).any():
+            assert travel_of(ladder, found.rows)[1] <= most.contact + 1e-9
+            kept += 1
+    assert kept > 20
+
+
+def test_a_track_that_cannot_move_less_stays_the_cheapest():
+    ladder, _ = random_field(8)
+    ladder = replace(ladder, max_joint_step=4.0)  # every step may be made
+    keys, inside = np.empty(0, dtype=np.int64), np.ones_like(ladder.free)
+    roughness = random_roughness(ladder, 8)
+    cheapest = smoothest(ladder, keys, inside, roughness)
+    found = smoothest_within(ladder, keys, inside, roughness, Travel(-1.0, -1.0))
+    np.testing.assert_array_equal(found.rows, cheapest.rows)
+
+
 def test_the_smoothest_track_of_a_large_field_is_a_shortest_path_of_scipy():
     random = np.random.default_rng(7)
     n_columns, n_rows = 40, 30
@@ -208,6 +254,7 @@ def test_the_smoothest_track_of_a_large_field_is_a_shortest_path_of_scipy():
                         roughness.time_weight,
                         roughness.step_seconds[column : column + 1],
                         roughness.max_speed,
+                        roughness.contact_speed,
                         np.stack([np.zeros(n_rows), roughness.node_cost[column + 1]]),
                     )
                     key = (column * n_rows + row, (column + 1) * n_rows + following)

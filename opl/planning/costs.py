@@ -70,5 +70,6 @@ def roughness(
         time_weight=costs.time_weight,
         step_seconds=np.where(problem.off_wheel, 0.0, arc_step / problem.pace.feed),
         max_speed=robot.max_speed,
+        contact_speed=problem.pace.contact_speed,
         node_cost=node_cost,
     )

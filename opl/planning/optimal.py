@@ -22,7 +22,7 @@ from opl.planning.path import BrokenStepError, fill_in
 from opl.planning.plan import Plan, check_track
 from opl.planning.problem import GrindingProblem
 from opl.planning.refine import RefinedProblem, carried, refine
-from opl.planning.smooth import smoothest
+from opl.planning.smooth import Travel, smoothest_within
 from opl.planning.symmetry import twins, undominated
 
 SUBDIVIDE = np.array([0.25, 0.5, 0.75])  # where a step that bulges is given columns
@@ -59,13 +59,15 @@ def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: 
     Args:
         problem: What is to be planned.
         settings: What is wanted.
-        fallback: The motion to return if no better one is found in time.
+        fallback: The motion to return if no better one is found in time. Joints and contact should
+            not travel further than along it.
 
     Returns:
         The plan with its lower bound.
     """
     deadline = time.monotonic() + settings.seconds
-    search = _Search(problem, settings, deadline)
+    path = fallback.path
+    search = _Search(problem, settings, Travel(path.joint_travel, path.contact_travel), deadline)
     plan = search.run()
     if plan is None or plan.path.joint_range_sum > fallback.path.joint_range_sum:
         plan = fallback
@@ -76,9 +78,10 @@ class _Search:
     """The certified search, and what it has learnt of collisions."""
 
     def __init__(
-        self, problem: GrindingProblem, settings: OptimalSettings, deadline: float
+        self, problem: GrindingProblem, settings: OptimalSettings, most: Travel, deadline: float
     ) -> None:
         self._settings = settings
+        self._most = most
         self._deadline = deadline
         self._original = branches_of(problem)
         self._refined = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
@@ -161,7 +164,7 @@ class _Search:
             inside = branch.free & wide.holds(np.nan_to_num(branch.nodes.q, nan=np.inf))
             costs = roughness(problem, branch.nodes, settings.costs, inside)
             while not self._late():
-                smooth = smoothest(ladder, branch.blocked_steps, inside, costs)
+                smooth = smoothest_within(ladder, branch.blocked_steps, inside, costs, self._most)
                 if smooth is None:
                     break
                 bulges = self._bulges(branch, smooth.rows, wide)
