@@ -371,6 +371,21 @@ def _origin(element):
     return T
 
 
+class Ghosts:
+    """A scene in which postures near some others collide; stands in for a `CollisionScene`."""
+
+    def __init__(self, q, radius):
+        self._q = np.atleast_2d(q)
+        self._radius = radius
+
+    def collides(self, q):
+        away = np.linalg.norm(np.asarray(q)[:, None] - self._q, axis=-1)
+        return (away < self._radius).any(axis=1)
+
+    def colliding_pairs(self, q):
+        return [("R_link", "ghost")] if self.collides(q[None])[0] else []
+
+
 # the paper's search, as printed
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from cells import (
     FclScene,
+    Ghosts,
     printed_recursion,
     problem_of,
     small_job,
@@ -105,21 +106,6 @@ def test_the_same_problem_gives_the_same_motion():
 
 
 # things in the way
-
-
-class Ghosts:
-    """A scene in which postures near some others collide; stands in for a `CollisionScene`."""
-
-    def __init__(self, q, radius):
-        self._q = np.atleast_2d(q)
-        self._radius = radius
-
-    def collides(self, q):
-        away = np.linalg.norm(np.asarray(q)[:, None] - self._q, axis=-1)
-        return (away < self._radius).any(axis=1)
-
-    def colliding_pairs(self, q):
-        return [("R_link", "ghost")] if self.collides(q[None])[0] else []
 
 
 @cache

@@ -1,0 +1,234 @@
+"""The certified method on real cells: value, bound and motion, against searches of other kinds."""
+
+from dataclasses import replace
+from functools import cache
+from itertools import product
+
+import numpy as np
+import pytest
+from cells import (
+    FclScene,
+    Ghosts,
+    problem_of,
+    small_job,
+    v_job,
+    with_positions,
+)
+from jobs import opl, write_job
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from opl.planning.cheapest import plan_cheapest
+from opl.planning.check import RESOLUTION, densify
+from opl.planning.optimal import plan_optimal
+from opl.planning.plan import plan_recursive
+from opl.planning.timing import timed
+from opl.verification.replay import replay
+
+SETTINGS = v_job().search.optimal
+ONLY_TRAVEL = replace(
+    SETTINGS.costs, contact_weight=0.0, limit_weight=0.0, singularity_weight=0.0, push_weight=0.0
+)
+ONLY_TIME = replace(ONLY_TRAVEL, joint_weights=np.zeros(6), time_weight=1.0)
+
+
+@cache
+def one_row():
+    """Return one pass over the tip of the V part, 20 cutter points at 40 contact positions."""
+    job = small_job()
+    return problem_of(
+        with_positions(replace(job, passes=replace(job.passes, rows=1)), 40), slice(20, 40)
+    )
+
+
+@cache
+def v_row():
+    """Return the middle row of the V part as it is: 60 cutter points at 140 contact positions."""
+    return problem_of(replace(v_job(), passes=replace(v_job().passes, rows=1)))
+
+
+@cache
+def two_rows():
+    """Return the end of one pass and the beginning of the next."""
+    return problem_of(with_positions(small_job(), 40), slice(50, 70))
+
+
+@cache
+def recursive(make):
+    return plan_recursive(make())
+
+
+@cache
+def optimal(make):
+    return plan_optimal(make(), SETTINGS, recursive(make))
+
+
+def on_wheel(motion):
+    return motion.q[~np.isnan(motion.cutter_point)]
+
+
+def free_tracks(problem):
+    """Yield (posture at each cutter point, t at each) of every continuous track of a tiny field."""
+    rule = problem.interpolation
+    for nodes in problem.field.branches:
+        free = problem.free_nodes(nodes)
+        for rows in product(*(np.flatnonzero(column) for column in free)):
+            q = nodes.q[np.arange(len(rows)), list(rows)]
+            t = nodes.contact_position[list(rows)]
+            moves = np.maximum(np.ceil(np.abs(np.diff(t)) / rule.max_contact_step - 1e-9), 1.0)
+            turned = np.abs(np.diff(q, axis=0)).max(axis=1)
+            if (turned <= rule.max_joint_step * moves).all():
+                yield q, t
+
+
+CELLS = pytest.mark.parametrize("make", [v_row, two_rows], ids=["V row", "two rows"])
+
+
+@CELLS
+def test_the_bound_lies_below_the_value_and_the_motion_attains_the_value(make):
+    plan = optimal(make)
+    value = np.ptp(on_wheel(plan.motion), axis=0).sum()
+    assert plan.path.joint_range_sum == pytest.approx(value, abs=1e-12)
+    assert plan.lower_bound <= value
+    assert value <= recursive(make).path.joint_range_sum
+
+
+@CELLS
+def test_every_cutter_point_is_ground_where_the_path_says(make):
+    problem, plan = make(), optimal(make)
+    whole = plan.path.cutter_point % 1.0 == 0.0
+    np.testing.assert_array_equal(plan.path.cutter_point[whole], np.arange(len(problem.points)))
+    np.testing.assert_array_equal(plan.path.pass_index[whole], problem.points.pass_index)
+
+
+def test_a_row_of_the_v_part_is_within_a_thousandth_of_the_least_there_is():
+    found, other = optimal(v_row).path, recursive(v_row).path
+    assert found.joint_range_sum <= 1.895
+    assert found.joint_range_sum * (1.0 - 1e-3) <= optimal(v_row).lower_bound
+    assert found.joint_travel <= other.joint_travel
+
+
+def test_the_motion_is_free_in_two_other_scenes():
+    problem, plan = two_rows(), optimal(two_rows)
+    scene = FclScene(problem.cell)
+    dense, _ = densify(plan.motion.q, RESOLUTION)
+    assert all(min(scene.clearances(q).values(), default=1.0) > 0.0 for q in dense[::4])
+    motion = timed(plan.motion, problem.points, problem.pace, problem.cell.robot.max_speed)
+    allowed = small_job().search.max_contact_error
+    verification = replay(problem.cell, problem.points, motion, allowed)
+    assert verification.verified is not None, verification.findings
+
+
+def test_the_same_problem_gives_the_same_bytes():
+    problem = problem_of(
+        with_positions(replace(small_job(), passes=replace(small_job().passes, rows=1)), 40),
+        slice(20, 40),
+    )
+    again = plan_optimal(problem, SETTINGS, plan_recursive(problem))
+    assert again.motion.q.tobytes() == optimal(one_row).motion.q.tobytes()
+    assert again.lower_bound == optimal(one_row).lower_bound
+
+
+@pytest.mark.parametrize("first", [22, 36, 57])
+def test_the_bound_of_a_tiny_field_is_the_least_sum_of_all_its_tracks(first):
+    problem = problem_of(with_positions(small_job(), 7), slice(first, first + 4))
+    plan = plan_optimal(problem, SETTINGS, plan_recursive(problem))
+    least = min(np.ptp(q, axis=0).sum() for q, _ in free_tracks(problem))
+    assert plan.lower_bound == pytest.approx(least, rel=1e-5)
+    assert plan.lower_bound <= least + 1e-12
+
+
+def test_what_collides_is_avoided_and_the_bound_still_holds():
+    problem, free = one_row(), optimal(one_row)
+    inner = free.path.q[(free.path.cutter_point > 5) & (free.path.cutter_point < 15)]
+    ghosts = Ghosts(inner[:: len(inner) // 4], radius=0.02)
+    haunted = replace(problem, scene=ghosts)
+    plan = plan_optimal(haunted, SETTINGS, plan_recursive(haunted))
+    assert not ghosts.collides(densify(plan.motion.q, RESOLUTION)[0]).any()
+    assert plan.lower_bound <= plan.path.joint_range_sum
+    assert plan.lower_bound >= free.lower_bound - 1e-9  # what is out can only raise it
+
+
+def test_an_interrupted_search_returns_what_there_was_and_a_bound_that_holds():
+    problem = one_row()
+    plan = plan_optimal(problem, replace(SETTINGS, seconds=1e-9), recursive(one_row))
+    assert plan.motion is recursive(one_row).motion
+    assert 0.0 <= plan.lower_bound <= optimal(one_row).lower_bound + 1e-12
+
+
+def test_an_interrupted_proof_still_leaves_a_verified_program(tmp_path):
+    job = write_job(tmp_path / "job", {"search.seconds": 1e-9})
+    ended = opl("run", job, "--out", tmp_path / "out")
+    assert ended.status == 0, ended.err
+    assert "0 collisions" in ended.out
+    assert (tmp_path / "out" / "V_SHAPE.JBI").is_file()
+
+
+# least travel, least time
+
+
+def shortest(problem, price):
+    """Return the least price of all tracks of a field, by scipy, every step an edge.
+
+    Args:
+        problem: The problem.
+        price: price(q_here, q_there, t_here, t_there, column) of a step on the wheel.
+    """
+    rule = problem.interpolation
+    best = np.inf
+    for nodes in problem.field.branches:
+        free, (n, m) = problem.free_nodes(nodes), nodes.q.shape[:2]
+        tails, heads, prices = [], [], []
+        for column in range(n - 1):
+            here, there = np.flatnonzero(free[column]), np.flatnonzero(free[column + 1])
+            a, b = (grid.ravel() for grid in np.meshgrid(here, there, indexing="ij"))
+            q_a, q_b = nodes.q[column, a], nodes.q[column + 1, b]
+            t_a, t_b = nodes.contact_position[a], nodes.contact_position[b]
+            moves = np.maximum(np.ceil(np.abs(t_b - t_a) / rule.max_contact_step - 1e-9), 1.0)
+            small = np.abs(q_b - q_a).max(axis=1) <= rule.max_joint_step * moves
+            tails.append((column * m + a)[small])
+            heads.append(((column + 1) * m + b)[small])
+            prices.append(1.0 + price(q_a, q_b, t_a, t_b, column)[small])
+        starts, ends = np.flatnonzero(free[0]), np.flatnonzero(free[-1])
+        tails += [np.full(len(starts), n * m), (n - 1) * m + ends]
+        heads += [starts, np.full(len(ends), n * m + 1)]
+        prices += [np.ones(len(starts)), np.ones(len(ends))]
+        edges = (np.concatenate(tails), np.concatenate(heads))
+        graph = csr_array((np.concatenate(prices), edges), shape=(n * m + 2, n * m + 2))
+        best = min(best, dijkstra(graph, indices=n * m)[n * m + 1] - (n + 1))
+    return best
+
+
+def at_cutter_points(path):
+    whole = path.cutter_point % 1.0 == 0.0
+    return path.q[whole], path.contact_position[whole]
+
+
+def test_the_least_travel_is_a_shortest_path_of_scipy():
+    problem = one_row()
+    plan = plan_cheapest(problem, ONLY_TRAVEL, SETTINGS.max_contact_change)
+    q, _ = at_cutter_points(plan.path)
+    least = shortest(problem, lambda a, b, *_: np.abs(b - a).sum(axis=1))
+    assert plan.checks == 1  # nothing was in the way, so the field is scipy's
+    assert np.abs(np.diff(q, axis=0)).sum() == pytest.approx(least, abs=1e-9)
+    assert plan.path.joint_travel >= least - 1e-9
+
+
+def test_the_least_time_is_a_shortest_path_of_scipy():
+    problem = one_row()
+    slow = replace(problem.cell.robot, max_speed=problem.cell.robot.max_speed / 40.0)
+    problem = replace(problem, cell=replace(problem.cell, robot=slow))
+    arc = np.abs(np.diff(problem.points.arc_length)) / problem.pace.feed
+
+    def seconds(q_a, q_b, t_a, t_b, column):
+        turning = (np.abs(q_b - q_a) / slow.max_speed).max(axis=1)
+        sliding = np.abs(t_b - t_a) / problem.pace.contact_speed
+        return np.maximum(np.maximum(turning, sliding), arc[column])
+
+    plan = plan_cheapest(problem, ONLY_TIME, SETTINGS.max_contact_change)
+    q, t = at_cutter_points(plan.path)
+    steps = range(len(q) - 1)
+    spent = sum(float(seconds(q[[k]], q[[k + 1]], t[[k]], t[[k + 1]], k)[0]) for k in steps)
+    assert plan.checks == 1
+    assert spent == pytest.approx(shortest(problem, seconds), abs=1e-9)
+    assert spent > arc.sum() * 1.05  # the feed alone does not decide here
