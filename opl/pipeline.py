@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 from opl.cell.clearance import PartTree, part_tree, wheel_clearance
 from opl.cell.collision import CollisionScene
@@ -28,6 +28,7 @@ from opl.surfacing import cut_surface
 from opl.verification.replay import replay
 
 Progress = Callable[[str, float], None]
+Clock = Callable[[str], AbstractContextManager[None]]  # measures the stage it is called with
 
 
 def run(job: Job, progress: Progress = lambda stage, fraction: None) -> Outcome:
@@ -96,8 +97,13 @@ def cutter_points(job: Job) -> CutterPoints:
     return cut_surface(job).points
 
 
-def pose_problem(job: Job, points: CutterPoints, clock: _Clock) -> GrindingProblem:
+def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProblem:
     """Build the node matrix and the clearance layer.
+
+    Args:
+        job: The job.
+        points: Its cutter points.
+        clock: Measures the stages.
 
     Raises:
         InputError: If the arm reaches some cutter point at no contact position, or collides at
