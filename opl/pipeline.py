@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager, contextmanager
 
 from opl.cell.clearance import PartTree, part_tree, wheel_clearance
 from opl.cell.collision import CollisionScene
+from opl.cell.enclosure import enclosing_bodies
 from opl.cell.robot import forward
 from opl.cell.workcell import PART, WHEEL
 from opl.errors import InputError, NoPathError
@@ -127,6 +128,10 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
             f"{runs_of(unreachable)} of {len(points)}; check wheel.T_base_contact0_mm and "
             "fixture.T_flange_workpiece_mm",
         )
+    inside = enclosing_bodies(job.cell, job.pace.home)
+    if inside:
+        pairs = ", ".join(" inside of ".join(pair) for pair in inside)
+        raise InputError(f"{job.path}: process.home_deg", f"at home one is in the other: {pairs}")
     hits = [*scene.colliding_pairs(job.pace.home), *_part_near_wheel(job, part)]
     if hits:
         pairs = ", ".join(" and ".join(pair) for pair in hits)
@@ -142,8 +147,9 @@ def _part_near_wheel(job: Job, part: PartTree) -> list[tuple[str, str]]:
     """Return part and wheel if they are too near at home, where they do not touch on purpose."""
     home = job.pace.home[None]
     Ts_contact0_workpiece = job.cell.Ts_contact0_workpiece(forward(job.cell.robot, home))
-    distance = wheel_clearance(part, job.cell.wheel, Ts_contact0_workpiece, job.cell.clearance)[0]
-    return [(PART, WHEEL)] if distance < job.cell.clearance else []
+    needed = job.cell.part_from_wheel
+    distance = wheel_clearance(part, job.cell.wheel, Ts_contact0_workpiece, needed)[0]
+    return [(PART, WHEEL)] if distance < needed else []
 
 
 class _Clock:

@@ -245,12 +245,7 @@ class FclScene:
                     geometry, radius = fcl.Cylinder(r, h), np.hypot(r, h / 2)
                 name = link.get("name")
                 self._add(name, name, _origin(collision.find("origin")), geometry, radius)
-        mesh = fcl.BVHModel()
-        mesh.beginModel(len(cell.part.vertices), len(cell.part.faces))
-        mesh.addSubModel(cell.part.vertices, cell.part.faces)
-        mesh.endModel()
-        radius = np.linalg.norm(cell.part.vertices, axis=1).max()
-        self._add("part", "tool0", cell.T_flange_workpiece, mesh, radius)
+        self._add("part", "tool0", cell.T_flange_workpiece, *_fcl_mesh(cell.part))
         for body in cell.fixture:
             self._add_body(body, "tool0")
         for body in cell.obstacles:
@@ -274,6 +269,8 @@ class FclScene:
         if isinstance(body.shape, Box):
             geometry = fcl.Box(*body.shape.size)
             radius = np.linalg.norm(body.shape.size) / 2
+        elif isinstance(body.shape, TriangleMesh):
+            geometry, radius = _fcl_mesh(body.shape)
         else:
             geometry = fcl.Cylinder(body.shape.radius, body.shape.length)
             radius = np.hypot(body.shape.radius, body.shape.length / 2)
@@ -284,7 +281,8 @@ class FclScene:
 
         Links that are no neighbours must not touch. Held bodies keep the clearance from all links
         but the flange's, and need only not touch the last but one. Held bodies and all links but
-        the foot keep the clearance from everything fixed; part and wheel are asked elsewhere.
+        the foot keep the clearance from everything fixed; part and wheel are asked elsewhere. What
+        is said of a pair by name goes before all that.
         """
         held = {"part", *(body.name for body in cell.fixture)}
         place = {name: k for k, name in enumerate(chain)}
@@ -302,7 +300,13 @@ class FclScene:
                 continue
             elif a in place or (a in held and b not in held):
                 pairs.append((one, other, cell.clearance))
-        return pairs
+        return list(self._as_said(pairs, cell.pairs))
+
+    def _as_said(self, pairs, rules):
+        for one, other, needed in pairs:
+            names = frozenset([self.pieces[one][0], self.pieces[other][0]])
+            if names not in rules.allowed:
+                yield one, other, rules.clearances.get(names, needed)
 
     @staticmethod
     def _rank(place, held):
@@ -360,6 +364,15 @@ class FclScene:
             key = (first[0], second[0])
             margins[key] = min(margins.get(key, np.inf), distance - needed[k])
         return margins
+
+
+def _fcl_mesh(mesh):
+    """Return triangles as fcl's geometry, and the radius of a ball around them."""
+    geometry = fcl.BVHModel()
+    geometry.beginModel(len(mesh.vertices), len(mesh.faces))
+    geometry.addSubModel(mesh.vertices, mesh.faces)
+    geometry.endModel()
+    return geometry, np.linalg.norm(mesh.vertices, axis=1).max()
 
 
 def _origin(element):

@@ -13,7 +13,7 @@ import pinocchio as pin
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh
-from opl.geometry.shapes import Body, Box
+from opl.geometry.shapes import Body, Box, Cylinder
 
 Pair = tuple[str, str]
 
@@ -25,6 +25,7 @@ class CollisionScene:
     against all links but the flange's, and links and held bodies against wheel and obstacles. Pairs
     with something that is not the robot must stay apart by the clearance of the cell; links of the
     robot must not touch each other (their primitives already enclose the real castings).
+    The cell may say otherwise of single pairs.
     """
 
     def __init__(self, cell: WorkCell) -> None:
@@ -38,7 +39,7 @@ class CollisionScene:
         self._n_links = self._geometry.ngeoms
         self._add_bodies(cell)
         self._pairs: list[Pair] = []
-        margins = self._choose_pairs(cell.clearance)
+        margins = self._choose_pairs(cell)
         self._data = self._model.createData()
         self._geometry_data = self._geometry.createData()
         for request, margin in zip(self._geometry_data.collisionRequests, margins, strict=True):
@@ -81,9 +82,9 @@ class CollisionScene:
         base = self._model.frames[self._model.getFrameId("base")]
         self._add(PART, _mesh(cell.part), flange, cell.T_flange_workpiece)
         for body in cell.fixture:
-            self._add(body.name, _primitive(body), flange, body.T_parent_body)
+            self._add(body.name, _solid(body), flange, body.T_parent_body)
         for body in (cell.wheel_body(), *cell.obstacles):
-            self._add(body.name, _primitive(body), base, body.T_parent_body)
+            self._add(body.name, _solid(body), base, body.T_parent_body)
 
     def _add(
         self, name: str, shape: coal.CollisionGeometry, frame: pin.Frame, T_frame_body: Array
@@ -93,7 +94,7 @@ class CollisionScene:
             pin.GeometryObject(name, frame.parentJoint, placement, shape)
         )
 
-    def _choose_pairs(self, clearance: float) -> list[float]:
+    def _choose_pairs(self, cell: WorkCell) -> list[float]:
         """Enter the pairs to be asked and return the margin of each in [m]."""
         joints = [geometry.parentJoint for geometry in self._geometry.geometryObjects]
         margins = []
@@ -105,11 +106,15 @@ class CollisionScene:
                 # nothing moves within one joint; neighbouring links share a bearing
                 if apart == 0 or (both_links and apart == 1) or pair == (PART, WHEEL):
                     continue
-                self._geometry.addCollisionPair(pin.CollisionPair(first, second))
-                self._pairs.append(pair)
                 # joint 0 is what does not move: next to the first link, but not its neighbour
                 held_at_wrist = apart == 1 and min(joints[first], joints[second]) > 0
-                margins.append(0.0 if both_links or held_at_wrist else clearance)
+                usual = 0.0 if both_links or held_at_wrist else cell.clearance
+                margin = cell.pairs.needed(*pair, otherwise=usual)
+                if margin is None:
+                    continue
+                self._geometry.addCollisionPair(pin.CollisionPair(first, second))
+                self._pairs.append(pair)
+                margins.append(margin)
         return margins
 
     def _name(self, index: int) -> str:
@@ -120,10 +125,12 @@ class CollisionScene:
         return str(geometry.name)
 
 
-def _primitive(body: Body) -> coal.CollisionGeometry:
+def _solid(body: Body) -> coal.CollisionGeometry:
     if isinstance(body.shape, Box):
         return coal.Box(*body.shape.size)
-    return coal.Cylinder(body.shape.radius, body.shape.length)
+    if isinstance(body.shape, Cylinder):
+        return coal.Cylinder(body.shape.radius, body.shape.length)
+    return _mesh(body.shape)
 
 
 def _mesh(mesh: TriangleMesh) -> coal.CollisionGeometry:

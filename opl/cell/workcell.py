@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from opl.cell.limits import Limit, broken, within
+from opl.cell.pairs import PairRules
 from opl.cell.robot import Robot
 from opl.geometry.frames import Array, inverse, pose
 from opl.geometry.mesh import TriangleMesh
@@ -31,6 +32,7 @@ class WorkCell:
         T_flange_workpiece: How the fixture holds the part, shape (4, 4).
         contact_allowance: How deep the part may sink into the belt in [m].
         clearance: Distance to keep from everything else in [m].
+        pairs: The pairs that keep another distance, or none.
         limits: Limits of joints and sums of joints beside the robot's own.
     """
 
@@ -42,6 +44,7 @@ class WorkCell:
     T_flange_workpiece: Array
     contact_allowance: float
     clearance: float
+    pairs: PairRules = field(default_factory=PairRules)
     limits: tuple[Limit, ...] = ()
 
     @property
@@ -52,6 +55,17 @@ class WorkCell:
         `SECOND_OPINION`, agrees.
         """
         return max(self.contact_allowance - SECOND_OPINION, self.contact_allowance / 2.0)
+
+    @property
+    def part_from_wheel(self) -> float:
+        """Distance that the part keeps from the wheel on free moves in [m]."""
+        needed = self.pairs.needed(PART, WHEEL, self.clearance)
+        assert needed is not None, "the belt has its own allowance"
+        return needed
+
+    def widened(self, by: float) -> WorkCell:
+        """Return a cell in which everything must stay so much farther apart, in [m]."""
+        return replace(self, clearance=self.clearance + by, pairs=self.pairs.widened(by))
 
     def within_limits(self, q: Array) -> np.ndarray:
         """Return which postures, shape (..., 6) in [rad], keep every joint limit, shape (...)."""

@@ -1,10 +1,11 @@
-"""Primitive solids that stand in a cell or are fixed to the flange."""
+"""Solids that stand in a cell or are fixed to the flange: primitives and meshes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from opl.geometry.frames import Array
+from opl.geometry.mesh import TriangleMesh
 
 
 @dataclass(frozen=True)
@@ -43,5 +44,5 @@ class Body:
     """
 
     name: str
-    shape: Box | Cylinder
+    shape: Box | Cylinder | TriangleMesh
     T_parent_body: Array

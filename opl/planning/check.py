@@ -69,7 +69,7 @@ def find_faults(
     q, move = densify(motion.q, RESOLUTION)
     Ts_base_flange = forward(cell.robot, q)
     free_move = np.array([stretch in FREE_MOVES for stretch in motion.stretch])
-    needed = np.where(free_move[move], cell.clearance, -cell.planned_allowance)
+    needed = np.where(free_move[move], cell.part_from_wheel, -cell.planned_allowance)
     Ts_contact0_workpiece = cell.Ts_contact0_workpiece(Ts_base_flange)
     cuts = wheel_clearance(part, cell.wheel, Ts_contact0_workpiece, needed) < needed
     # a move that is refused for the wheel need not be asked about the rest

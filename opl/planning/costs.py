@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -60,7 +60,7 @@ def roughness(
     near = singularity_margins(robot.arm, q) / NEAR_SINGULARITY
     charge += costs.singularity_weight * np.square(np.maximum(1.0 - near, 0.0)).sum(axis=-1)
     if costs.push_away > 0.0 and costs.push_weight > 0.0:
-        wider = replace(problem.cell, clearance=problem.cell.clearance + costs.push_away)
+        wider = problem.cell.widened(costs.push_away)
         charge += costs.push_weight * CollisionScene(wider).collides(q)
     node_cost[inside] = charge
     arc_step = np.abs(np.diff(problem.points.arc_length))

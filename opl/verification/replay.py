@@ -151,6 +151,10 @@ class _Run:
         self._corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
         self._q = motion.q[0]
         self._at = transform(world.move_to(self._q), self._corners)
+        for name in world.surrounding():
+            self.collisions += 1
+            told = f"robot and {name}"
+            self.findings.add("collision", "start", where(motion, 0), told, 0.0, "one in the other")
 
     def make_move(self, move: int) -> None:
         """Go on to a posture, checking on the way."""
@@ -202,9 +206,10 @@ class _Run:
         grinding = motion.stretch[move] in ON_WHEEL
         touching_down = grinding and motion.stretch[move - 1] is Stretch.APPROACH
         free = not grinding and motion.stretch[move] not in ALONG_NORMAL
-        horizon = max(cell.clearance, FARTHEST_GAP)
+        off_wheel = cell.pairs.clearances.get(frozenset((PART, WHEEL)), cell.clearance)
+        horizon = max(off_wheel, FARTHEST_GAP)
         gap = min(self._world.gap(horizon), horizon)
-        needed = cell.clearance if free else -cell.contact_allowance
+        needed = off_wheel if free else -cell.contact_allowance
         if gap < needed:
             self._too_near(move, PART, WHEEL, gap, needed)
             return True

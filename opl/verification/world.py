@@ -2,21 +2,24 @@
 
 Nothing here is shared with `opl.cell.collision`: PyBullet reads the URDF itself, poses the links
 itself and measures distances itself. The part is a concave triangle mesh, not its convex hull,
-which Bullet allows only for bodies without mass that are placed by pose.
+which Bullet allows only for bodies without mass that are placed by pose. Between two such meshes
+Bullet finds nothing at all, so every other mesh is a compound of its triangles, each a convex body.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from opl.cell.workcell import PART, WorkCell
 from opl.geometry.frames import Array, pose
-from opl.geometry.shapes import Body, Box
+from opl.geometry.mesh import TriangleMesh
+from opl.geometry.shapes import Body, Box, Cylinder
 from opl.verification.engine import pybullet, start
+from opl.verification.meshes import is_inside, triangle_body
 
 BASE_LINK = -1  # Bullet's number of the link that does not move
 # Bullet rounds the edges of a link's boxes by about this much, so that they seem farther away than
@@ -59,6 +62,8 @@ class World:
     def __init__(self, cell: WorkCell) -> None:
         self._cell = cell
         self._client = start()
+        # else a file is taken for an earlier one of its name
+        self._client.setPhysicsEngineParameter(enableFileCaching=0)
         self._robot = self._client.loadURDF(
             str(cell.robot.urdf),
             basePosition=[0.0, 0.0, -cell.robot.base_height],
@@ -95,13 +100,23 @@ class World:
 
     def pairs(self) -> list[Pair]:
         """Return every pair that must stay apart; part and wheel may touch and are not in it."""
-        return list(self._pairs())
+        return [pair for pair in map(self._as_said, self._pairs()) if pair is not None]
+
+    def _as_said(self, pair: Pair) -> Pair | None:
+        """Return a pair with what the cell says of it; None if the two may touch."""
+        names = {pair.first.name, pair.second.name}
+        if any(names == set(allowed) for allowed in self._cell.pairs.allowed):
+            return None
+        for told, clearance in self._cell.pairs.clearances.items():
+            if names == set(told):
+                return replace(pair, clearance=clearance)
+        return pair
 
     def _pairs(self) -> Iterator[Pair]:
         links, clearance = self._links, self._cell.clearance
         for k, link in enumerate(links):
             # neighbouring links share a bearing
-            yield from (Pair(link, other, 0.0, LINK_ROUNDING) for other in links[k + 2 :])
+            yield from (Pair(link, other, 0.0, 2.0 * LINK_ROUNDING) for other in links[k + 2 :])
             if k > 0:  # the base does not move, nor does what stands around it
                 for other in (self._wheel, *self._obstacles):
                     yield Pair(link, other, clearance, LINK_ROUNDING)
@@ -140,6 +155,21 @@ class World:
     def gap(self, within: float) -> float:
         """Return the distance of the part from the wheel in [m], as `distance`."""
         return self.distance(self._held[0][0], self._wheel, within)
+
+    def surrounding(self) -> list[str]:
+        """Return the meshes around flange or part as posed: distances are those of surfaces."""
+        state = self._client.getLinkState(self._robot, self._flange, computeForwardKinematics=True)
+        held = self._client.getBasePositionAndOrientation(self._held[0][0].body)
+        R_base_part = np.array(self._client.getMatrixFromQuaternion(held[1])).reshape(3, 3)
+        points = [np.array(state[4]), R_base_part @ self._cell.part.vertices[0] + held[0]]
+        found = []
+        for body in self._cell.obstacles:
+            if isinstance(body.shape, TriangleMesh):
+                R, p = body.T_parent_body[:3, :3], body.T_parent_body[:3, 3]
+                corners = body.shape.vertices[body.shape.faces] @ R.T + p
+                if any(is_inside(corners, point) for point in points):
+                    found.append(body.name)
+        return found
 
     def distance_to_wheel(self, p_base: Array) -> float:
         """Return how far a point, given in the base frame, is from the wheel's surface in [m].
@@ -197,20 +227,27 @@ class World:
         return self._body(PART, shape)
 
     def _add(self, body: Body, T_base_body: Array | None = None) -> Solid:
+        client = self._client
         if isinstance(body.shape, Box):
             half = [edge / 2.0 for edge in body.shape.size]
-            shape = self._client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half)
-        else:
-            shape = self._client.createCollisionShape(
+            shape = client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half)
+            solid = self._body(body.name, shape)
+        elif isinstance(body.shape, Cylinder):
+            shape = client.createCollisionShape(
                 pybullet.GEOM_CYLINDER, radius=body.shape.radius, height=body.shape.length
             )
-        solid = self._body(body.name, shape)
+            solid = self._body(body.name, shape)
+        else:
+            solid = self._as_solid(body.name, triangle_body(client, body.shape))
         if T_base_body is not None:
             self._place(solid, T_base_body)
         return solid
 
     def _body(self, name: str, shape: int) -> Solid:
         body = self._client.createMultiBody(baseMass=0.0, baseCollisionShapeIndex=shape)
+        return self._as_solid(name, body)
+
+    def _as_solid(self, name: str, body: int) -> Solid:
         self._client.changeDynamics(body, BASE_LINK, collisionMargin=MARGIN)
         return Solid(name, body, BASE_LINK)
 

@@ -1,0 +1,50 @@
+"""Meshes in PyBullet that are not the part: compounds of their triangles.
+
+A mesh is made a convex hull by Bullet unless it is told to keep it concave, and between two meshes
+kept concave it finds no contact whatever. A compound of triangles, each a convex body of its own,
+meets both.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from opl.geometry.frames import Array
+from opl.geometry.mesh import TriangleMesh
+from opl.verification.engine import BulletClient, pybullet
+
+RAY = np.array([0.2748, 0.5913, 0.7582])  # along no edge that anybody draws
+
+
+def triangle_body(client: BulletClient, mesh: TriangleMesh) -> int:
+    """Add a body without mass and return Bullet's number of it.
+
+    Bullet makes one convex shape for each object of an OBJ file; here each triangle is an object.
+    """
+    lines = ["v {:.9g} {:.9g} {:.9g}".format(*vertex) for vertex in mesh.vertices]
+    for number, face in enumerate(mesh.faces + 1):
+        lines += [f"o t{number}", "f {} {} {}".format(*face)]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "triangles.obj"
+        path.write_text("\n".join(lines) + "\n", encoding="ascii")
+        shape = client.createCollisionShape(pybullet.GEOM_MESH, fileName=str(path))
+        # the body reads the file once more
+        return int(client.createMultiBody(baseMass=0.0, baseCollisionShapeIndex=shape))
+
+
+def is_inside(triangles: Array, p: Array) -> bool:
+    """Return whether a ray from a point crosses a closed surface an odd number of times.
+
+    Args:
+        triangles: Corners in [m], shape (n, 3, 3).
+        p: The point in [m], shape (3,).
+    """
+    a, b, c = (triangles[:, k] - p for k in range(3))
+    sides = [np.sign(np.cross(one, other) @ RAY) for one, other in ((a, b), (b, c), (c, a))]
+    through = (sides[0] == sides[1]) & (sides[1] == sides[2])
+    normal = np.cross(b - a, c - a)
+    ahead = np.einsum("ij,ij->i", normal, a) * (normal @ RAY) > 0.0
+    return bool(np.count_nonzero(through & ahead) % 2)
