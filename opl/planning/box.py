@@ -13,7 +13,6 @@ import numpy as np
 from numba import njit
 
 from opl.geometry.frames import Array
-from opl.planning.ladder import allowed
 
 
 @dataclass(frozen=True)
@@ -44,12 +43,17 @@ class JointBox:
         return np.asarray(inside.all(axis=-1))
 
 
+def size_of(low: Array, high: Array) -> float:
+    """Return the size of a core in [rad], 0 while it is empty."""
+    return float(np.maximum(high - low, 0.0).sum())
+
+
 _Q, _B = "float64[:,:,::1]", "boolean[:,::1]"
 _F1, _I1 = "float64[::1]", "int64[::1]"
 
 
 @njit(f"void({_Q},int64,int64,int64,{_F1},{_F1},{_F1})", cache=True)
-def _sizes(q, column, first, last, low, high, sizes):  # type: ignore[no-untyped-def]
+def sizes_with(q, column, first, last, low, high, sizes):  # type: ignore[no-untyped-def]
     """Fill in the size of the core with each node of a column taken in, rows first to last."""
     sizes[first : last + 1] = 0.0
     for joint in range(q.shape[1]):
@@ -90,7 +94,7 @@ def tighten(q, free, columns, first, last, threshold, low, high):  # type: ignor
         worst = 0.0
         worst_column = -1
         for column in columns:
-            _sizes(q, column, first[column], last[column], low, high, sizes)
+            sizes_with(q, column, first[column], last[column], low, high, sizes)
             cheapest = np.inf
             for row in range(first[column], last[column] + 1):
                 if not free[column, row]:
@@ -142,7 +146,7 @@ def grow(q, free, first, last, low, high):  # type: ignore[no-untyped-def]
         worst = -np.inf
         worst_column = worst_row = 0
         for column in range(len(q)):
-            _sizes(q, column, first[column], last[column], low, high, sizes)
+            sizes_with(q, column, first[column], last[column], low, high, sizes)
             cheapest = np.inf
             cheapest_row = -1
             for row in range(first[column], last[column] + 1):
@@ -159,84 +163,3 @@ def grow(q, free, first, last, low, high):  # type: ignore[no-untyped-def]
             value = q[worst_column, joint, worst_row]
             high[joint] = max(high[joint], value)
             low[joint] = min(low[joint], value)
-
-
-@njit(
-    f"Tuple((float64,int64))({_Q},{_B},{_F1},boolean[::1],float64,{_F1},float64,{_I1},{_I1},{_I1},"
-    f"{_F1},{_F1},float64,{_I1})",
-    cache=True,
-)
-def bottleneck(  # type: ignore[no-untyped-def]
-    q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked,
-    first, last, low, high, threshold, rows,
-):  # fmt: skip
-    """Find the connected track whose most expensive node is cheapest to take into a core.
-
-    Every box that contains the core and holds a connected track is at least that large.
-
-    Args:
-        q: Nodes in [rad], shape (n_columns, 6, n_rows).
-        free: Which may be used, shape (n_columns, n_rows).
-        t: Contact position of each row, shape (n_rows,).
-        off_wheel: Which steps leave the wheel, shape (n_columns - 1,).
-        max_t_step: As in `Ladder`, ``max_contact_step``.
-        max_t_change: As in `Ladder`, ``max_contact_change``.
-        max_q_step: As in `Ladder`, ``max_joint_step``.
-        blocked: Sorted keys of steps that are not free.
-        first: First row in play of each column, shape (n_columns,).
-        last: Last row in play of each column, shape (n_columns,).
-        low: Lower faces of the core, shape (6,).
-        high: Upper faces of the core, shape (6,).
-        threshold: Nodes that make the box this large in [rad] are not used.
-        rows: Filled with the track, shape (n_columns,).
-
-    Returns:
-        The size of the core with that node in [rad], infinite if there is no track; and the column
-        of that node.
-    """
-    n_columns, _, n_rows = q.shape
-    sizes = np.full((n_columns, n_rows), np.inf)
-    best = np.full((n_columns, n_rows), np.inf)
-    before = np.full((n_columns, n_rows), -1)
-    reached = np.empty(n_rows, dtype=np.int64)  # rows of the column before that a track reaches
-    n_reached = 0
-    for column in range(n_columns):
-        _sizes(q, column, first[column], last[column], low, high, sizes[column])
-        for row in range(first[column], last[column] + 1):
-            size = sizes[column, row]
-            if not free[column, row] or size >= threshold:
-                continue
-            if column == 0:
-                best[column, row] = size
-                continue
-            for k in range(n_reached):
-                here = reached[k]
-                if best[column - 1, here] >= best[column, row]:
-                    continue
-                if not allowed(
-                    q, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked,
-                    column - 1, here, row,
-                ):  # fmt: skip
-                    continue
-                best[column, row] = max(best[column - 1, here], size)
-                before[column, row] = here
-                if best[column - 1, here] <= size:
-                    break
-        n_reached = 0
-        for row in range(first[column], last[column] + 1):
-            if best[column, row] < np.inf:
-                reached[n_reached] = row
-                n_reached += 1
-        if n_reached == 0:
-            return np.inf, -1
-    row = np.argmin(best[n_columns - 1])
-    value = best[n_columns - 1, row]
-    if value == np.inf:
-        return value, -1
-    worst_column = n_columns - 1
-    for column in range(n_columns - 1, -1, -1):
-        rows[column] = row
-        if sizes[column, row] > sizes[worst_column, rows[worst_column]]:
-            worst_column = column
-        row = before[column, row]
-    return value, worst_column

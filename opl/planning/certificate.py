@@ -20,8 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.box import JointBox, bottleneck, grow, tighten
+from opl.planning.bottleneck import bottleneck
+from opl.planning.box import JointBox, grow, size_of, tighten
 from opl.planning.ladder import Ladder
+from opl.planning.strips import no_strips
 
 GROW_EVERY = 64  # subproblems between two attempts at a better track
 
@@ -63,7 +65,7 @@ def least_box(
         gap: Stop when the best box is proven to be within this fraction of the least.
         seconds: Stop after this time with what is known.
     """
-    run = _Proof(ladder, blocked, bound, gap)
+    run = BoxProof(ladder, blocked, bound, gap)
     deadline = time.monotonic() + seconds
     finished = True
     while run.open_bound() < run.threshold():
@@ -77,8 +79,15 @@ def least_box(
     return Certificate(lower_bound, run.rows, box, run.subproblems, finished)
 
 
-class _Proof:
-    """One run of branch and bound."""
+class BoxProof:
+    """One run of branch and bound.
+
+    Args:
+        ladder: The nodes and what steps are small enough.
+        blocked: Sorted keys of steps that are not free, int64.
+        bound: Only boxes smaller than this matter, in [rad].
+        gap: Fraction within which the best box is to be proven.
+    """
 
     def __init__(self, ladder: Ladder, blocked: np.ndarray, bound: float, gap: float) -> None:
         self.best = bound
@@ -96,6 +105,7 @@ class _Proof:
         )
         self._gap = gap
         n_columns, n_rows = ladder.free.shape
+        self._strips = no_strips(n_columns, n_rows)
         self._columns = sorted(
             {0, n_columns // 4, n_columns // 2, 3 * n_columns // 4, n_columns - 1}
         )
@@ -115,34 +125,36 @@ class _Proof:
         return self.best * (1.0 - self._gap) - 1e-9 if np.isfinite(self.best) else np.inf
 
     def box_of(self, rows: np.ndarray) -> JointBox:
+        """Return the box that the nodes of a track span."""
         q = self._ladder.q[np.arange(len(rows)), rows]
         return JointBox(q.min(axis=0), q.max(axis=0))
 
     def take_next(self) -> None:
         """Finish the subproblem with the least bound, or put its halves in the queue."""
         bound, _, first, last, low, high = heapq.heappop(self._queue)
-        columns = np.array(self._columns, dtype=np.int64)
-        tightened, column = tighten(
-            self._q, self._ladder.free, columns, first, last, self.threshold(), low, high
-        )
+        tightened, column = self._tighten(first, last, low, high)
         if not np.isfinite(tightened):
             return
         self.subproblems += 1
         bound = max(bound, tightened)
         if self.subproblems % GROW_EVERY == 1:
             self._improve(first, last, low, high)
-        if tightened > _size(low, high) + 1e-9:
+        if tightened > size_of(low, high) + 1e-9:
             self._halve(bound, column, first, last, low, high)
-            return
-        # the core holds a node of every column looked at: is there a track?
-        rows = np.empty(len(self._q), dtype=np.int64)
-        least, column = self._bottleneck(first, last, low, high, rows)
+        else:
+            self._settle(bound, first, last, low, high)
+
+    def _settle(
+        self, bound: float, first: np.ndarray, last: np.ndarray, low: Array, high: Array
+    ) -> None:
+        """Ask whether there is a track, now that the core holds every column looked at."""
+        least, column, rows = self._bottleneck(first, last, low, high)
         if not np.isfinite(least):
             return
         self._keep(rows)
-        if self.box_of(rows).size <= _size(low, high) + 1e-9:
+        if self.box_of(rows).size <= size_of(low, high) + 1e-9:
             return  # the core itself holds a track: nothing smaller is left here
-        if least <= _size(low, high) + 1e-9:
+        if least <= size_of(low, high) + 1e-9:
             # each node alone is free, but not all together: some faces of the core are still open
             column = int(np.argmax(last - first))
         if column not in self._columns:
@@ -178,25 +190,39 @@ class _Proof:
         """Try for a better track: the cheapest to reach from a core grown over all columns."""
         low, high = low.copy(), high.copy()
         grow(self._q, self._ladder.free, first, last, low, high)
-        rows = np.empty(len(self._q), dtype=np.int64)
-        size, _ = self._bottleneck(first, last, low, high, rows)
+        size, _, rows = self._bottleneck(first, last, low, high)
         if np.isfinite(size):
             self._keep(rows)
 
-    def _bottleneck(
-        self, first: np.ndarray, last: np.ndarray, low: Array, high: Array, rows: np.ndarray
+    def _tighten(
+        self, first: np.ndarray, last: np.ndarray, low: Array, high: Array
     ) -> tuple[float, int]:
-        threshold = self.threshold()
-        size, column = bottleneck(
-            self._q, self._ladder.free, *self._steps, first, last, low, high, threshold, rows
+        columns = np.array(self._columns, dtype=np.int64)
+        bound, column = tighten(
+            self._q, self._ladder.free, columns, first, last, self.threshold(), low, high
         )
-        return float(size), int(column)
+        return float(bound), int(column)
+
+    def _bottleneck(
+        self, first: np.ndarray, last: np.ndarray, low: Array, high: Array
+    ) -> tuple[float, int, np.ndarray]:
+        """Return the size of the core with the cheapest track, its dearest column and its rows."""
+        rows = np.empty(len(self._q), dtype=np.int64)
+        size, column = bottleneck(
+            self._q,
+            self._ladder.free,
+            *self._steps,
+            first,
+            last,
+            low,
+            high,
+            self.threshold(),
+            rows,
+            *self._strips.arrays,
+        )
+        return float(size), int(column), rows
 
     def _keep(self, rows: np.ndarray) -> None:
         size = self.box_of(rows).size
         if size < self.best:
             self.best, self.rows = size, rows.copy()
-
-
-def _size(low: Array, high: Array) -> float:
-    return float(np.maximum(high - low, 0.0).sum())

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opl.planning.bound import raise_bound
 from opl.planning.box import JointBox
 from opl.planning.branch import Branch, Track, branches_of
 from opl.planning.certificate import least_box
@@ -71,7 +72,7 @@ def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: 
     plan = search.run()
     if plan is None or plan.path.joint_range_sum > fallback.path.joint_range_sum:
         plan = fallback
-    return replace(plan, lower_bound=min(search.lower_bound(), plan.path.joint_range_sum))
+    return replace(plan, lower_bound=search.lower_bound(plan.path.joint_range_sum))
 
 
 class _Search:
@@ -83,6 +84,7 @@ class _Search:
         self._settings = settings
         self._most = most
         self._deadline = deadline
+        self._problem = problem
         self._original = branches_of(problem)
         self._refined = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
         self._branches = branches_of(problem)
@@ -110,10 +112,14 @@ class _Search:
                 return None
         return None
 
-    def lower_bound(self) -> float:
+    def lower_bound(self, found: float) -> float:
         """Return the least joint range sum of any track through the cutter points, in [rad].
 
-        Nodes at cutter points that were found to collide are left out.
+        Nodes at cutter points that were found to collide are left out. Where the bound of the nodes
+        stays below what was found, the ways between the cutter points are asked too.
+
+        Args:
+            found: The joint range sum of the best path, in [rad].
         """
         columns = np.searchsorted(self._refined.places, np.arange(len(self._original[0].free)))
         lost = False
@@ -123,7 +129,13 @@ class _Search:
         if lost:
             self._searched = undominated(self._original)
             self._bound = max(self._bound, self._certify(self._original, PROOF_GAP)[0])
-        return self._bound
+        wanted = found * (1.0 - self._settings.widen)
+        if self._bound < wanted:
+            self._bound = min(
+                raise_bound(self._problem, self._original[k], self._bound, wanted, self._deadline)
+                for k in self._searched
+            )
+        return min(self._bound, found)
 
     def _late(self) -> bool:
         return time.monotonic() > self._deadline

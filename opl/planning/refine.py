@@ -69,8 +69,7 @@ def refine(refined: RefinedProblem, places: Array) -> RefinedProblem:
     )
     t = problem.field.contact_positions
     layer = wheel_layer(problem.cell, problem.part, added, t)
-    Ts_base_flange = problem.cell.Ts_base_flange(t[None, :], added.Ts_workpiece_cutter[:, None])
-    q = inverse(problem.cell.robot.arm, Ts_base_flange)
+    q = _solutions(problem, added.Ts_workpiece_cutter)
     at = before + 1
     field = NodeField(
         t,
@@ -92,24 +91,54 @@ def refine(refined: RefinedProblem, places: Array) -> RefinedProblem:
     )
 
 
+def postures_between(problem: GrindingProblem, nodes: NodeMatrix, places: Array) -> Array:
+    """Return the postures of a branch between cutter points, NaN where there is none.
+
+    Args:
+        problem: What is to be planned.
+        nodes: The branch.
+        places: Fractional cutter points, shape (k,).
+
+    Returns:
+        Joint positions in [rad], shape (k, n_rows, 6).
+    """
+    q = _solutions(problem, cutter_frames(problem.points, places))
+    return _on_branch(problem, nodes, q, places.astype(int))
+
+
+def _solutions(problem: GrindingProblem, Ts_workpiece_cutter: Array) -> Array:
+    """Return all inverse solutions of some cutter frames in [rad], shape (k, M, 8, 6)."""
+    t = problem.field.contact_positions
+    Ts_base_flange = problem.cell.Ts_base_flange(t[None, :], Ts_workpiece_cutter[:, None])
+    return inverse(problem.cell.robot.arm, Ts_base_flange)
+
+
 def _insert(
     problem: GrindingProblem, nodes: NodeMatrix, q: Array, before: np.ndarray
 ) -> NodeMatrix:
-    """Return a matrix with new columns, each on the same count of turns as its neighbours.
+    """Return a matrix with new columns, all their inverse solutions given."""
+    added = _on_branch(problem, nodes, q, before)
+    return replace(nodes, q=np.insert(nodes.q, before + 1, added, axis=0))
+
+
+def _on_branch(problem: GrindingProblem, nodes: NodeMatrix, q: Array, before: np.ndarray) -> Array:
+    """Return what a branch makes of inverse solutions, on the count of turns of its neighbours.
 
     Args:
         problem: For the limits.
-        nodes: The matrix.
-        q: All inverse solutions of the new columns in [rad], shape (k, M, 8, 6).
-        before: Column of ``nodes`` that each new one follows, shape (k,).
+        nodes: The branch.
+        q: All inverse solutions in [rad], shape (k, M, 8, 6).
+        before: Column of ``nodes`` that each follows, shape (k,).
+
+    Returns:
+        Joint positions in [rad], NaN beyond the limits, shape (k, n_rows, 6).
     """
     added = q[:, nodes.position_index, nodes.branch]
     near = nodes.q[before]
     near = np.where(np.isnan(near), nodes.q[before + 1], near)
     added = added + 2.0 * np.pi * np.round((near - added) / (2.0 * np.pi))
     within = problem.cell.within_limits(added)
-    added = np.where(within[..., None], added, np.nan)
-    return replace(nodes, q=np.insert(nodes.q, before + 1, added, axis=0))
+    return np.where(within[..., None], added, np.nan)
 
 
 def carried(branches: list[Branch], places: Array, refined: RefinedProblem) -> list[Branch]:

@@ -1,0 +1,147 @@
+"""How small the joint range sum can be, ways between the cutter points included.
+
+The certificate of the nodes lets t jump from one cutter point to the next. Where the motion on the
+way must leave the box that the nodes span, no path comes near that bound. Here the steps where this
+happens are given strips, which hold whatever a motion passes there, and the proof is made again:
+its bound is that of all motions that pass each cutter point at one of its nodes, however t changes
+between them, up to the curvature of the motion within a cell of a strip.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from opl.geometry.frames import Array
+from opl.planning.bottleneck import tighten_strips
+from opl.planning.box import JointBox, size_of
+from opl.planning.branch import Branch
+from opl.planning.certificate import BoxProof
+from opl.planning.ladder import Ladder
+from opl.planning.path import BrokenStepError, fill_in
+from opl.planning.problem import GrindingProblem
+from opl.planning.refine import postures_between
+from opl.planning.strips import Strips, strips_of
+
+FIRST_CELLS = 4  # of a step that is looked at closely, twice as many each time it is again
+MOST_CELLS = 32
+LEAST_GAIN = 1e-4  # of the bound, in one round; less is not worth finer cells
+MOST_SUBPROBLEMS = 300  # of one round: what has not closed by then would take far longer
+
+
+def raise_bound(
+    problem: GrindingProblem, branch: Branch, bound: float, upper: float, deadline: float
+) -> float:
+    """Return a lower bound on the joint range sum of one branch, in [rad].
+
+    Args:
+        problem: What is to be planned.
+        branch: The branch; its free nodes and blocked steps are taken for all there are.
+        bound: What is already proven, in [rad].
+        upper: How large a bound is wanted, in [rad]; there the proof ends.
+        deadline: When to stop with what is proven, by `time.monotonic`.
+    """
+    cells: dict[int, int] = {}
+    while True:
+        strips = _cut(problem, branch, cells)
+        proof = StripProof(branch.ladder, branch.blocked_steps, upper, strips)
+        while proof.open_bound() < min(upper, proof.held) and time.monotonic() < deadline:
+            if proof.subproblems >= MOST_SUBPROBLEMS:
+                break
+            proof.take_next()
+        before, bound = bound, max(bound, min(proof.open_bound(), proof.held, upper))
+        if bound >= upper or proof.rows is None or time.monotonic() >= deadline:
+            return bound
+        outside = _steps_outside(problem, branch, proof.rows, proof.box)
+        finer = [step for step in outside if cells.get(step, 0) < MOST_CELLS]
+        if not finer or (cells and bound - before < LEAST_GAIN * bound):
+            return bound
+        for step in finer:
+            cells[step] = 2 * cells[step] if step in cells else FIRST_CELLS
+
+
+class StripProof(BoxProof):
+    """Branch and bound over tracks that are charged for what they pass on the way.
+
+    No track is sought: the proof ends where a core holds all that its track passes, `held` in
+    [rad], since nothing can be proven beyond it.
+    """
+
+    def __init__(self, ladder: Ladder, blocked: np.ndarray, bound: float, strips: Strips) -> None:
+        super().__init__(ladder, blocked, bound, 0.0)
+        self._strips = strips
+        self.held = np.inf
+        self.box = JointBox(np.zeros(6), np.zeros(6))
+
+    def _tighten(
+        self, first: np.ndarray, last: np.ndarray, low: Array, high: Array
+    ) -> tuple[float, int]:
+        while True:
+            bound, column = super()._tighten(first, last, low, high)
+            if not np.isfinite(bound):
+                return bound, column
+            if not tighten_strips(
+                self._q,
+                self._ladder.free,
+                first,
+                last,
+                self.threshold(),
+                low,
+                high,
+                *self._strips.arrays,
+            ):
+                return max(bound, size_of(low, high)), column
+
+    def _settle(
+        self, bound: float, first: np.ndarray, last: np.ndarray, low: Array, high: Array
+    ) -> None:
+        least, column, rows = self._bottleneck(first, last, low, high)
+        if not np.isfinite(least):
+            return
+        bound = max(bound, least)
+        size = size_of(low, high)
+        held = least <= size + 1e-9
+        if held and self.box_of(rows).size <= size + 1e-9:
+            self._hold(bound, rows, low, high)
+        elif not held and column not in self._columns:
+            self._columns.append(column)
+            self._push(bound, first, last, low, high)
+        else:
+            if held or first[column] == last[column]:
+                column = int(np.argmax(last - first))
+            if first[column] == last[column]:
+                self._hold(bound, rows, low, high)
+            else:
+                self._halve(bound, column, first, last, low, high)
+
+    def _improve(self, first: np.ndarray, last: np.ndarray, low: Array, high: Array) -> None:
+        """Do nothing: a track is worth what it passes, which its nodes do not tell."""
+
+    def _hold(self, bound: float, rows: np.ndarray, low: Array, high: Array) -> None:
+        if bound < self.held:
+            self.held, self.rows, self.box = bound, rows, JointBox(low, high)
+
+
+def _cut(problem: GrindingProblem, branch: Branch, cells: dict[int, int]) -> Strips:
+    """Return strips with that many cells for each of some steps."""
+    steps = np.array(sorted(cells), dtype=int)
+    lines = [step + np.arange(1, cells[step]) / cells[step] for step in steps]
+    places = np.concatenate([*lines, np.arange(len(problem.points))])
+    order = np.argsort(places)
+    between = np.concatenate([*lines, np.empty(0)])
+    q = np.concatenate([postures_between(problem, branch.nodes, between), branch.nodes.q])[order]
+    in_order = bool((np.diff(branch.nodes.position_index) == 1).all())
+    return strips_of(q, places[order] % 1.0 == 0.0, in_order)
+
+
+def _steps_outside(
+    problem: GrindingProblem, branch: Branch, rows: np.ndarray, box: JointBox
+) -> list[int]:
+    """Return the steps of a track that pass outside of a box if t changes evenly."""
+    try:
+        path = fill_in(problem.cell, problem.points, branch.nodes, rows, problem.interpolation)
+    except BrokenStepError as error:
+        return [error.column]
+    outside = path.cutter_point[~box.holds(path.q)]
+    return sorted({int(place) for place in outside if place % 1.0})
