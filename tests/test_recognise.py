@@ -1,16 +1,22 @@
 """What is ground is recognised from postures alone."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 from cells import small_job, small_motion, small_problem, tiny_motion, tiny_problem
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from opl.geometry.frames import inverse
+from opl.job import load
+from opl.pipeline import cutter_points
 from opl.planning.motion import Stretch
+from opl.resources import folder
 from opl.verification.align import align
 from opl.verification.between import frames_at, place_between
-from opl.verification.contact import Touches, contact_positions, find_touches
+from opl.verification.contact import Touches, contact_positions, find_touches, misfit
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import replay
 
@@ -96,18 +102,76 @@ def test_contact_positions_are_those_of_the_contact_model(t):
     assert found == pytest.approx(t, abs=0.01)
 
 
+@cache
+def hollow():
+    """Return wheel and cutter points of the S part; its hollow half is ground at an edge."""
+    job = load(folder("workpieces") / "s_shape" / "job.yaml")
+    return job.cell.wheel, cutter_points(job)
+
+
+def parts_at(wheel, points, place, t):
+    """Return where the part is when places are ground at contact positions, seen from contact0."""
+    return wheel.T_contact0_contact(np.asarray(t)) @ inverse(frames_at(points, np.asarray(place)))
+
+
 def test_a_place_between_two_cutter_points_is_found():
     problem = small_problem()
     wheel, points = problem.cell.wheel, problem.points
-    place, t = 20.3, 12.5
-    Ts_cutter = frames_at(points, np.array([place]))
-    Ts = wheel.T_contact0_contact(t) @ inverse(Ts_cutter)
-    found, position, apart = place_between(
-        wheel, points, Ts, np.array([[20.0, 21.0]]), np.array([[t, t]])
-    )
-    assert found[0] == pytest.approx(place, abs=1e-3)
-    assert position[0] == pytest.approx(t, abs=0.01)
+    Ts = parts_at(wheel, points, [20.3], [12.5])
+    found, position, apart = place_between(wheel, points, Ts, np.ones(2), (20, 21), (12.5, 12.5))
+    assert found[0] == pytest.approx(20.3, abs=1e-3)
+    assert position[0] == pytest.approx(12.5, abs=0.01)
     assert apart[0] < 1e-6
+
+
+@pytest.mark.parametrize("forwards", [True, False])
+def test_a_pivot_through_the_hollow_is_followed(forwards):
+    """On the way the part lies on the flat and on the edge of the wheel at once."""
+    wheel, points = hollow()
+    place = np.linspace(0.625, 0.6875, 8)
+    t = np.linspace(-21.65, -27.7, 8)
+    if not forwards:
+        t = t[::-1]
+    Ts = parts_at(wheel, points, place, t)
+    # alone, a posture may as well be a millimetre farther on
+    again = Ts[:, None] @ frames_at(points, place[:, None] + np.linspace(0.1, 0.3, 401))
+    distance, _ = misfit(wheel, again, contact_positions(wheel, again))
+    assert distance.min() < 1e-5
+    found, position, apart = place_between(
+        wheel, points, Ts, np.ones(9), (0, 1), (-15.6, -33.3) if forwards else (-33.3, -15.6)
+    )
+    np.testing.assert_allclose(found, place, atol=1e-3)
+    np.testing.assert_allclose(position, t, atol=0.02)
+    assert apart.max() < 2e-6
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(
+    st.integers(0, 25),
+    st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12).map(sorted),
+    st.floats(-69.0, 69.0),
+    st.lists(st.floats(-1.0, 1.0), min_size=12, max_size=12),
+)
+def test_whatever_goes_forward_over_the_wheel_is_explained(point, fractions, start, changes):
+    wheel, points = hollow()
+    n = len(fractions)
+    place = point + np.array(fractions)
+    t = np.clip(start + np.cumsum(changes[:n]), -70.0, 70.0)
+    Ts = parts_at(wheel, points, place, t)
+    found, _, apart = place_between(
+        wheel, points, Ts, np.ones(n + 1), (point, point + 1), (t[0], t[-1])
+    )
+    assert (np.diff(found) >= 0.0).all()
+    assert apart.max() < 1e-5
+
+
+def test_what_goes_back_is_not_explained():
+    wheel, points = hollow()
+    Ts = parts_at(wheel, points, [3.2, 3.6, 3.3, 3.8], np.full(4, 30.0))
+    found, _, apart = place_between(wheel, points, Ts, np.ones(5), (3, 4), (30.0, 30.0))
+    assert (np.diff(found) >= 0.0).all()
+    step = np.linalg.norm(np.diff(points.Ts_workpiece_cutter[3:5, :3, 3], axis=0))
+    assert apart[1:3].sum() > 0.25 * step  # it went back by 0.3 of the step
 
 
 def test_only_points_at_their_place_on_the_wheel_touch():

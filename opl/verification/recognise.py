@@ -2,8 +2,8 @@
 
 Postures and cutter points are aligned like two texts: both keep their order, a posture may lie
 between two cutter points or off the wheel, and a cutter point that no posture brings to the wheel
-is left out, which is dear. Between two cutter points the frame changes evenly; postures there are
-placed where they come nearest to the contact model.
+is left out, which is dear. Between two cutter points the frame changes evenly; postures there get
+places that never go back and lie nearest to the contact model.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def recognise(
     touches = find_touches(cell.wheel, points, Ts_contact0_workpiece[stations], tolerance)
     ground = align(touches, points.pass_index, tolerance, rule.max_contact_step)
     labels = _Labels(cell, points, Ts_contact0_workpiece, rule)
-    labels.grind(touches, ground, stations)
+    labels.grind(touches, ground, stations, duration)
     return labels.recognition(q, duration)
 
 
@@ -109,7 +109,13 @@ class _Labels:
         self._also: dict[int, list[tuple[int, float]]] = {}  # more cutter points at a posture
         self._astray: list[tuple[int, float]] = []
 
-    def grind(self, touches: Touches, ground: NDArray[np.intp], stations: NDArray[np.intp]) -> None:
+    def grind(
+        self,
+        touches: Touches,
+        ground: NDArray[np.intp],
+        stations: NDArray[np.intp],
+        duration: Array,
+    ) -> None:
         """Label everything, given which touches are the ground cutter points."""
         posture, point = stations[touches.posture[ground]], touches.point[ground]
         t = touches.contact_position[ground]
@@ -119,7 +125,7 @@ class _Labels:
                 self._also.setdefault(int(k), []).append((int(i), float(position)))
                 continue
             self._mark(k, Stretch.GRIND, self._points.pass_index[i], position, i)
-        self._fill_between(posture, point, t, np.diff(pass_index) == 0)
+        self._fill_between(posture, point, t, np.diff(pass_index) == 0, duration)
         first, last = self._lead_ins(posture, point, t, pass_index)
         self._name_the_air(first, last)
 
@@ -165,6 +171,7 @@ class _Labels:
         point: NDArray[np.intp],
         t: Array,
         goes_on: NDArray[np.bool_],
+        duration: Array,
     ) -> None:
         """Label the postures between those that grind cutter points.
 
@@ -173,22 +180,25 @@ class _Labels:
             point: The cutter points, shape (n,).
             t: The contact positions, shape (n,).
             goes_on: After which of them the pass goes on, shape (n - 1,).
+            duration: Time of the move that ends at each posture in [s].
         """
-        gaps = {m: range(posture[m] + 1, posture[m + 1]) for m in np.flatnonzero(goes_on)}
-        inside = np.array([k for gap in gaps.values() for k in gap], dtype=int)
-        steps = np.array([m for m, gap in gaps.items() for _ in gap], dtype=int)
-        if not len(inside):
-            return
-        ends = np.stack([point[steps], point[steps + 1]], axis=1).astype(float)
-        t_ends = np.stack([t[steps], t[steps + 1]], axis=1)
-        place, position, apart = place_between(
-            self._wheel, self._points, self._Ts[inside], ends, t_ends
-        )
-        for row, k in enumerate(inside):
-            pass_index = int(self._points.pass_index[point[steps[row]]])
-            self._mark(k, Stretch.BETWEEN, pass_index, position[row], place[row])
-            if apart[row] > self._rule.max_contact_error:
-                self._astray.append((int(k), float(apart[row])))
+        for m in np.flatnonzero(goes_on):
+            between = np.arange(posture[m] + 1, posture[m + 1])
+            if not len(between):
+                continue
+            place, position, apart = place_between(
+                self._wheel,
+                self._points,
+                self._Ts[between],
+                duration[between[0] : posture[m + 1] + 1],
+                (int(point[m]), int(point[m + 1])),
+                (float(t[m]), float(t[m + 1])),
+            )
+            for row, k in enumerate(between):
+                pass_index = int(self._points.pass_index[point[m]])
+                self._mark(k, Stretch.BETWEEN, pass_index, position[row], place[row])
+                if apart[row] > self._rule.max_contact_error:
+                    self._astray.append((int(k), float(apart[row])))
 
     def _lead_ins(
         self,
