@@ -25,7 +25,7 @@ from opl.planning.box import JointBox, grow, size_of, tighten
 from opl.planning.ladder import Ladder
 from opl.planning.strips import no_strips
 
-GROW_EVERY = 64  # subproblems between two attempts at a better track
+GROW_EVERY = 256  # subproblems between two attempts at a better track
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from opl.planning.box import JointBox
 from opl.planning.branch import Branch, Track, branches_of
 from opl.planning.certificate import least_box
 from opl.planning.costs import Costs, roughness
-from opl.planning.path import BrokenStepError, fill_in
+from opl.planning.path import BrokenStepError, GrindingPath, fill_in
 from opl.planning.plan import Plan, check_track
 from opl.planning.problem import GrindingProblem
 from opl.planning.refine import RefinedProblem, carried, refine
@@ -67,8 +67,7 @@ def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: 
         The plan with its lower bound.
     """
     deadline = time.monotonic() + settings.seconds
-    path = fallback.path
-    search = _Search(problem, settings, Travel(path.joint_travel, path.contact_travel), deadline)
+    search = _Search(problem, settings, fallback.path, deadline)
     plan = search.run()
     if plan is None or plan.path.joint_range_sum > fallback.path.joint_range_sum:
         plan = fallback
@@ -79,10 +78,15 @@ class _Search:
     """The certified search, and what it has learnt of collisions."""
 
     def __init__(
-        self, problem: GrindingProblem, settings: OptimalSettings, most: Travel, deadline: float
+        self,
+        problem: GrindingProblem,
+        settings: OptimalSettings,
+        fallback: GrindingPath,
+        deadline: float,
     ) -> None:
         self._settings = settings
-        self._most = most
+        self._most = Travel(fallback.joint_travel, fallback.contact_travel)
+        self._ceiling = fallback.joint_range_sum
         self._deadline = deadline
         self._problem = problem
         self._original = branches_of(problem)
@@ -96,20 +100,18 @@ class _Search:
 
     def run(self) -> Plan | None:
         """Return the best plan, or None if there is none within time and widenings."""
-        self._bound, _ = self._certify(self._original, PROOF_GAP)
-        while not self._late():
-            learnt = (self._refinements, self._blocked_something)
+        self._bound, best = self._certify(self._original, PROOF_GAP)
+        while best is not None and not self._late():
+            refinements = self._refinements
             self._blocked_something = False
-            _, best = self._certify(self._branches, REFINED_GAP)
-            if best is None:
-                return None
             plan = self._smooth_plan(*best)
             if plan is not None:
                 return plan
             if self._blocked_something:
                 self._searched = undominated(self._branches)
-            if learnt[0] == self._refinements and not self._blocked_something:
+            elif refinements == self._refinements:
                 return None
+            _, best = self._certify(self._branches, REFINED_GAP)
         return None
 
     def lower_bound(self, found: float) -> float:
@@ -143,8 +145,11 @@ class _Search:
     def _certify(
         self, branches: list[Branch], gap: float
     ) -> tuple[float, tuple[int, JointBox] | None]:
-        """Return the least lower bound of all branches, and the branch with the smallest box."""
-        lower_bound = size = np.inf
+        """Return the least lower bound of all branches, and the branch with the smallest box.
+
+        Boxes as large as what the fallback spans are of no use; None if there is no smaller one.
+        """
+        lower_bound, size = np.inf, self._ceiling
         best = None
         for index in self._searched:
             branch = branches[index]
