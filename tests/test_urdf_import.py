@@ -1,6 +1,7 @@
 """Robots of the user's own: the closed form read off a URDF, and what is refused."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 import trimesh
 from jobs import opl
@@ -104,7 +105,7 @@ def test_meshes_come_along_and_are_found(tmp_path):
         (("xyz=\"0.1 0 0\"", "xyz=\"0.1 0 0.03\""), r"do not meet in one point.* by \d+ mm"),
         (
             ('<axis xyz="-1 0 0"/>', '<axis xyz="0 1 0"/>'),
-            r"axes 2, 3 and 4 are parallel: an arm of UR's kind",
+            r"axes 4 and 5 must be at right angles",
         ),
         (('<axis xyz="0 0 1"/>', '<axis xyz="0 1 0"/>'), r"axis 1 must be the z axis"),
         (('<origin xyz="0.15 0 0.505"/>', '<origin xyz="0.15 0 0.505" rpy="0.1 0 0"/>'),
@@ -117,11 +118,6 @@ def test_meshes_come_along_and_are_found(tmp_path):
         (("</robot>", ""), r"not XML"),
         (('<robot name="mh24">', '<robot name="mh24"><link name="a"/>'), r"one root link"),
         (('<origin xyz="0 0 0.505"/>', '<origin xyz="0 0.1 0.505"/>'), r"link base must be fixed"),
-        (
-            ('<link name="base">', '<link name="base"><collision name="x"><geometry>'
-             '<sphere radius="0.1"/></geometry></collision>'),
-            r"link base has collision shapes but hangs on a fixed joint",
-        ),
     ],
 )  # fmt: skip
 def test_what_has_no_closed_form_is_refused_with_the_reason(change, message, tmp_path):
@@ -132,6 +128,42 @@ def test_what_has_no_closed_form_is_refused_with_the_reason(change, message, tmp
     with pytest.raises(InputError, match=message):
         import_urdf(path, "mine", tmp_path / "mine")
     assert not (tmp_path / "mine").exists()
+
+
+def test_shapes_on_fixed_joints_come_to_the_link_that_carries_them(tmp_path):
+    # as in the description of UR: the foot hangs on a fixed joint, turned, below a root link world
+    hung = """<link name="world"/><joint name="stand" type="fixed"><parent link="world"/>
+      <child link="base_link"/><origin xyz="0 0 0.02"/></joint>
+      <joint name="plate" type="fixed"><parent link="base_link"/><child link="mount"/>
+      <origin xyz="0 0 0.1" rpy="0 0 1.5707963267948966"/></joint>
+      <link name="mount"><collision name="block"><origin xyz="0.3 0 0"/><geometry>
+      <box size="0.1 0.2 0.3"/></geometry></collision></link>"""
+    path = changed(tmp_path, ('<robot name="mh24">', f'<robot name="mh24">{hung}'))
+    made = import_urdf(path, "mine", tmp_path / "mine").robot
+    assert made.base_height == pytest.approx(0.525)
+    assert made.controller_base_height == pytest.approx(0.525)
+    model = pin.buildModelFromUrdf(str(made.urdf))
+    shapes = pin.buildGeomFromUrdf(model, str(made.urdf), pin.GeometryType.COLLISION)
+    (block,) = (
+        shape
+        for shape in shapes.geometryObjects
+        if np.allclose(getattr(shape.geometry, "halfSide", 0.0), [0.05, 0.1, 0.15])
+    )
+    assert model.frames[block.parentFrame].name == "world"
+    np.testing.assert_allclose(block.placement.translation, [0, 0.3, 0.12], atol=1e-12)
+    np.testing.assert_allclose(block.placement.rotation[:, 0], [0, 1, 0], atol=1e-12)
+    q = np.ones((1, 6))
+    np.testing.assert_allclose(forward(made, q), forward(MH24, q), atol=1e-9)
+
+
+def test_what_hangs_on_a_frame_base_stays_where_it_is(tmp_path):
+    on_foot = '<parent link="base_link"/>\n    <child link="S_link"/>\n    <origin xyz="0 0 0"/>'
+    on_base = '<parent link="base"/><child link="S_link"/><origin xyz="0 0 -0.505"/>'
+    path = changed(tmp_path, (on_foot, on_base))
+    made = import_urdf(path, "mine", tmp_path / "mine", base_at_floor=True).robot
+    expected = forward(MH24, np.ones(6))
+    expected[2, 3] += 0.505
+    np.testing.assert_allclose(forward(made, np.ones(6)), expected, atol=1e-9)
 
 
 def test_placeholders_are_told(tmp_path):

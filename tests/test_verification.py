@@ -246,7 +246,7 @@ def moved_into_wheel(motion, index, depth):
     T_base_flange = forward(cell.robot, motion.q[index])
     into = cell.wheel.T_base_contact(motion.contact_position[index])[:3, 2]
     T_base_flange[:3, 3] += depth * into
-    found = inverse(cell.robot.arm, T_base_flange, motion.q[index, 3])
+    found = inverse(cell.robot.arm, T_base_flange, motion.q[index])
     found = found + 2 * np.pi * np.round((motion.q[index] - found) / (2 * np.pi))
     q = motion.q.copy()
     q[index] = found[np.nanargmin(np.abs(found - q[index]).max(axis=1))]

@@ -16,12 +16,15 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial.transform import Rotation
 
-from opl.cell.inverse import SphericalWristArm, inverse
+from opl.cell.inverse import Arm, inverse
+from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot_file import N_JOINTS, RobotFile, read_robot_file
+from opl.cell.spherical_wrist import SphericalWristArm
 from opl.cell.urdf_tree import UrdfTree
 from opl.errors import InputError
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, pose
 from opl.resources import folder
 
 # In which a joint is taken to reach its top speed where nobody knows its acceleration, in [s].
@@ -50,6 +53,7 @@ class Robot:
         urdf: The geometry with shapes; has the frames ``base`` and ``tool0`` (flange face, z out).
         base_height: Base frame above the mounting face in [m].
         controller_base_height: The same of the base frame that the maker's controller counts from.
+        controller_base_turn: How far that one is turned about axis 1 against ours in [rad].
         payload: What the flange may carry in [kg], None if not known.
     """
 
@@ -64,10 +68,11 @@ class Robot:
     acceleration_assumed: bool
     pulses_per_radian: Array
     unverified_pulses: tuple[str, ...]
-    arm: SphericalWristArm
+    arm: Arm
     urdf: Path
     base_height: float
     controller_base_height: float
+    controller_base_turn: float
     payload: float | None
 
     def __post_init__(self) -> None:
@@ -86,9 +91,16 @@ class Robot:
 
     @property
     def reach(self) -> float:
-        """Farthest that the wrist centre can be from axis 1 in [m]."""
-        arm = self.arm
-        return float(np.hypot(arm.a1 + arm.c2 + np.hypot(arm.a2, arm.c3), arm.b))
+        """Farthest from axis 1 that the wrist centre, or where axes 5 and 6 meet, can be in [m]."""
+        return self.arm.reach
+
+    @property
+    def T_controller_base(self) -> Array:
+        """The base frame, as the maker's controller counts, shape (4, 4)."""
+        return pose(
+            Rotation.from_rotvec([0.0, 0.0, -self.controller_base_turn]).as_matrix(),
+            np.array([0.0, 0.0, self.base_height - self.controller_base_height]),
+        )
 
 
 def known_robots() -> list[str]:
@@ -158,9 +170,7 @@ def controller_poses(robot: Robot, q: Array) -> Array:
 
     As `forward`, from the controller's own base frame instead of opl's.
     """
-    Ts_controller_flange = forward(robot, q)
-    Ts_controller_flange[..., 2, 3] += robot.base_height - robot.controller_base_height
-    return Ts_controller_flange
+    return robot.T_controller_base @ forward(robot, q)
 
 
 @cache
@@ -189,7 +199,7 @@ def _arm_fits_urdf(robot: Robot) -> bool:
     """Return whether the closed form finds postures again that the URDF was put in."""
     fractions = np.array([[0.3, 0.6, 0.4, 0.7, 0.2, 0.6], [0.8, 0.3, 0.7, 0.4, 0.6, 0.3]])
     q = robot.lower + fractions * (robot.upper - robot.lower)  # any two
-    difference = inverse(robot.arm, forward(robot, q), q[:, 3]) - q[:, None]
+    difference = inverse(robot.arm, forward(robot, q), q) - q[:, None]
     distance = np.abs(np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
     # some URDFs round right angles to seven digits
     return bool((distance < 1e-5).any(axis=-1).all())
@@ -197,7 +207,7 @@ def _arm_fits_urdf(robot: Robot) -> bool:
 
 def _robot(document: RobotFile, home: Path) -> Robot:
     """Return the robot in SI units."""
-    arm, base, joints = document.arm, document.base, document.joints
+    base, joints = document.base, document.joints
     controller = base.controller_height_mm
     speed = np.radians([joint.speed.max_deg_s for joint in joints])
     known = document.acceleration
@@ -216,19 +226,21 @@ def _robot(document: RobotFile, home: Path) -> Robot:
         unverified_pulses=tuple(
             joint.name for joint in joints if joint.pulses and not joint.pulses.verified
         ),
-        arm=SphericalWristArm(
-            a1=arm.a1_mm / 1e3,
-            a2=arm.a2_mm / 1e3,
-            b=arm.b_mm / 1e3,
-            c1=arm.c1_mm / 1e3,
-            c2=arm.c2_mm / 1e3,
-            c3=arm.c3_mm / 1e3,
-            c4=arm.c4_mm / 1e3,
-            offsets=tuple(math.radians(offset) for offset in arm.offsets_deg),
-            signs=tuple(arm.signs),
-        ),
+        arm=_arm(document),
         urdf=(home / document.urdf).resolve(),
         base_height=base.height_mm / 1e3,
         controller_base_height=(base.height_mm if controller is None else controller) / 1e3,
+        controller_base_turn=math.radians(base.controller_turn_deg),
         payload=None if document.payload is None else document.payload.max_kg,
+    )
+
+
+def _arm(document: RobotFile) -> Arm:
+    """Return the closed form in SI units."""
+    lengths = document.arm.lengths_mm()
+    kind = ParallelAxesArm if document.arm.parallel_axes else SphericalWristArm
+    return kind(
+        **{key.removesuffix("_mm"): length / 1e3 for key, length in lengths.items()},
+        offsets=tuple(math.radians(offset) for offset in document.arm.offsets_deg),
+        signs=tuple(document.arm.signs),
     )

@@ -29,25 +29,50 @@ class Sourced(Document):
 class Base(Sourced):
     """Where the base frame is: on axis 1, so far above the mounting face.
 
-    The maker's controller may count from elsewhere on axis 1; ``controller_height_mm`` says so.
+    The maker's controller may count from elsewhere on axis 1, or from a frame turned about it;
+    ``controller_height_mm`` and ``controller_turn_deg`` say so.
     """
 
     height_mm: float
     controller_height_mm: float | None = None
+    controller_turn_deg: float = 0.0
 
 
 class Arm(Sourced):
-    """Link lengths, zero offsets and signs, as in `opl.cell.inverse.SphericalWristArm`."""
+    """Link lengths, zero offsets and signs, as in `opl.cell.spherical_wrist` or `parallel_axes`."""
 
+    family: Literal["spherical wrist", "parallel axes"] = "spherical wrist"
     a1_mm: float
-    a2_mm: float
+    a2_mm: float | None = None  # spherical wrist only
     b_mm: float
     c1_mm: float
     c2_mm: Positive
     c3_mm: float
     c4_mm: float
+    c5_mm: float | None = None  # parallel axes only
     offsets_deg: Annotated[list[float], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
     signs: Annotated[list[Literal[1, -1]], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
+
+    @model_validator(mode="after")
+    def _one_family(self) -> Arm:
+        own, other = ("c5_mm", "a2_mm") if self.parallel_axes else ("a2_mm", "c5_mm")
+        if getattr(self, own) is None:
+            raise ValueError(f"an arm of family {self.family} needs {own}")
+        if getattr(self, other) is not None:
+            raise ValueError(f"an arm of family {self.family} has no {other}")
+        if self.parallel_axes and self.c3_mm <= 0.0:
+            raise ValueError(f"c3_mm must be more than 0, got {self.c3_mm:g}")
+        return self
+
+    @property
+    def parallel_axes(self) -> bool:
+        """Whether axes 2, 3 and 4 are parallel, else the last three meet in one point."""
+        return self.family == "parallel axes"
+
+    def lengths_mm(self) -> dict[str, float]:
+        """Return the link lengths of its family by their keys."""
+        values = {key: getattr(self, key) for key in type(self).model_fields if key[-3:] == "_mm"}
+        return {key: value for key, value in values.items() if value is not None}
 
 
 class Payload(Sourced):

@@ -9,13 +9,14 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from opl.cell.inverse import SphericalWristArm, inverse
+from opl.cell.inverse import Arm, inverse
+from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.recognise import RecognisedArm, recognise
 from opl.cell.robot import Robot, forward, load_robot
 from opl.cell.robot_file import FROM_URDF
@@ -28,6 +29,8 @@ N_CHECKED = 500
 CLOSURE = 2e-5  # [m], and as much in the entries of the rotation matrix
 # Stands for a speed that the URDF does not give: slow, for programs ask for a share of it.
 SLOW = np.deg2rad(10.0)
+# Height [m] and turn [rad] of the controller's own base frame, where the URDF has one.
+Controller = tuple[float, float] | None
 _NAME = re.compile(r"[a-z0-9][a-z0-9_-]*")
 
 
@@ -77,9 +80,9 @@ def import_urdf(
     tree = UrdfTree(urdf)
     found = recognise(urdf)
     height = 0.0 if base_at_floor else found.arm.c1
-    controller = tree.base_height()
+    controller = tree.base_frame()
     tree.set_base(height)
-    tree.require_shapes_on_joints()
+    tree.gather_shapes()
     meshes = tree.collect_meshes()
     cautions = [*tree.cautions(), *_doubts(found)]
     found = replace(found, arm=replace(found.arm, c1=found.arm.c1 - height))
@@ -130,7 +133,8 @@ def _doubts(found: RecognisedArm) -> Iterator[str]:
     for name, speed in zip(names, found.max_speed, strict=True):
         if speed <= 0.0:
             yield f"{name}: the URDF gives no speed, 10 deg/s stands there; see the data sheet"
-    for k in (1, 4):  # no such arm turns these all round
+    # no arm turns these all round, unless its axes 2 to 4 are parallel
+    for k in () if isinstance(found.arm, ParallelAxesArm) else (1, 4):
         low, high = found.lower[k], found.upper[k]
         if high - low > 2.0 * np.pi - 1e-3:
             yield (
@@ -144,11 +148,15 @@ def _doubts(found: RecognisedArm) -> Iterator[str]:
 
 
 def _robot_yaml(
-    found: RecognisedArm, name: str, maker: str, height: float, controller: float | None, urdf: str
+    found: RecognisedArm, name: str, maker: str, height: float, controller: Controller, urdf: str
 ) -> str:
     """Return the text of ``robot.yaml``."""
     origin = [f"source: {urdf}", f"certainty: {FROM_URDF}"]
-    counts = [] if controller is None else [f"controller_height_mm: {_mm(controller)}"]
+    counts = []
+    if controller is not None:
+        counts = [f"controller_height_mm: {_mm(controller[0])}"]
+        if controller[1]:
+            counts.append(f"controller_turn_deg: {_deg(controller[1])}")
     lines = [
         f"# {name}, made by opl robots import-urdf from {urdf}.",
         "# Check limits and speeds against the data sheet, and say so under source and certainty",
@@ -184,11 +192,13 @@ def _robot_yaml(
     return "\n".join([*lines, ""])
 
 
-def _arm_lines(arm: SphericalWristArm) -> list[str]:
-    lengths = [f"{key}_mm: {_mm(getattr(arm, key))}" for key in ("a1", "a2", "b", "c1", "c2", "c3")]
+def _arm_lines(arm: Arm) -> list[str]:
+    keys = [field.name for field in fields(arm) if isinstance(getattr(arm, field.name), float)]
+    lengths = [f"{key}_mm: {_mm(getattr(arm, key))}" for key in keys]
     offsets = ", ".join(_deg(offset) for offset in arm.offsets)
     signs = ", ".join(map(str, arm.signs))
-    return [*lengths, f"c4_mm: {_mm(arm.c4)}", f"offsets_deg: [{offsets}]", f"signs: [{signs}]"]
+    family = ["family: parallel axes"] if isinstance(arm, ParallelAxesArm) else []
+    return [*family, *lengths, f"offsets_deg: [{offsets}]", f"signs: [{signs}]"]
 
 
 def _indented(columns: int, lines: list[str]) -> list[str]:

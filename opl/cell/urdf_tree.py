@@ -1,4 +1,4 @@
-"""A URDF as text to be changed: where its frame ``base`` lies, and what its meshes are called."""
+"""A URDF as text to be changed: its frame ``base``, shapes on fixed joints, names of meshes."""
 
 from __future__ import annotations
 
@@ -6,10 +6,15 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 from opl.errors import InputError
+from opl.geometry.frames import Array, pose
 
 BASE = "base"
 _NOWHERE = "0 0 0"
+_EXACT = 1e-6  # [m], [rad]; URDFs round right angles
 
 
 class UrdfTree:
@@ -28,44 +33,60 @@ class UrdfTree:
             raise InputError(str(path), f"must have one root link, has {', '.join(free) or 'none'}")
         self._root_link = free[0]
 
-    def base_height(self) -> float | None:
-        """Return how high the frame ``base`` lies above the root link in [m]; None without one.
+    def base_frame(self) -> tuple[float, float] | None:
+        """Return where the frame ``base`` lies on the z axis of the root link; None without one.
+
+        Returns:
+            Its height in [m], and how far it is turned about that axis in [rad].
 
         Raises:
-            InputError: If it lies elsewhere than on the z axis of the root link, or is turned.
+            InputError: If it lies elsewhere, or is not upright.
         """
         if BASE not in self._links():
             return None
-        joint = self._joints.get(BASE)
-        if joint is None:
-            return 0.0  # it is the root itself
-        origin = joint.find("origin")
-        xyz = _numbers(origin, "xyz")
-        upright = max(map(abs, (*xyz[:2], *_numbers(origin, "rpy")))) < 1e-6
-        if joint.get("type") != "fixed" or _parent(joint) != self._root_link or not upright:
+        carrier, T_root_base = self._carrier(BASE)
+        aside = np.hypot(*T_root_base[:2, 3])
+        if carrier != self._root_link or max(aside, 1.0 - T_root_base[2, 2]) > _EXACT:
             raise InputError(
                 str(self._path),
                 f"link {BASE} must be fixed to the root link, straight above it, or be left out",
             )
-        return xyz[2]
+        turn = float(np.arctan2(T_root_base[1, 0], T_root_base[0, 0]))
+        return float(T_root_base[2, 3]), 0.0 if abs(turn) < _EXACT else turn
 
     def set_base(self, height: float) -> None:
-        """Put the frame ``base`` on the z axis of the root link, so high in [m]."""
-        if self._root_link == BASE:
-            self._rename_root()
-        joint = self._joints.get(BASE)
-        if joint is None:
-            ET.SubElement(self._root, "link", name=BASE)
-            name = f"{self._root_link}-{BASE}"
-            while name in {joint.get("name") for joint in self._root.findall("joint")}:
-                name += "_frame"
-            joint = ET.SubElement(self._root, "joint", name=name, type="fixed")
-            ET.SubElement(joint, "parent", link=self._root_link)
-            ET.SubElement(joint, "child", link=BASE)
-            self._joints[BASE] = joint
-        for origin in joint.findall("origin"):
-            joint.remove(origin)
+        """Put the frame ``base`` on the z axis of the root link, so high in [m], not turned."""
+        if BASE in self._links():
+            self._rename_base()
+        ET.SubElement(self._root, "link", name=BASE)
+        name = f"{self._root_link}-{BASE}"
+        while name in {joint.get("name") for joint in self._root.findall("joint")}:
+            name += "_frame"
+        joint = ET.SubElement(self._root, "joint", name=name, type="fixed")
+        ET.SubElement(joint, "parent", link=self._root_link)
+        ET.SubElement(joint, "child", link=BASE)
         ET.SubElement(joint, "origin", xyz=f"0 0 {height!r}", rpy=_NOWHERE)
+        self._joints[BASE] = joint
+
+    def gather_shapes(self) -> None:
+        """Move shapes on links that hang on a fixed joint to the link that carries them.
+
+        The planner knows shapes by the joints that move them, and the replay would pass them over.
+        """
+        for link in self._hanging():
+            carrier, T_carrier_link = self._carrier(str(link.get("name")))
+            (parent,) = (one for one in self._root.findall("link") if one.get("name") == carrier)
+            for shape in link.findall("collision"):
+                link.remove(shape)
+                origin = shape.find("origin")
+                T_carrier_shape = T_carrier_link @ _pose(origin)
+                if origin is None:
+                    origin = ET.Element("origin")
+                    shape.insert(0, origin)
+                origin.set("xyz", _text(T_carrier_shape[:3, 3]))
+                turn = Rotation.from_matrix(T_carrier_shape[:3, :3])
+                origin.set("rpy", _text(turn.as_euler("xyz")))
+                parent.append(shape)
 
     def require_shapes_on_joints(self) -> None:
         """Refuse shapes on links that hang on a fixed joint: the replay would not see them.
@@ -73,15 +94,13 @@ class UrdfTree:
         Raises:
             InputError: If there is one; names it.
         """
-        for link in self._root.findall("link"):
+        for link in self._hanging():
             name = str(link.get("name"))
-            joint = self._joints.get(name)
-            if joint is not None and joint.get("type") == "fixed" and link.findall("collision"):
-                raise InputError(
-                    str(self._path),
-                    f"link {name} has collision shapes but hangs on a fixed joint: move them to "
-                    f"link {_parent(joint)}, else they would not be checked",
-                )
+            raise InputError(
+                str(self._path),
+                f"link {name} has collision shapes but hangs on a fixed joint: move them to "
+                f"link {self._carrier(name)[0]}, else they would not be checked",
+            )
 
     def collect_meshes(self) -> dict[str, Path]:
         """Name the meshes relative to the URDF; return where each is now, by its new name.
@@ -120,19 +139,40 @@ class UrdfTree:
     def _links(self) -> list[str]:
         return [str(link.get("name")) for link in self._root.findall("link")]
 
-    def _rename_root(self) -> None:
-        """Call a root link that is named base otherwise, that base may be a frame beside it."""
-        self._root_link = "base_link"
-        if "base_link" in self._links():
-            raise InputError(
-                str(self._path), "base_link hangs on base: remove the link base, or fix it to it"
-            )
+    def _rename_base(self) -> None:
+        """Give the URDF's own base another name, for what hangs on it stays where it is."""
+        name = "base_link" if self._root_link == BASE else "controller_base"
+        while name in self._links():
+            name += "_frame"
+        if self._root_link == BASE:
+            self._root_link = name
         for link in self._root.findall("link"):
             if link.get("name") == BASE:
-                link.set("name", self._root_link)
-        for parent in self._root.iter("parent"):
-            if parent.get("link") == BASE:
-                parent.set("link", self._root_link)
+                link.set("name", name)
+        for end in (*self._root.iter("parent"), *self._root.iter("child")):
+            if end.get("link") == BASE:
+                end.set("link", name)
+        if BASE in self._joints:
+            self._joints[name] = self._joints.pop(BASE)
+
+    def _hanging(self) -> list[ET.Element]:
+        """Return the links that have collision shapes but hang on a fixed joint."""
+        joints = self._joints
+        return [
+            link
+            for link in self._root.findall("link")
+            if link.findall("collision")
+            and (joint := joints.get(str(link.get("name")))) is not None
+            and joint.get("type") == "fixed"
+        ]
+
+    def _carrier(self, name: str) -> tuple[str, Array]:
+        """Return the link that carries another over fixed joints, and T_carrier_link, (4, 4)."""
+        T_carrier_link = np.eye(4)
+        while (joint := self._joints.get(name)) is not None and joint.get("type") == "fixed":
+            T_carrier_link = _pose(joint.find("origin")) @ T_carrier_link
+            name = _parent(joint)
+        return name, T_carrier_link
 
     def _locate(self, name: str) -> Path | None:
         """Return the file of a mesh: relative, absolute, file:// or package://."""
@@ -161,7 +201,13 @@ def _parent(joint: ET.Element) -> str:
     return "" if parent is None else str(parent.get("link"))
 
 
-def _numbers(origin: ET.Element | None, key: str) -> tuple[float, float, float]:
-    text = _NOWHERE if origin is None else origin.get(key, _NOWHERE)
-    x, y, z = (float(number) for number in text.split())
-    return x, y, z
+def _pose(origin: ET.Element | None) -> Array:
+    """Return the pose that an element says, shape (4, 4); that of no element is the identity."""
+    if origin is None:
+        return np.eye(4)
+    xyz, rpy = (np.array(origin.get(key, _NOWHERE).split(), dtype=float) for key in ("xyz", "rpy"))
+    return pose(Rotation.from_euler("xyz", rpy).as_matrix(), xyz)
+
+
+def _text(numbers: Array) -> str:
+    return " ".join(f"{round(float(number), 12) + 0.0!r}" for number in numbers)

@@ -117,7 +117,7 @@ def _along_normal(
     )
     T_contact_flange = np.linalg.solve(T_base_contact, T_base_flange)
     Ts_base_flange = T_base_contact @ T_contact_away @ T_contact_flange
-    solutions = inverse(cell.robot.arm, Ts_base_flange, path.q[index, 3])[:, path.branch]
+    solutions = inverse(cell.robot.arm, Ts_base_flange, path.q[index])[:, path.branch]
     if np.isnan(solutions).any():
         raise UnreachableApproachError(column, "reach")
     q = path.q[index] + np.cumsum(

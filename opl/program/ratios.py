@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from opl.cell.robot import Robot
+from opl.cell.spherical_wrist import SphericalWristArm
 from opl.documents import Document, read
 from opl.errors import InputError
 from opl.program.parameters import AxisParameters
@@ -152,6 +153,8 @@ def ratio_file(robot: Robot, parameters: AxisParameters, source: str) -> str:
 def mismatches(robot: Robot, parameters: AxisParameters) -> Sequence[str]:
     """Return what speaks against the parameters being those of the robot, one line each."""
     arm, links = robot.arm, np.array(parameters.link_lengths)
+    if not isinstance(arm, SphericalWristArm):
+        return (f"the file is of an arm with a spherical wrist, {robot.title} has none",)
     drawn = np.abs([arm.a1, arm.c2, arm.a2, arm.c3, arm.c4])
     if not links.any() or np.abs(links - drawn).max() <= LINK_TOLERANCE:
         return ()

@@ -55,7 +55,7 @@ def pose_of(values: tuple[float, ...]) -> Array:
 
 def configuration(robot: Robot, q: Array) -> tuple[int, ...]:
     """Return the six meaningful numbers of RCONF for a posture, shape (6,)."""
-    slots = postures_of(robot.arm, forward(robot, q), q[3])
+    slots = postures_of(robot.arm, forward(robot, q), q)
     apart = np.abs(np.remainder(slots - q + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
     slot = int(np.nanargmin(apart))
     flip, back, elbow = slot // 4, slot // 2 % 2, slot % 2
@@ -82,7 +82,7 @@ def postures(
         return np.empty((0, 6))
     no_flip, lower, back, *beyond = numbers[:6]
     slot = 4 * (1 - no_flip) + 2 * back + int(lower != back)
-    q = postures_of(robot.arm, T_base_flange, 0.0 if near is None else near[3])[slot]
+    q = postures_of(robot.arm, T_base_flange, near)[slot]
     if np.isnan(q).any():
         return np.empty((0, 6))
     found = [q]

@@ -142,7 +142,7 @@ def line(robot: Robot, start: Array, end: Array, T_flange_tool: Array) -> Array 
         (first * Rotation.from_rotvec(s * turn)).as_matrix(), T_start[:3, 3] + s * way
     )
     guess = start + s * (end - start)
-    slots = postures_of(robot.arm, Ts_base_tool @ inverse(T_flange_tool), guess[:, 3])
+    slots = postures_of(robot.arm, Ts_base_tool @ inverse(T_flange_tool), guess)
     found, q = [], start
     for candidates in slots:
         turned = candidates + 2.0 * np.pi * np.round((q - candidates) / (2.0 * np.pi))
