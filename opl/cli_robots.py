@@ -81,16 +81,18 @@ def show_data(name: str, as_json: bool) -> None:
     help="Where on axis 1 the base frame lies: at the height of axis 2, or on the mounting face.",
 )
 def import_description(file: Path, name: str, out: Path, maker: str, base: str) -> None:
-    """Make a robot of your own from a URDF of an arm with a spherical wrist.
+    """Make a robot of your own from a URDF.
 
-    The closed form of its inverse kinematics is read off the joint axes and checked on random
-    postures. Meshes are copied. A frame base in the URDF is taken for the controller's own.
+    The arm has a spherical wrist, or three parallel axes in the middle as those of Universal
+    Robots. The closed form of its inverse kinematics is read off the joint axes and checked on
+    random postures. Meshes are copied. A frame base in the URDF is taken for the controller's own.
 
     Example: opl robots import-urdf my_arm.urdf --name my_arm --out robots/my_arm
     """
     made = import_urdf(file, name, out, base_at_floor=base == "floor", maker=maker)
     click.echo(
-        f"{made.robot.name}: arm with a spherical wrist, reach {made.robot.reach * 1e3:.0f} mm"
+        f"{made.robot.name}: arm with {read_robot_file(made.files[0]).arm.family}, "
+        f"reach {made.robot.reach * 1e3:.0f} mm"
     )
     click.echo(f"FK(IK) closes within {made.closure:.1g} on random postures")
     for line in made.cautions:

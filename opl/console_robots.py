@@ -43,15 +43,18 @@ def show_robot(robot: Robot, file: RobotFile) -> None:
     _print(f"{file.name}: {file.title}{made}")
     controller = base.controller_height_mm
     own = "" if controller is None else f", that of its controller {controller:g} mm"
+    if base.controller_turn_deg:
+        own += f", turned {base.controller_turn_deg:g} deg"
+    lengths = ", ".join(f"{key[:-3]} {length:g}" for key, length in arm.lengths_mm().items())
+    wrist = "where axes 5 and 6 meet" if arm.parallel_axes else "the wrist centre"
     payload = "payload not known"
     if file.payload is not None:
         payload = f"payload {file.payload.max_kg:g} kg {notes.mark(file.payload)}"
     lines = [
-        f"reach {robot.reach * 1e3:.0f} mm from axis 1 to the wrist centre, {payload}",
+        f"reach {robot.reach * 1e3:.0f} mm from axis 1 to {wrist}, {payload}",
         f"base frame on axis 1, {base.height_mm:g} mm above the mounting face{own} "
         f"{notes.mark(base)}",
-        f"arm a1 {arm.a1_mm:g}, a2 {arm.a2_mm:g}, b {arm.b_mm:g}, c1 {arm.c1_mm:g}, c2 "
-        f"{arm.c2_mm:g}, c3 {arm.c3_mm:g}, c4 {arm.c4_mm:g} mm; zeros "
+        f"arm with {arm.family}: {lengths} mm; zeros "
         f"{' '.join(f'{offset:g}' for offset in arm.offsets_deg)} deg; signs "
         f"{' '.join('+' if sign > 0 else '-' for sign in arm.signs)} {notes.mark(arm)}",
     ]
@@ -114,10 +117,10 @@ class _Notes:
 
 
 def _axes(names: Sequence[str]) -> str:
-    """Return the names of the joints, short where they are only numbered."""
-    if all(name[1:] == str(number) for number, name in enumerate(names, start=1)):
-        return f"{names[0]} to {names[-1]}"
-    return " ".join(names)
+    """Return the names of the joints, the first and last where they are long or only numbered."""
+    numbered = all(name[1:] == str(number) for number, name in enumerate(names, start=1))
+    told = " ".join(names)
+    return f"{names[0]} to {names[-1]}" if numbered or len(told) > 20 else told
 
 
 def _pulses(robot: Robot) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from opl.cell.robot import Robot
+from opl.cell.spherical_wrist import SphericalWristArm
 from opl.documents import Document
 from opl.errors import InputError, OplError
 from opl.geometry.frames import Array, NotARotationError, nearest_pose
@@ -205,6 +206,12 @@ class ProgramSection(Document):
                     f"{self.controller} counts pulses, of which {robot.title} (robot: "
                     f"{robot.name}, made by {robot.maker}) has none; name the controller of that "
                     f"arm: {', '.join(_without_pulses())}",
+                )
+            if self.positions != "pulses" and not isinstance(robot.arm, SphericalWristArm):
+                raise InputError(
+                    f"{path}: program.positions",
+                    f"must be pulses: poses of {self.controller} name a posture as that of an arm "
+                    f"with a spherical wrist, which {robot.title} has not",
                 )
             return
         own = ("positions", "user_frame", "levels", "acceleration_percent", "deceleration_percent")

@@ -75,9 +75,8 @@ def urdf(robot: RobotFile, shapes: Shapes) -> str:
         text.append(_revolute(joint, parent, child, origin, axis))
         text.append(_link(child, shapes.links[f"joint_{number}"]))
         parent = child
-    # flange face: z out of the flange; x up or down at the zero posture, as the maker has it
-    rpy = "3.141592653589793 -1.5707963267948966 0" if _x_up(robot) else "0 1.5707963267948966 0"
-    text += [_link("tool0", None), _fixed(parent, "tool0", f'rpy="{rpy}"'), "</robot>\n"]
+    origin = f'rpy="{_flange_rpy(robot)}"'
+    text += [_link("tool0", None), _fixed(parent, "tool0", origin), "</robot>\n"]
     return "".join(text)
 
 
@@ -86,24 +85,33 @@ def _joints(robot: RobotFile) -> list[tuple[Joint, np.ndarray, np.ndarray]]:
     arm, signs = robot.arm, robot.arm.signs
     upper = math.radians(-arm.offsets_deg[1])  # tilt of the upper arm from upright
     fore = upper - math.radians(arm.offsets_deg[2])
-    assert np.allclose(np.remainder([arm.offsets_deg[k] for k in (0, 3, 4)], 360.0), 0.0)
     x, y, z = np.eye(3)
     up, along, ahead = _tilted(upper, z), _tilted(fore, z), _tilted(fore, x)
-    axes = [z, y, y, along, y, along]
     origins = [
         np.zeros(3),
         arm.a1_mm * x + (robot.base.height_mm + arm.c1_mm) * z,
         arm.c2_mm * up,
-        arm.a2_mm * ahead + arm.b_mm * y,
-        arm.c3_mm * along,
-        arm.c4_mm * along,
     ]
+    if arm.parallel_axes:
+        assert np.allclose([arm.offsets_deg[k] for k in (0, 4, 5)], 0.0)
+        down = _tilted(fore - math.radians(arm.offsets_deg[3]), z)
+        axes = [z, y, y, y, down, y]
+        origins += [arm.c3_mm * along + arm.b_mm * y, arm.c4_mm * down, arm.c5_mm * y]
+    else:
+        assert np.allclose(np.remainder([arm.offsets_deg[k] for k in (0, 3, 4)], 360.0), 0.0)
+        axes = [z, y, y, along, y, along]
+        origins += [arm.a2_mm * ahead + arm.b_mm * y, arm.c3_mm * along, arm.c4_mm * along]
     turned = [sign * axis for sign, axis in zip(signs, axes, strict=True)]
     return list(zip(robot.joints, origins, turned, strict=True))
 
 
-def _x_up(robot: RobotFile) -> bool:
-    return abs(robot.arm.offsets_deg[5]) == 180.0
+def _flange_rpy(robot: RobotFile) -> str:
+    """Return how the flange is turned at zero: z out of its face, x as the maker has it."""
+    if robot.arm.parallel_axes:
+        return "1.5707963267948966 0 3.141592653589793"  # z left, x back
+    if abs(robot.arm.offsets_deg[5]) == 180.0:
+        return "3.141592653589793 -1.5707963267948966 0"  # z ahead, x up
+    return "0 1.5707963267948966 0"  # z ahead, x down
 
 
 def _tilted(angle: float, v: np.ndarray) -> np.ndarray:

@@ -18,6 +18,9 @@ from opl.resources import folder
 
 ROBOTS = {name: load_robot(name) for name in known_robots()}
 every_robot = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS)
+every_spherical_wrist = pytest.mark.parametrize(
+    "robot", [r for name, r in ROBOTS.items() if name != "ur10e"], ids=lambda robot: robot.name
+)
 
 # Where the makers and public descriptions put the flange of the zero posture, in [mm] above the
 # floor, whether its x points up there, and the published reach.
@@ -33,6 +36,8 @@ AT_ZERO = {
     "kr16": (1768, 640, False, 1611),
     "m20ia": (1085, 1565, True, 1812),
 }
+# three axes parallel, where the others have a spherical wrist
+UR = "ur10e"
 
 # Denavit-Hartenberg: a1, length of the upper arm, offset of the forearm, forearm, wrist to flange,
 # in [m]; a frame on axis 1 at the height of axis 2
@@ -47,6 +52,7 @@ DH = {
     "irb2600": ("abb", 0.150, 0.700, 0.115, 0.795, 0.085),
     "irb4600": ("abb", 0.175, 0.900, 0.175, 0.960, 0.135),
     "kr16": ("kuka", 0.260, 0.680, -0.035, 0.670, 0.158),
+    UR: ("ur", 0.61270, 0.57155, 0.17415, 0.11985, 0.11655),
 }
 # the rows of each family: sign and zero of theta in [deg], d, a, alpha in [deg]
 DH_ROWS = {
@@ -61,6 +67,11 @@ DH_ROWS = {
     "kuka": lambda a1, a2, a3, d4, d6: [
         (-1, 0, 0, a1, -90), (1, 0, 0, a2, 0), (1, -90, 0, a3, -90),
         (-1, 0, d4, 0, 90), (1, 0, 0, 0, -90), (-1, 180, d6, 0, 0),
+    ],
+    # as the maker publishes it, its base turned by half a turn
+    "ur": lambda a2, a3, d4, d5, d6: [
+        (1, 180, 0, 0, 90), (1, 0, 0, -a2, 0), (1, 0, 0, -a3, 0),
+        (1, 0, d4, 0, 90), (1, 0, d5, 0, -90), (1, 0, d6, 0, 0),
     ],
 }  # fmt: skip
 
@@ -88,13 +99,20 @@ def random_postures(robot, n, seed=0):
 # geometry
 
 
-def test_there_are_robots_of_four_makers():
-    assert len(ROBOTS) >= 8
-    assert {robot.maker for robot in ROBOTS.values()} == {"Yaskawa", "ABB", "KUKA", "FANUC"}
-    assert set(AT_ZERO) == set(DH) == set(ROBOTS)
+def test_there_are_robots_of_five_makers():
+    makers = {"Yaskawa", "ABB", "KUKA", "FANUC", "Universal Robots"}
+    assert {robot.maker for robot in ROBOTS.values()} == makers
+    assert {*AT_ZERO, UR} == set(DH) == set(ROBOTS)
 
 
-@every_robot
+def test_the_zero_posture_of_the_ur10e_is_the_makers():
+    T = controller_poses(ROBOTS[UR], np.zeros(6))
+    expected = [[1, 0, 0, -1.18425], [0, 0, -1, -0.2907], [0, 1, 0, 0.06085], [0, 0, 0, 1]]
+    np.testing.assert_allclose(T, expected, atol=1e-12)
+    assert ROBOTS[UR].reach == pytest.approx(1.3, abs=0.02)  # published, in round figures
+
+
+@every_spherical_wrist
 def test_the_zero_posture_is_the_makers(robot):
     ahead, high, x_up, reach = AT_ZERO[robot.name]
     T = forward(robot, np.zeros(6))
@@ -121,7 +139,7 @@ def test_every_posture_found_reaches_the_pose_and_the_original_is_among_them(rob
     assert np.nanmin(distance.reshape(len(q), -1), axis=1).max() < 1e-8
 
 
-@every_robot
+@every_spherical_wrist
 def test_an_independent_package_finds_the_same_postures(robot):
     Ts = forward(robot, random_postures(robot, 60, seed=2))
     for q, q_opw in zip(inverse(robot.arm, Ts), opw_solutions(robot.arm, Ts), strict=True):
@@ -175,7 +193,7 @@ def test_every_number_has_a_source(robot):
 
 def test_pulses_are_verified_absent_or_marked():
     missing = {name for name, robot in ROBOTS.items() if robot.missing_pulses}
-    assert missing == {"gp12", "mh50", "irb2600", "irb4600", "kr16", "m20ia"}
+    assert missing == {"gp12", "mh50", "irb2600", "irb4600", "kr16", "m20ia", UR}
     for name in missing:
         assert np.isnan(ROBOTS[name].pulses_per_radian).all()
         assert ROBOTS[name].unverified_pulses == ()
@@ -235,7 +253,7 @@ def posture(robot, *degrees):
     return np.remainder(q + np.pi, 2 * np.pi) - np.pi
 
 
-@every_robot
+@every_spherical_wrist
 def test_ordinary_postures_do_not_collide(robot):
     colliding = link_collisions(robot)
     assert not colliding(np.zeros(6))
@@ -247,7 +265,17 @@ def test_ordinary_postures_do_not_collide(robot):
                 assert not colliding(q), np.degrees(q)
 
 
-@every_robot
+def test_ordinary_postures_of_the_ur10e_do_not_collide():
+    colliding = link_collisions(ROBOTS[UR])
+    assert not colliding(np.zeros(6))
+    for elbow in range(-90, 91, 30):
+        for hand in (-90, 0, 90):
+            for turn in (-90, 0, 90):
+                assert not colliding(np.radians([10, -90, elbow, hand, turn, 30]))
+    assert colliding(np.radians([0, -90, 180, 0, 0, 0]))
+
+
+@every_spherical_wrist
 def test_the_wrist_bends_freely_over_its_travel(robot):
     colliding = link_collisions(robot)
     for bend in np.linspace(robot.lower[4], robot.upper[4], 61):
@@ -258,5 +286,6 @@ def test_the_wrist_bends_freely_over_its_travel(robot):
 def test_few_random_postures_collide_and_some_do(robot):
     colliding = link_collisions(robot)
     rate = np.mean([colliding(q) for q in random_postures(robot, 1000)])
-    # axis 3 of m20ia turns through 458 degrees: most of the excess is the arm folded into itself
-    assert 0.03 < rate < (0.45 if robot.name == "m20ia" else 0.17)
+    # axis 3 of m20ia turns through 458 degrees, and that of ur10e through 360: most of the excess
+    # is the arm folded into itself
+    assert 0.03 < rate < {"m20ia": 0.45, UR: 0.5}.get(robot.name, 0.17)

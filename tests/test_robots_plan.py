@@ -11,6 +11,7 @@ from jobs import GONE, opl, write_job
 from program_samples import DATE, HOME, SCALE
 
 from opl.cell.robot import load_robot
+from opl.cell.urdf_import import import_urdf
 from opl.errors import InputError, UnsafeError
 from opl.job import load
 from opl.program.moves import Move, Program
@@ -50,9 +51,17 @@ def test_an_abb_arm_gets_a_proven_program_in_rapid(tmp_path):
     assert "J1_deg" in columns and not any("pulses" in column for column in columns)
 
 
+UR10E = {"robot": "ur10e", "process.home_deg": [0.0, -110.0, 110.0, -90.0, -90.0, 0.0]}
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        (
+            {**UR10E, "robot": "mine", **program(positions="base")},
+            r"program\.positions: must be pulses: poses of DX200 name a posture as that of an arm "
+            r"with a spherical wrist, which mine has not",
+        ),
         (
             {**IRB2600, **program()},
             r"job\.yaml: program\.controller: DX200 counts pulses, of which ABB IRB 2600-12/1\.65 "
@@ -70,6 +79,8 @@ def test_an_abb_arm_gets_a_proven_program_in_rapid(tmp_path):
     ],
 )
 def test_a_program_in_pulses_nobody_knows_is_refused(changes, message, tmp_path):
+    if changes["robot"] == "mine":
+        import_urdf(load_robot("ur10e").urdf, "mine", tmp_path / "mine")
     with pytest.raises(InputError, match=message):
         load(write_job(tmp_path, changes))
 
@@ -128,7 +139,7 @@ def test_robots_are_listed_in_80_columns():
     for name, reach, told in (
         ("gp25", "1730", "verified"),
         ("gp12", "1440", "not known"),
-        ("kr16", "1611", "A1 to A6     not needed"),
+        ("kr16", "1611", "A1 to A6        not needed"),
     ):
         (line,) = (line for line in ended.out.splitlines() if line.startswith(name))
         assert reach in line and told in line

@@ -1,5 +1,7 @@
 """Robots of the user's own: the closed form read off a URDF, and what is refused."""
 
+from dataclasses import asdict, replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -12,7 +14,6 @@ from opl.cell.robot_file import read_robot_file
 from opl.cell.urdf_import import import_urdf
 from opl.errors import InputError
 
-LENGTHS = ("a1", "a2", "b", "c2", "c3", "c4")
 MH24 = load_robot("mh24")
 
 
@@ -35,11 +36,10 @@ def wrist_origin(dx, dy):
 def test_our_own_robots_are_recognised(name, tmp_path):
     robot = load_robot(name)
     found = recognise(robot.urdf)
-    for key in LENGTHS:
-        assert getattr(found.arm, key) == pytest.approx(getattr(robot.arm, key), abs=1e-9)
-    assert found.arm.c1 == pytest.approx(robot.base_height, abs=1e-9)
-    np.testing.assert_allclose(found.arm.offsets, robot.arm.offsets, atol=1e-9)
-    assert found.arm.signs == robot.arm.signs
+    assert type(found.arm) is type(robot.arm)
+    known = asdict(replace(robot.arm, c1=robot.base_height))
+    for key, value in asdict(found.arm).items():
+        np.testing.assert_allclose(value, known[key], atol=1e-9)
     made = import_urdf(robot.urdf, "mine", tmp_path / "mine")
     assert made.closure < 1e-11
     mine = load_robot("mine", tmp_path)
@@ -58,6 +58,54 @@ def test_an_arm_with_a_lateral_offset_and_odd_zeros_is_recognised(tmp_path):
     assert made.robot.arm.b == pytest.approx(0.04, abs=1e-9)
     assert made.robot.arm.offsets[2] == pytest.approx(-np.pi / 2 - 0.3, abs=1e-9)
     assert made.closure < 1e-9
+
+
+def ur_as_its_maker_has_it(tmp_path):
+    """Return the UR10e below a link world, its foot on a fixed joint, its base turned round."""
+    extra = """<link name="world"/><joint name="stand" type="fixed"><parent link="world"/>
+      <child link="base_link"/></joint>
+      <link name="plate"><collision name="plate"><geometry><box size="0.3 0.3 0.01"/></geometry>
+      </collision></link><joint name="plate" type="fixed"><parent link="base_link"/>
+      <child link="plate"/><origin rpy="0 0 3.14159265"/></joint>"""
+    turned = '<origin xyz="0 0 0" rpy="0 0 3.14159265"/>'
+    return changed(
+        tmp_path,
+        ('<robot name="ur10e">', f'<robot name="ur10e">{extra}'),
+        ('<origin xyz="0 0 0.1807"/>\n  </joint>\n\n  <joint', f"{turned}</joint><joint"),
+        name="ur10e",
+    )
+
+
+def test_an_arm_with_parallel_axes_is_recognised_as_its_maker_describes_it(tmp_path):
+    made = import_urdf(ur_as_its_maker_has_it(tmp_path), "mine", tmp_path / "mine")
+    ours = load_robot("ur10e")
+    assert made.closure < 1e-11 and made.cautions == ()
+    q = np.random.default_rng(0).uniform(ours.lower, ours.upper, (20, 6))
+    np.testing.assert_allclose(forward(made.robot, q), forward(ours, q), atol=1e-9)
+    # the pendant counts from the mounting face, turned by half a turn
+    np.testing.assert_allclose(made.robot.T_controller_base, ours.T_controller_base, atol=1e-8)
+    assert made.robot.controller_base_turn == pytest.approx(np.pi)
+    ended = opl("robots", "import-urdf", ours.urdf, "--name", "m", "--out", tmp_path / "command")
+    assert "arm with parallel axes, reach 1316 mm" in ended.out
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (('xyz="0 0.11655 0"', 'xyz="0.003 0.11655 0"'), None),
+        (('<axis xyz="0 0 -1"/>', '<axis xyz="0.6 0 -0.8"/>'), "axis 5 must meet it, it passes by"),
+        (('<axis xyz="0 0 -1"/>', '<axis xyz="0 0.6 -0.8"/>'), "axes 4 and 5 must be at right"),
+        (
+            ('xyz="0 0.11655 0"', 'xyz="0 0.11655 0" rpy="0.2 0 0"'),
+            "axes 5 and 6 must be at right angles",
+        ),
+        (('xyz="0 0 -0.11985"', 'xyz="0.02 0 -0.11985"'), "it passes by 20 mm"),
+    ],
+)
+def test_another_build_with_parallel_axes_is_refused(change, message, tmp_path):
+    path = changed(tmp_path, change, name="ur10e")
+    with pytest.raises(InputError, match=message or "axes 5 and 6 must meet, they pass by 3 mm"):
+        import_urdf(path, "mine", tmp_path / "mine")
 
 
 def test_rounded_right_angles_are_no_obstacle(tmp_path):

@@ -4,7 +4,9 @@ A column is a cutter point, a row a contact position: a ladder graph whose rungs
 Each branch of the inverse kinematics has its own matrices, because a track never changes branch (a
 change passes a singularity). Joints that turn more than once have several counts of turns for a
 posture; where the angles of a branch leave a gap that no step could cross, each count is a matrix
-of its own, elsewhere the counts are more rows of one matrix.
+of its own, elsewhere the counts are more rows of one matrix. Where nearly every joint turns twice,
+that would be hundreds of matrices that make the same motions: then the one in the middle of the
+limits stands for all.
 """
 
 from __future__ import annotations
@@ -61,6 +63,8 @@ class NodeField:
 
 # [rad] a gap in the angles of a joint that is wider than this is crossed by no step of a track
 SEAM_GAP = np.deg2rad(45.0)
+# three turns each of two wrist axes
+MOST_SHEETS = 9
 
 
 def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) -> NodeField:
@@ -111,6 +115,7 @@ def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
     lifted = q.copy()
     sheet_turns: list[Array] = [np.zeros(1)] * 6
     copy_turns: list[Array] = [np.zeros(1)] * 6
+    central: list[Array] = [np.zeros(1)] * 6
     all_turns = turns(lower, upper)
     for joint in range(6):
         counts = np.unique(all_turns[:, joint])
@@ -128,7 +133,13 @@ def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
         end = start + 2.0 * np.pi - gaps[widest]
         first = np.ceil((lower[joint] - end) / (2.0 * np.pi))
         last = np.floor((upper[joint] - start) / (2.0 * np.pi))
-        sheet_turns[joint] = 2.0 * np.pi * np.arange(first, last + 1)
+        counts = 2.0 * np.pi * np.arange(first, last + 1)
+        sheet_turns[joint] = counts
+        whole = counts[(start + counts >= lower[joint]) & (end + counts <= upper[joint])]
+        middle = (lower[joint] + upper[joint] - start - end) / 2.0
+        central[joint] = whole[[np.argmin(np.abs(whole - middle))]] if len(whole) else counts
+    if np.prod([len(counts) for counts in sheet_turns]) > MOST_SHEETS:
+        sheet_turns = central
     return lifted, _products(sheet_turns), _products(copy_turns)
 
 
