@@ -169,6 +169,7 @@ def load(path: Path, method: str | None = None) -> Job:
     part = file.workpiece.load_part(path)
     surface = file.workpiece.load_surface(path)
     file.workpiece.check_sizes(path, surface, part)
+    file.workpiece.check_outside(path, surface, part)
     cell = WorkCell(
         robot=robot,
         wheel=wheel,

@@ -12,11 +12,15 @@ from opl.documents import Document
 from opl.errors import InputError
 from opl.geometry.machined import CAD, MESHES, load_machined
 from opl.geometry.mesh import TriangleMesh, load_mesh
+from opl.geometry.outside import facing_inward
 from opl.geometry.passes import Kind, MachinedSurface, Order, Passes
 from opl.geometry.scallop import row_pitch
 from opl.geometry.size import check_sizes
 
 MM = 1e-3
+
+# so much of a surface may look as if it faced into the solid before it is refused
+MOST_INWARD = 0.1
 
 _Positive = Annotated[float, Field(gt=0.0)]
 _NotNegative = Annotated[float, Field(ge=0.0)]
@@ -96,6 +100,25 @@ class WorkpieceSection(Document):
             key = "mesh_unit" if key == "part" else unit_key
             hint = "; STEP and IGES files carry their unit" if suffix in CAD else ""
             raise InputError(f"{path}: workpiece.{key}", message + hint) from error
+
+    def check_outside(self, path: Path, surface: MachinedSurface, part: TriangleMesh) -> None:
+        """Refuse a surface whose normals point into the solid.
+
+        Raises:
+            InputError: If they do so at more than a tenth of it.
+        """
+        inward = facing_inward(surface, part)
+        if inward > MOST_INWARD:
+            told = f"normals point into the solid at {100.0 * inward:.0f} % of the surface"
+            if Path(self.surface).suffix.lower() in MESHES:
+                raise InputError(
+                    f"{path}: workpiece.surface", f"{told}; export it with its triangles turned"
+                )
+            raise InputError(
+                f"{path}: workpiece.reversed_normal",
+                f"{told}; set it to {str(not self.reversed_normal).lower()}"
+                + ("" if inward > 0.9 else ", or let all faces of the file point outward"),
+            )
 
 
 class PassesSection(Document):

@@ -102,7 +102,6 @@ def write_stl(shape, path, deflection=0.006, angle=0.5):
 def test_faces_are_exact_and_face_outward(tmp_path, shape, kind, distance, area):
     found = cad.load_cad_faces(write_step(shape.Shape(), tmp_path / "part.step"))
     assert found[0].type == kind
-    assert all(one.in_solid for one in found)
     samples = found[0].face.area_samples(0.5e-3)
     assert np.abs(distance(samples.points)).max() < 1e-9
     assert (distance(samples.points + 1e-4 * samples.normals) > 0.9e-4).all()

@@ -248,7 +248,7 @@ def test_a_file_that_is_no_mesh_is_refused(tmp_path):
 def test_a_surface_without_a_normal_is_refused_with_the_place(tmp_path):
     job = write_job(tmp_path)
     # on the flat bottom of the solid; the surface stands still where v begins
-    edges = [[[x, -54.0, 18.5654], [x, -54.0, 18.5654], [x, -26.0, 18.5654]] for x in (-12.5, 12.5)]
+    edges = [[[x, -54.0, 18.5654], [x, -54.0, 18.5654], [x, -26.0, 18.5654]] for x in (12.5, -12.5)]
     write_surface(
         tmp_path / "surface.json",
         knots_u=[0, 0, 1, 1],

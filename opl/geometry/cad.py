@@ -53,13 +53,12 @@ class CadFace:
 
     Attributes:
         type: What kind of surface it is in the file, e.g. ``plane`` or ``b-spline``.
-        face: Its NURBS surface and what its borders leave of it, in the file's frame.
-        in_solid: Whether the face bounds a solid, which tells its outside.
+        face: Its NURBS surface and what its borders leave of it, in the file's frame. The outside
+            is where the file has it: of a face that bounds a solid, away from that.
     """
 
     type: str
     face: Face
-    in_solid: bool
 
 
 def load_cad_faces(path: Path) -> tuple[CadFace, ...]:
@@ -78,12 +77,11 @@ def load_cad_faces(path: Path) -> tuple[CadFace, ...]:
             str(path), "needs the optional extra for STEP and IGES: pip install 'opl[cad]'"
         ) from error
     shape = _read(path)
-    in_solids = {hash(face) for solid in _all(shape, "SOLID") for face in _all(solid, "FACE")}
     explorer = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
     faces: list[CadFace] = []
     while explorer.More():
         raw = TopoDS.Face_s(explorer.Current())
-        faces.append(_converted(path, raw, len(faces) + 1, hash(raw) in in_solids))
+        faces.append(_converted(path, raw, len(faces) + 1))
         explorer.Next()
     if not faces:
         raise InputError(str(path), "holds no faces")
@@ -138,7 +136,7 @@ def _read(path: Path) -> Any:
     return shape
 
 
-def _converted(path: Path, raw: Any, number: int, in_solid: bool) -> CadFace:
+def _converted(path: Path, raw: Any, number: int) -> CadFace:
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Surface
     from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
@@ -172,7 +170,7 @@ def _converted(path: Path, raw: Any, number: int, in_solid: bool) -> CadFace:
             raise
         raise InputError(str(path), f"face {number}: {error}") from error
     name = _TYPES[kind] if kind < len(_TYPES) else "other"
-    return CadFace(name, face, in_solid)
+    return CadFace(name, face)
 
 
 def _surface(spline: Any, loops: tuple[Array, ...]) -> tuple[NurbsSurface, Trim | None]:
