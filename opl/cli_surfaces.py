@@ -10,7 +10,6 @@ import numpy as np
 
 from opl.deliver import check_folder, write_texts
 from opl.geometry.faces import FaceSummary, list_faces, preview
-from opl.geometry.inspection import uncovered_area
 from opl.geometry.order import air_way
 from opl.job import load
 from opl.report.part_view import part_view
@@ -33,18 +32,7 @@ def points(job: Path, out: Path | None, as_json: bool) -> None:
     folder = out or Path("out") / loaded.name
     check_folder(folder)
     surfacing = cut_surface(loaded)
-    laid = surfacing.laid.points
-    texts = {
-        f"{loaded.name}_points.csv": points_table(surfacing.laid),
-        f"{loaded.name}_points.svg": part_view(
-            title=f"{loaded.name}: what will be ground",
-            vertices=loaded.cell.part.vertices,
-            faces=loaded.cell.part.faces,
-            Ts_workpiece_cutter=laid.Ts_workpiece_cutter,
-            pass_index=laid.pass_index,
-        ),
-    }
-    written = write_texts(folder, texts)
+    laid, inspection = surfacing.laid.points, surfacing.inspection
     last = np.append(np.diff(laid.pass_index) != 0, True)
     figures = {
         "job": loaded.name,
@@ -53,20 +41,34 @@ def points(job: Path, out: Path | None, as_json: bool) -> None:
         "pitch_mm": round(1e3 * loaded.passes.pitch, 4),
         "path_mm": round(1e3 * float(laid.arc_length[last].sum()), 2),
         "air_mm": round(1e3 * air_way(laid.Ts_workpiece_cutter, laid.pass_index), 2),
-        "uncovered_percent": round(
-            100.0 * uncovered_area(loaded.surface, loaded.passes, surfacing.laid), 2
-        ),
+        "uncovered_percent": round(100.0 * inspection.uncovered_fraction, 2),
         "warnings": [str(finding) for finding in surfacing.warnings],
-        "files": [str(path) for path in written],
     }
-    if as_json:
-        click.echo(json.dumps(figures, indent=2))
-        return
-    click.echo(
+    told = (
         f"{figures['cutter_points']} cutter points in {figures['passes']} passes, pitch "
         f"{figures['pitch_mm']:g} mm, path {figures['path_mm']:g} mm, "
         f"{figures['uncovered_percent']:g} % of the area not covered"
     )
+    texts = {
+        f"{loaded.name}_points.csv": points_table(surfacing.laid),
+        f"{loaded.name}_points.svg": part_view(
+            title=f"{loaded.name}: what will be ground",
+            subtitle=told,
+            vertices=loaded.cell.part.vertices,
+            faces=loaded.cell.part.faces,
+            Ts_workpiece_cutter=laid.Ts_workpiece_cutter,
+            pass_index=laid.pass_index,
+            doubtful=inspection.doubtful,
+            uncovered=inspection.uncovered.points,
+            uncovered_normals=inspection.uncovered.normals,
+        ),
+    }
+    written = write_texts(folder, texts)
+    figures["files"] = [str(path) for path in written]
+    if as_json:
+        click.echo(json.dumps(figures, indent=2))
+        return
+    click.echo(told)
     for finding in surfacing.warnings:
         click.echo(f"warning: {finding}")
     for path in written:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from opl.errors import InputError
 from opl.findings import Finding
-from opl.geometry.inspection import inspect
+from opl.geometry.inspection import Inspection, inspect
 from opl.geometry.nurbs import DegenerateNormalError
 from opl.geometry.passes import LaidPasses, lay_passes
 from opl.geometry.toolpath import CutterPoints
@@ -22,16 +22,21 @@ class Surfacing:
 
     Attributes:
         laid: The cutter points, and how the surface bends there.
-        warnings: What is doubtful about them.
+        inspection: What is doubtful about them.
     """
 
     laid: LaidPasses
-    warnings: tuple[Finding, ...]
+    inspection: Inspection
 
     @property
     def points(self) -> CutterPoints:
         """Return the cutter points."""
         return self.laid.points
+
+    @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """Return what is doubtful about them."""
+        return self.inspection.findings
 
 
 def cut_surface(job: Job) -> Surfacing:

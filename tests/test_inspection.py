@@ -6,7 +6,7 @@ from surfaces import cylinder_patch, plane_patch
 from opl.geometry.inspection import inspect
 from opl.geometry.mesh_surface import MeshSurface
 from opl.geometry.nurbs import NurbsSurface
-from opl.geometry.passes import Passes, lay_passes
+from opl.geometry.passes import Order, Passes, lay_passes
 from opl.geometry.patchwork import Face, Patchwork
 from opl.geometry.wheel import ContactWheel
 
@@ -22,7 +22,8 @@ def found(surface, plane_normal, allowance=0.5e-3, on=None, **changes):
         plane_normal, **{"pitch": 5e-3, "max_bow_height": 0.05e-3, "largest_step": 4e-3, **changes}
     )
     laid = lay_passes(surface, plan)
-    return laid, {f.kind: f for f in inspect(surface, plan, laid, on or wheel(), allowance)}
+    looked_at = inspect(surface, plan, laid, on or wheel(), allowance)
+    return laid, {f.kind: f for f in looked_at.findings}
 
 
 def hollow(radius, outward=-1.0, **shape):
@@ -78,6 +79,32 @@ def test_short_segments_are_named():
     rough = NurbsSurface(1, 1, line, knots, net, np.ones((2, 4)))
     _, findings = found(Patchwork((Face(rough),)), Y, rows=1)
     assert "less than the bow height" in findings["short segment"].message
+
+
+def test_passes_that_lie_on_each_other_are_named_unless_the_job_asks_for_them():
+    twice = Patchwork((Face(plane_patch()), Face(plane_patch(0.02))))
+    laid, findings = found(twice, Y, pitch=8e-3, margin=4e-3)
+    assert laid.points.n_passes == 6
+    assert "pass 2 lies on pass 1, pass 4 lies on pass 3" in findings["duplicate"].message
+    once = Patchwork((Face(plane_patch()),))
+    for changes in ({}, {"order": Order.BOTH}, {"repeats": 2}):
+        assert "duplicate" not in found(once, Y, **changes)[1]
+
+
+def test_passes_that_only_cross_or_run_beside_each_other_are_no_duplicates():
+    _, findings = found(Patchwork((Face(cylinder(whole=True).surface),)), X, margin=1e-3)
+    assert "duplicate" not in findings
+
+
+def test_the_points_that_warnings_name_are_known():
+    plan = Passes(Z, 5e-3, 0.05e-3, 4e-3)
+    surface = hollow(0.06)
+    laid = lay_passes(surface, plan)
+    looked_at = inspect(surface, plan, laid, wheel(), 0.5e-3)
+    assert looked_at.doubtful.all()
+    assert looked_at.uncovered_fraction == pytest.approx(
+        looked_at.uncovered.areas.sum() / surface.area_samples(1e-3).areas.sum(), rel=1e-2, abs=1e-3
+    )
 
 
 def test_uncovered_area_is_told_in_percent():

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from opl.geometry.frames import Array
@@ -40,11 +41,17 @@ class AreaSamples:
             )
         )
 
+    def chosen(self, which: NDArray[np.bool_]) -> AreaSamples:
+        """Return some of the samples."""
+        return AreaSamples(
+            self.points[which], self.normals[which], self.areas[which], self.uv[which]
+        )
 
-def uncovered_fraction(
+
+def uncovered(
     samples: AreaSamples, points: Array, pass_index: np.ndarray, pitch: float
-) -> float:
-    """Return the part of the area that is more than half a pitch away from every pass, 0 to 1.
+) -> NDArray[np.bool_]:
+    """Return which samples are more than half a pitch away from every pass, shape (k,).
 
     Args:
         samples: Of the surface.
@@ -52,17 +59,51 @@ def uncovered_fraction(
         pass_index: Pass of each, shape (n,).
         pitch: Distance of the rows in [m].
     """
+    looks, spacing = looks_along(points, pass_index, pitch)[0], pitch / _LOOKS_PER_PITCH
+    distance, _ = cKDTree(looks).query(samples.points)
+    # the nearest look may be half a spacing further along than the path itself
+    return np.asarray(distance > np.hypot(0.5 * pitch * (1.0 + 1e-6), 0.5 * spacing))
+
+
+def lying_on_others(
+    points: Array, pass_index: np.ndarray, pitch: float, tolerance: float
+) -> list[tuple[int, int]]:
+    """Return the passes that run along an earlier one for at least half of their points.
+
+    Args:
+        points: Cutter points in [m], shape (n, 3).
+        pass_index: Pass of each, shape (n,).
+        pitch: Distance of the rows in [m].
+        tolerance: Passes that are no further apart than this are one [m].
+
+    Returns:
+        Pairs of passes, the earlier one first.
+    """
+    looks, owner = looks_along(points, pass_index, pitch)
+    reach = float(np.hypot(tolerance, 0.5 * pitch / _LOOKS_PER_PITCH))
+    own = [points[pass_index == k] for k in range(int(pass_index.max()) + 1)]
+    # a pass that lies on another one does so in its middle or in one of its quarters
+    some = np.array([mine[[len(mine) // 4, len(mine) // 2, 3 * len(mine) // 4]] for mine in own])
+    near = cKDTree(looks).query_ball_point(some.reshape(-1, 3), reach)
+    found = []
+    for k, mine in enumerate(own):
+        others = {int(owner[look]) for looked in near[3 * k : 3 * k + 3] for look in looked}
+        for other in sorted(other for other in others if other < k):
+            distance, _ = cKDTree(looks[owner == other]).query(mine)
+            if np.count_nonzero(distance <= reach) >= 0.5 * len(mine):
+                found.append((other, k))
+    return found
+
+
+def looks_along(points: Array, pass_index: np.ndarray, pitch: float) -> tuple[Array, np.ndarray]:
+    """Return points along passes, close to each other, and the pass of each, (m, 3) and (m,)."""
     one_pass = np.diff(pass_index) == 0
     starts, ends = points[:-1][one_pass], points[1:][one_pass]
     lengths = np.linalg.norm(ends - starts, axis=1)
-    spacing = pitch / _LOOKS_PER_PITCH
-    counts = np.maximum(np.ceil(lengths / spacing).astype(int), 1)
+    counts = np.maximum(np.ceil(lengths * _LOOKS_PER_PITCH / pitch).astype(int), 1)
     which = np.repeat(np.arange(len(counts)), counts)
     first = np.cumsum(counts) - counts
     fraction = (np.arange(len(which)) - first[which] + 0.5) / counts[which]
-    looks = starts[which] + fraction[:, None] * (ends - starts)[which]
-    distance, _ = cKDTree(np.concatenate([points, looks])).query(samples.points)
-    # the nearest look may be half a spacing further along than the path itself
-    reach = np.hypot(0.5 * pitch * (1.0 + 1e-6), 0.5 * spacing)
-    total = float(samples.areas.sum())
-    return float(samples.areas[distance > reach].sum()) / total if total > 0.0 else 0.0
+    between = starts[which] + fraction[:, None] * (ends - starts)[which]
+    owner = np.concatenate([pass_index, pass_index[:-1][one_pass][which]])
+    return np.concatenate([points, between]), owner

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from opl.findings import Finding, Level
-from opl.geometry.coverage import uncovered_fraction
+from opl.geometry.coverage import AreaSamples, lying_on_others, uncovered
 from opl.geometry.frames import rotation_angle
 from opl.geometry.mesh_surface import MeshSurface
-from opl.geometry.passes import LaidPasses, MachinedSurface, Passes
+from opl.geometry.passes import LaidPasses, MachinedSurface, Order, Passes
 from opl.geometry.wheel import ContactWheel
 
 # normals that turn by more than this from one cutter point to the next jump [rad]
@@ -22,6 +24,26 @@ UNCOVERED = 0.01
 # the area is looked at about this often across a pitch, and this often across the surface at most
 _LOOKS_PER_PITCH, _MOST_LOOKS = 6.0, 150.0
 
+# what it is, which cutter points, and what of them
+_Doubt = tuple[str, NDArray[np.bool_], str]
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """What a person should know of cutter points.
+
+    Attributes:
+        findings: What is doubtful; all are warnings.
+        doubtful: Which cutter points they name, shape (N,).
+        uncovered: Points of the surface that no pass comes by.
+        uncovered_fraction: Their part of the whole area, 0 to 1.
+    """
+
+    findings: tuple[Finding, ...]
+    doubtful: NDArray[np.bool_]
+    uncovered: AreaSamples
+    uncovered_fraction: float
+
 
 def inspect(
     surface: MachinedSurface,
@@ -29,8 +51,8 @@ def inspect(
     laid: LaidPasses,
     wheel: ContactWheel,
     contact_allowance: float,
-) -> tuple[Finding, ...]:
-    """Return what is doubtful about cutter points; all are warnings.
+) -> Inspection:
+    """Look for what is doubtful about cutter points.
 
     Args:
         surface: What is ground.
@@ -39,19 +61,31 @@ def inspect(
         wheel: The wheel.
         contact_allowance: How deep the part may sink into the belt in [m].
     """
-    found = [*_hollows(laid, wheel, contact_allowance), *_segments(laid, passes), *_jumps(laid)]
-    uncovered = uncovered_area(surface, passes, laid)
-    if uncovered > UNCOVERED:
-        found.append(
+    pointed = [
+        *_hollows(laid, wheel, contact_allowance),
+        *_segments(laid, passes),
+        *_jumps(laid),
+        *_repeated(laid, passes),
+    ]
+    findings = [_warning(kind, _points(chosen), message) for kind, chosen, message in pointed]
+    doubtful = np.zeros(len(laid.points), dtype=bool)
+    for _, chosen, _ in pointed:
+        doubtful |= chosen
+    samples = surface.area_samples(_spacing(surface, passes))
+    points, pass_index = laid.points.Ts_workpiece_cutter[:, :3, 3], laid.points.pass_index
+    missed = samples.chosen(uncovered(samples, points, pass_index, passes.pitch))
+    fraction = float(missed.areas.sum() / samples.areas.sum())
+    if fraction > UNCOVERED:
+        findings.append(
             _warning(
                 "coverage",
                 "the surface",
-                f"{100.0 * uncovered:.1f} % of the area is more than half a pitch "
+                f"{100.0 * fraction:.1f} % of the area is more than half a pitch "
                 f"({500.0 * passes.pitch:.3g} mm) away from every pass",
             )
         )
     if isinstance(surface, MeshSurface) and surface.facet_error > passes.max_bow_height:
-        found.append(
+        findings.append(
             _warning(
                 "mesh",
                 "the surface",
@@ -60,18 +94,16 @@ def inspect(
                 f"{1e3 * passes.max_bow_height:.2g} mm; export a finer mesh",
             )
         )
-    return tuple(found)
+    return Inspection(tuple(findings), doubtful, missed, fraction)
 
 
-def uncovered_area(surface: MachinedSurface, passes: Passes, laid: LaidPasses) -> float:
-    """Return the part of the area that no pass comes by, 0 to 1."""
+def _spacing(surface: MachinedSurface, passes: Passes) -> float:
+    """Return how far apart in [m] the area is looked at."""
     extents = [np.ptp(surface.extent_along(axis)) for axis in np.eye(3)]
-    spacing = max(passes.pitch / _LOOKS_PER_PITCH, float(max(extents)) / _MOST_LOOKS)
-    Ts, pass_index = laid.points.Ts_workpiece_cutter, laid.points.pass_index
-    return uncovered_fraction(surface.area_samples(spacing), Ts[:, :3, 3], pass_index, passes.pitch)
+    return max(passes.pitch / _LOOKS_PER_PITCH, float(max(extents)) / _MOST_LOOKS)
 
 
-def _hollows(laid: LaidPasses, wheel: ContactWheel, allowance: float) -> Iterator[Finding]:
+def _hollows(laid: LaidPasses, wheel: ContactWheel, allowance: float) -> Iterator[_Doubt]:
     """Yield where the surface is too hollow for the wheel.
 
     Across the path the wheel is round: a hollow of a smaller radius takes neither its flat nor its
@@ -81,9 +113,9 @@ def _hollows(laid: LaidPasses, wheel: ContactWheel, allowance: float) -> Iterato
     tight = across < -1.0 / wheel.radius
     if tight.any():
         deepest = int(np.argmin(across))
-        yield _warning(
+        yield (
             "hollow",
-            _points(tight),
+            tight,
             f"radius {-1e3 / across[deepest]:.1f} mm across the path at cutter point {deepest} "
             f"against a wheel of {1e3 * wheel.radius:g} mm: the wheel cannot enter",
         )
@@ -97,25 +129,25 @@ def _hollows(laid: LaidPasses, wheel: ContactWheel, allowance: float) -> Iterato
             if wheel.max_roll > 0.0
             else "it cannot be ground: the part may not roll about the wheel's edges (max_roll_deg)"
         )
-        yield _warning(
+        yield (
             "hollow",
-            _points(bridged),
+            bridged,
             f"radius {-1e3 / along[deepest]:.1f} mm along the path at cutter point {deepest} "
             f"against the wheel's flat of {1e3 * wheel.width:g} mm, which would cut in "
             f"{1e3 * sunk[deepest]:.2g} mm ({1e3 * allowance:g} mm allowed): {way}",
         )
 
 
-def _segments(laid: LaidPasses, passes: Passes) -> Iterator[Finding]:
-    """Yield steps that are shorter than the bow height, and places that are ground again."""
+def _segments(laid: LaidPasses, passes: Passes) -> Iterator[_Doubt]:
+    """Yield steps and passes that are shorter than the bow height."""
     origins, pass_index = laid.points.Ts_workpiece_cutter[:, :3, 3], laid.points.pass_index
     lengths = np.linalg.norm(np.diff(origins, axis=0), axis=1)
     short = (np.diff(pass_index) == 0) & (lengths < passes.max_bow_height)
     if short.any():
         at = np.append(short, False)
-        yield _warning(
+        yield (
             "short segment",
-            _points(at),
+            at,
             f"the next point is as near as {1e3 * lengths[short].min():.2g} mm, less than the bow "
             "height",
         )
@@ -124,10 +156,10 @@ def _segments(laid: LaidPasses, passes: Passes) -> Iterator[Finding]:
     extents = np.array([np.ptp(origins[pass_index == k], axis=0).max() for k in range(len(counts))])
     tiny = alone & (extents < passes.max_bow_height)[pass_index]
     if tiny.any():
-        yield _warning("short segment", _points(tiny), "passes shorter than the bow height")
+        yield "short segment", tiny, "passes shorter than the bow height"
 
 
-def _jumps(laid: LaidPasses) -> Iterator[Finding]:
+def _jumps(laid: LaidPasses) -> Iterator[_Doubt]:
     """Yield where the normal turns so far within a step that the robot would have to jump."""
     Ts = laid.points.Ts_workpiece_cutter
     turns = rotation_angle(Ts[:-1], Ts[1:])
@@ -135,11 +167,27 @@ def _jumps(laid: LaidPasses) -> Iterator[Finding]:
     if jumps.any():
         worst = int(np.argmax(np.where(jumps, turns, 0.0)))
         step = np.linalg.norm(Ts[worst + 1, :3, 3] - Ts[worst, :3, 3])
-        yield _warning(
+        yield (
             "normal jumps",
-            _points(np.append(jumps, False)),
+            np.append(jumps, False),
             f"the frame turns {np.rad2deg(turns[worst]):.0f} deg within {1e3 * step:.2g} mm after "
             f"cutter point {worst}",
+        )
+
+
+def _repeated(laid: LaidPasses, passes: Passes) -> Iterator[_Doubt]:
+    """Yield passes that lie on another one though the job asks for none twice."""
+    if passes.order is Order.BOTH or passes.repeats > 1:
+        return
+    points, pass_index = laid.points.Ts_workpiece_cutter[:, :3, 3], laid.points.pass_index
+    pairs = lying_on_others(points, pass_index, passes.pitch, passes.max_bow_height)
+    if pairs:
+        told = [f"pass {again + 1} lies on pass {first + 1}" for first, again in pairs[:4]]
+        told += [f"{len(pairs) - 4} more"] if len(pairs) > 4 else []
+        yield (
+            "duplicate",
+            np.isin(pass_index, [again for _, again in pairs]),
+            f"{', '.join(told)}: do faces of the surface lie on each other?",
         )
 
 

@@ -1,4 +1,4 @@
-"""A picture of a part, its passes and the frames of its cutter points."""
+"""A picture of a part, its passes, the frames of its cutter points and what is doubtful there."""
 
 from __future__ import annotations
 
@@ -6,21 +6,25 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 
 from opl.geometry.frames import Array
-from opl.report.canvas import FAINT, INK, RULE, blank_figure, house_style, legend_below, svg
+from opl.report.canvas import FAINT, INK, blank_figure, house_style, legend_below, svg
 
 MM = 1e3
-AXIS_COLOURS = {"x": "#c8102e", "z": "#0b4f8a"}
+AXIS_COLOURS = {"x": "#c8102e", "y": "#2e7d32", "z": "#0b4f8a"}
 PASS: dict[str, Any] = {"color": INK, "linewidth": 1.6}
+BEHIND: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "alpha": 0.45}
 AIR: dict[str, Any] = {"color": FAINT, "linewidth": 0.9, "linestyle": (0, (3, 3))}
+DOUBT = "#e08214"
+MISSED = "#f4c48a"
 PART = to_rgb("#d9dee2")
-MOST_NORMALS, MOST_TANGENTS = 160, 20  # drawn; more of them hide the passes
-FRAME_SIZE = 0.05  # of the part's size
+MOST_NORMALS, MOST_TRIADS, MOST_NUMBERS = 160, 12, 24  # drawn; more of them hide the passes
+NORMAL_SIZE, TRIAD_SIZE = 0.05, 0.09  # of the part's size
 LIGHT = np.array([-0.3, 0.6, 0.74])  # from above left, seen from the camera
 
 
@@ -28,42 +32,78 @@ LIGHT = np.array([-0.3, 0.6, 0.74])  # from above left, seen from the camera
 def part_view(
     *,
     title: str,
+    subtitle: str,
     vertices: Array,
     faces: np.ndarray,
     Ts_workpiece_cutter: Array,
     pass_index: np.ndarray,
+    doubtful: np.ndarray,
+    uncovered: Array,
+    uncovered_normals: Array,
 ) -> str:
-    """Return the part seen from two sides, as SVG: along the mean normal tilted, and from beside.
+    """Return the part as SVG: seen obliquely, along its normals and from beside the passes.
 
     Args:
         title: Heading.
+        subtitle: The figures, in one line.
         vertices: Corners of the part's triangles in [m], shape (n, 3).
         faces: Their indices, shape (m, 3).
         Ts_workpiece_cutter: Cutter frames, shape (N, 4, 4).
         pass_index: Pass of each, shape (N,).
+        doubtful: Which cutter points a warning names, shape (N,).
+        uncovered: Points of the surface that no pass comes by in [m], shape (k, 3).
+        uncovered_normals: Their outward normals, shape (k, 3).
     """
     figure = blank_figure(title)
-    axes = figure.subplots(1, 2)
-    up = Ts_workpiece_cutter[:, :3, 2].mean(axis=0)
-    along = Ts_workpiece_cutter[:, :3, 0].mean(axis=0)
-    for one, view, name in zip(
-        axes, _views(up, along), ("oblique", "along the rows' planes"), strict=True
-    ):
-        _draw(one, view, vertices, faces, Ts_workpiece_cutter, pass_index)
+    # the layout knows only the title; a second line of it leaves room for this one
+    figure.suptitle(f"{title}\n", x=0.012, ha="left", fontsize=16, fontweight="bold")
+    figure.text(0.012, 0.915, subtitle, fontsize=11.5, color=FAINT)
+    axes = figure.subplot_mosaic([list("ob"), list("oa")], width_ratios=[1.3, 1.0])
+    views = _views(Ts_workpiece_cutter[:, :3, 2].mean(axis=0), Ts_workpiece_cutter[:, :3, 0])
+    size = float(np.ptp(vertices, axis=0).max())
+    for key, view, name in zip("oab", views, ("oblique", "from above", "from beside"), strict=True):
+        one = axes[key]
+        _draw_part(one, view, vertices, faces)
+        facing = uncovered_normals @ view[2] > 0.0
+        missed = MM * uncovered[facing] @ view.T
+        one.plot(missed[:, 0], missed[:, 1], "s", color=MISSED, markersize=1.3, zorder=1.5)
+        _draw_passes(one, view, Ts_workpiece_cutter, pass_index, doubtful, numbered=key != "b")
+        _draw_frames(one, view, Ts_workpiece_cutter, pass_index, size)
+        one.autoscale_view()
+        one.set_aspect("equal")
+        one.axis("off")
         one.set_title(name, loc="left", fontsize=11, color=FAINT)
-    handles = [
-        Line2D([], [], label="pass, starting at the dot", **PASS),
-        Line2D([], [], label="way in the air", **AIR),
-        Line2D([], [], color=AXIS_COLOURS["z"], label="z: outward normal"),
-        Line2D([], [], color=AXIS_COLOURS["x"], label="x: along the path"),
-    ]
-    legend_below(figure, handles)
+        _draw_corner(one, view)
+        _draw_scale(one, MM * size)
+    legend_below(figure, _legend(doubtful, uncovered))
     return svg(figure, title)
 
 
-def _views(up: Array, along: Array) -> tuple[Array, Array]:
-    """Return two cameras as rows right, up, towards the eye, shape (3, 3) each."""
-    side = np.cross(up, along)
+def _legend(doubtful: np.ndarray, uncovered: Array) -> list[Artist]:
+    handles: list[Artist] = [
+        Line2D([], [], label="pass, begun at its dot", marker="o", markevery=2, **PASS),
+        Line2D([], [], label="way in the air", **AIR),
+        Line2D([], [], color=AXIS_COLOURS["z"], label="z: outward normal"),
+        Line2D([], [], color=AXIS_COLOURS["x"], label="x of the frame: tangent of the path"),
+        Line2D([], [], color=AXIS_COLOURS["y"], label="y of the frame: z cross x"),
+    ]
+    dots: dict[str, Any] = {"linestyle": "none", "color": DOUBT}
+    if doubtful.any():
+        handles.append(Line2D([], [], marker="o", label="cutter point with a warning", **dots))
+    if len(uncovered):
+        dots["color"] = MISSED
+        handles.append(Line2D([], [], marker="s", label="no pass comes by", **dots))
+    return handles
+
+
+def _views(up: Array, tangents: Array) -> tuple[Array, Array, Array]:
+    """Return three cameras as rows right, up, towards the eye, shape (3, 3) each.
+
+    Args:
+        up: Mean normal, shape (3,).
+        tangents: Tangents of the path, shape (N, 3).
+    """
+    side = np.cross(up, tangents.mean(axis=0))
     if np.linalg.norm(side) < 1e-3:  # a closed pass has no mean direction
         up, side = np.array([0.0, 0.0, 1.0]), np.array([0.0, -1.0, 0.0])
         if abs(float(up @ side)) > 0.9:
@@ -73,7 +113,7 @@ def _views(up: Array, along: Array) -> tuple[Array, Array]:
     y = y / np.linalg.norm(y)
     x = np.cross(y, z)
     eye = 0.75 * z - 0.85 * y - 0.45 * x
-    return _camera(eye, z), _camera(-y, z)
+    return _camera(eye, z), _camera(z, y), _camera(-y, z)
 
 
 def _camera(eye: Array, up: Array) -> Array:
@@ -83,19 +123,11 @@ def _camera(eye: Array, up: Array) -> Array:
     return np.stack([right, np.cross(eye, right), eye])
 
 
-def _draw(
-    axes: Axes,
-    view: Array,
-    vertices: Array,
-    faces: np.ndarray,
-    Ts: Array,
-    pass_index: np.ndarray,
-) -> None:
-    seen = MM * vertices @ view.T
-    triangles = seen[faces]
-    normals = np.cross(
-        vertices[faces][:, 1] - vertices[faces][:, 0], vertices[faces][:, 2] - vertices[faces][:, 0]
-    )
+def _draw_part(axes: Axes, view: Array, vertices: Array, faces: np.ndarray) -> None:
+    """Draw the triangles that face the eye, the nearest last."""
+    corners = vertices[faces]
+    triangles = MM * corners @ view.T
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = normals / np.where(lengths > 0.0, lengths, 1.0)
     front = normals @ view[2] > 0.0
@@ -112,41 +144,107 @@ def _draw(
             zorder=1,
         )
     )
-    origins = Ts[:, :3, 3]
-    points = MM * origins @ view.T
-    ends = np.flatnonzero(np.diff(pass_index)) + 1
-    passes = np.split(np.arange(len(points)), ends)
-    axes.add_collection(LineCollection([points[one][:, :2] for one in passes], **PASS, zorder=3))
-    gaps = [points[[one[-1], other[0]]][:, :2] for one, other in pairwise(passes)]
-    axes.add_collection(LineCollection(gaps, **AIR, zorder=2))
+
+
+def _draw_passes(
+    axes: Axes,
+    view: Array,
+    Ts: Array,
+    pass_index: np.ndarray,
+    doubtful: np.ndarray,
+    numbered: bool,
+) -> None:
+    """Draw passes from their starts, fainter where the surface turns away from the eye."""
+    points = (MM * Ts[:, :3, 3] @ view.T)[:, :2]
+    away = Ts[:, :3, 2] @ view[2] < 0.0
+    steps = np.stack([points[:-1], points[1:]], axis=1)
+    one_pass = np.diff(pass_index) == 0
+    behind = away[:-1] & away[1:]
+    axes.add_collection(LineCollection(list(steps[one_pass & behind]), **BEHIND, zorder=1.8))
+    axes.add_collection(LineCollection(list(steps[one_pass & ~behind]), **PASS, zorder=3))
+    axes.add_collection(LineCollection(list(steps[~one_pass]), **AIR, zorder=2))
+    marked = points[doubtful & ~away]
+    axes.plot(marked[:, 0], marked[:, 1], "o", color=DOUBT, markersize=3.2, zorder=4.5)
+    passes = np.split(np.arange(len(points)), np.flatnonzero(~one_pass) + 1)
     starts = points[[one[0] for one in passes]]
     axes.plot(starts[:, 0], starts[:, 1], "o", color=INK, markersize=4.0, zorder=5)
-    size = FRAME_SIZE * float(np.ptp(vertices, axis=0).max())
-    for axis, name, most in ((2, "z", MOST_NORMALS), (0, "x", MOST_TANGENTS)):
-        shown = np.unique(np.linspace(0, len(points) - 1, min(len(points), most)).astype(int))
-        tips = MM * (origins[shown] + size * Ts[shown][:, :3, axis]) @ view.T
-        strokes = np.stack([points[shown][:, :2], tips[:, :2]], axis=1)
-        axes.add_collection(
-            LineCollection(list(strokes), color=AXIS_COLOURS[name], linewidth=0.9, zorder=4)
+    shown = np.linspace(0, len(passes) - 1, MOST_NUMBERS if numbered else 0)
+    for number in np.unique(shown.astype(int)):
+        one = passes[number]
+        # beyond the start, where the pass does not run
+        ahead = points[one[min(2, len(one) - 1)]] - points[one[0]]
+        offset = -10.0 * ahead / (np.linalg.norm(ahead) or 1.0)
+        axes.annotate(
+            str(number + 1),
+            points[one[0]],
+            xytext=tuple(offset),
+            textcoords="offset points",
+            fontsize=9,
+            ha="center",
+            va="center",
+            zorder=6,
         )
-    _corner(axes, view)
-    axes.autoscale_view()
-    axes.set_aspect("equal")
-    axes.set_xlabel("mm")
-    axes.tick_params(length=2)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
 
 
-def _corner(axes: Axes, view: Array) -> None:
+def _draw_frames(axes: Axes, view: Array, Ts: Array, pass_index: np.ndarray, size: float) -> None:
+    """Draw normals all along, and whole frames here and there."""
+    shown = np.unique(np.linspace(0, len(Ts) - 1, min(len(Ts), MOST_NORMALS)).astype(int))
+    _strokes(axes, view, Ts[shown], "z", NORMAL_SIZE * size, 0.8)
+    passes = np.split(np.arange(len(Ts)), np.flatnonzero(np.diff(pass_index)) + 1)
+    some = np.unique(np.linspace(0, len(passes) - 1, min(len(passes), MOST_TRIADS)).astype(int))
+    # each further along its pass than the one before, so that they do not hide each other
+    fractions = np.linspace(0.15, 0.85, len(some))
+    places = [passes[k][int(f * len(passes[k]))] for k, f in zip(some, fractions, strict=True)]
+    for name in "xyz":
+        _strokes(axes, view, Ts[np.array(places)], name, TRIAD_SIZE * size, 1.5)
+
+
+def _strokes(axes: Axes, view: Array, Ts: Array, name: str, length: float, width: float) -> None:
+    """Draw one axis of frames that face the eye."""
+    Ts = Ts[Ts[:, :3, 2] @ view[2] > -0.2]
+    tips = Ts[:, :3, 3] + length * Ts[:, :3, "xyz".index(name)]
+    strokes = MM * np.stack([Ts[:, :3, 3], tips], axis=1) @ view.T
+    colour = AXIS_COLOURS[name]
+    axes.add_collection(
+        LineCollection(list(strokes[..., :2]), color=colour, linewidth=width, zorder=4)
+    )
+
+
+def _draw_corner(axes: Axes, view: Array) -> None:
     """Draw the directions of the workpiece frame in the corner."""
-    inset = axes.inset_axes((0.0, 0.84, 0.16, 0.16))
-    inset.set_xlim(-1.3, 1.3)
-    inset.set_ylim(-1.3, 1.3)
+    inset = axes.inset_axes((-0.18, 0.82, 0.18, 0.18))
+    inset.set_xlim(-1.6, 1.6)
+    inset.set_ylim(-1.6, 1.6)
     inset.set_aspect("equal")
     inset.axis("off")
-    for name, axis in zip("xyz", np.eye(3), strict=True):
-        tip = (view @ axis)[:2]
-        inset.plot([0.0, tip[0]], [0.0, tip[1]], color=RULE, linewidth=1.2)
-        x, y = 1.15 * tip
-        inset.text(x, y, name, fontsize=9, color=FAINT, ha="center", va="center")
+    tips = view[:2].T
+    places = 1.3 * tips
+    for _ in range(20):  # names that are too near push each other away
+        for a, b in pairwise((0, 1, 2, 0)):
+            gap = places[a] - places[b]
+            near = float(np.linalg.norm(gap))
+            if near < 0.6:
+                push = gap / near if near > 1e-6 else np.array([0.0, 1.0])
+                places[a] += 0.05 * push
+                places[b] -= 0.05 * push
+    for name, tip, place in zip("xyz", tips, places, strict=True):
+        colour = AXIS_COLOURS[name]
+        inset.plot([0.0, tip[0]], [0.0, tip[1]], color=colour, linewidth=1.4)
+        inset.text(place[0], place[1], name, fontsize=10, color=colour, ha="center", va="center")
+
+
+def _draw_scale(axes: Axes, size: float) -> None:
+    """Draw a bar of a round length in [mm] under the part."""
+    power = 10.0 ** np.floor(np.log10(0.3 * size))
+    length = power * max(step for step in (1.0, 2.0, 5.0) if step * power <= 0.3 * size)
+    (left, _), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    y = bottom - 0.06 * (top - bottom)
+    axes.plot([left, left + length], [y, y], color=INK, linewidth=2.0, solid_capstyle="butt")
+    axes.annotate(
+        f"{length:g} mm",
+        (left + length, y),
+        xytext=(6.0, 0.0),
+        textcoords="offset points",
+        fontsize=10,
+        va="center",
+    )
