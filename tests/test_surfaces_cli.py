@@ -3,11 +3,14 @@
 import csv
 import io
 import json
+import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 import trimesh
-from jobs import opl, write_job
+from jobs import GONE, opl, write_job
 
 from opl.job import load
 from opl.resources import folder
@@ -32,6 +35,100 @@ def test_points_of_every_part_are_written_as_a_table_and_a_picture(tmp_path, par
     normals = np.array([[float(row[f"normal_{k}"]) for k in "xyz"] for row in rows])
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=2e-6)
     assert picture.read_text().startswith("<?xml")
+
+
+@pytest.mark.parametrize(
+    ("part", "doubtful", "missed", "passes"),
+    [("v_shape", False, False, 5), ("s_shape", True, False, 5), ("faucet", True, True, 7)],
+)
+def test_the_picture_numbers_the_passes_and_marks_what_is_doubtful(
+    tmp_path, part, doubtful, missed, passes
+):
+    assert opl("points", job_of(part), "--out", tmp_path).status == 0
+    (picture,) = tmp_path.glob("*.svg")
+    text = picture.read_text()
+    assert ("cutter point with a warning" in text) is doubtful
+    assert ("no pass comes by" in text) is missed
+    for view in ("oblique", "from above", "from beside"):
+        assert f">{view}<" in text
+    assert text.count(">20 mm<") == 3
+    # each pass has its number in two of the views
+    assert [text.count(f">{number}<") for number in range(1, passes + 2)] == [2] * passes + [0]
+    assert f" in {passes} passes, pitch " in text
+
+
+def laid_by(tmp_path, **changes):
+    """Return pass, position and arc length of the cutter points of the V job, all in mm."""
+    path = write_job(tmp_path, {f"passes.{key}": value for key, value in changes.items()})
+    assert opl("points", path, "--out", tmp_path).status == 0
+    (table,) = tmp_path.glob("*.csv")
+    rows = list(csv.DictReader(io.StringIO(table.read_text())))
+    columns = ("pass", "x_mm", "y_mm", "z_mm", "arc_mm")
+    return np.array([[float(row[column]) for column in columns] for row in rows])
+
+
+def test_rows_of_a_job_lie_where_its_keys_say(tmp_path):
+    def x_of_rows(**changes):
+        found = laid_by(tmp_path, **{"rows": GONE, "margin_mm": 2.5, **changes})
+        return [float(x) for x in dict(found[:, :2]).values()]
+
+    assert x_of_rows() == [-10.0, -5.0, 0.0, 5.0, 10.0]
+    assert x_of_rows(margin_mm=5) == [-7.5, -2.5, 2.5, 7.5]
+    assert x_of_rows(rows=2) == [-2.5, 2.5]
+    assert x_of_rows(order="both", rows=2) == [-2.5, -2.5, 2.5, 2.5]
+    assert x_of_rows(repeats=2, shift_mm=2.5) == [-10, -5, 0, 5, 10, -7.5, -2.5, 2.5, 7.5]
+    turned = x_of_rows(plane_normal=GONE, kind="along_v")
+    np.testing.assert_allclose(turned, [-10.0, -5.0, 0.0, 5.0, 10.0], atol=1e-6)
+
+
+def test_margins_at_the_ends_of_the_passes_of_a_job_are_left_out(tmp_path):
+    whole, short = (laid_by(tmp_path, end_margin_mm=margin) for margin in (0, 4))
+    np.testing.assert_allclose(whole[-1, 4] - short[-1, 4], 8.0, atol=1e-5)
+    # the ends are straight flanks
+    gaps = np.linalg.norm(whole[[0, -1], 1:4] - short[[0, -1], 1:4], axis=1)
+    np.testing.assert_allclose(gaps, 4.0, atol=1e-5)
+
+
+def test_a_hole_in_the_surface_of_a_job_breaks_its_passes(tmp_path):
+    write_job(tmp_path)
+    content = json.loads((tmp_path / "surface.json").read_text())
+    (u0, u1), (v0, v1) = (np.array(content[f"knots_{axis}"])[[0, -1]] for axis in "uv")
+    border = [[u0, v0], [u1, v0], [u1, v1], [u0, v1]]
+    hole = [[u, v] for u, v in ((u0 + 8, v0 + 20), (u0 + 17, v0 + 20), (u0 + 17, v0 + 32))]
+    content["trim_loops"] = [border, [*hole, [u0 + 8, v0 + 32]]]
+    job = write_job(tmp_path, {"passes.rows": 5})
+    (tmp_path / "surface.json").write_text(json.dumps(content))
+    told = json.loads(opl("points", job, "--out", tmp_path, "--json").out)
+    # the hole lies between x = -4.5 and 4.5 mm: the rows at -10, -5, 5 and 10 pass by it
+    assert told["passes"] == 6
+    whole = sum(2.0 * (46.843 + 1.132 * 61.774) for _ in range(5))
+    assert told["path_mm"] == pytest.approx(whole - 12.0, abs=0.05)
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_the_geometry_of_a_part_is_what_its_script_makes(tmp_path, part):
+    shutil.copy(job_of(part).parent / "make_geometry.py", tmp_path)
+    subprocess.run([sys.executable, "make_geometry.py"], cwd=tmp_path, check=True)
+    made = sorted(path.name for path in tmp_path.iterdir() if path.suffix != ".py")
+    kept = sorted(path.name for path in job_of(part).parent.iterdir())
+    assert made == [name for name in kept if name.endswith((".json", ".stl", ".ply"))]
+    for name in made:
+        again, there = tmp_path / name, job_of(part).parent / name
+        if again.suffix == ".json":
+            assert rounded(json.loads(again.read_text())) == rounded(json.loads(there.read_text()))
+        else:
+            again, there = (trimesh.load(path, process=False) for path in (again, there))
+            np.testing.assert_array_equal(again.faces, there.faces)
+            np.testing.assert_allclose(again.vertices, there.vertices, rtol=0.0, atol=2e-5)
+
+
+def rounded(content):
+    """Return what a JSON file holds, numbers to the nearest nanometre of a millimetre."""
+    if isinstance(content, dict):
+        return {key: rounded(value) for key, value in content.items()}
+    if isinstance(content, list):
+        return [rounded(value) for value in content]
+    return pytest.approx(content, abs=1e-9)
 
 
 def test_points_are_the_same_to_the_byte_every_time(tmp_path):

@@ -19,7 +19,7 @@ AXIS_Z = 66.0
 PROFILE = [(-92.0, 26.0), (-76.0, 27.0), (-58.0, 17.0), (-40.0, 17.0), (-26.0, 19.0), (-14.0, 19.0)]
 BEND_RADIUS = 70.0
 BEND = 0.7
-HALF_SECTOR = 0.75  # of the ground faces, about the top
+HALF_SECTOR = 0.4  # of the ground faces, about the top
 AROUND, ALONG = 120, 48  # facets of the solid
 
 FOLDER = Path(__file__).resolve().parent
