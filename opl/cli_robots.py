@@ -81,7 +81,7 @@ def show_data(name: str, as_json: bool) -> None:
     help="Where on axis 1 the base frame lies: at the height of axis 2, or on the mounting face.",
 )
 def import_description(file: Path, name: str, out: Path, maker: str, base: str) -> None:
-    """Make a robot of your own from a URDF.
+    """Make a robot of your own from a URDF, or a xacro (pip install 'opl[xacro]').
 
     The arm has a spherical wrist, or three parallel axes in the middle as those of Universal
     Robots. The closed form of its inverse kinematics is read off the joint axes and checked on

@@ -53,6 +53,7 @@ HOMES = {
     "trimesh": {"geometry/mesh"},
     "contourpy": {"geometry/sections"},
     "OCP": {"geometry/cad"},
+    "xacro": {"cell/xacro_file"},
     "numba": {"cell/clearance", "planning"},
 }
 

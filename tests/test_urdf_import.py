@@ -1,5 +1,6 @@
 """Robots of the user's own: the closed form read off a URDF, and what is refused."""
 
+import sys
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -244,13 +245,67 @@ def test_a_link_without_shapes_is_told(tmp_path):
     [
         ("Mine!", "x.urdf", "name: must be small letters"),
         ("mine", "x.urdf", r"x\.urdf: no such file"),
-        ("mine", "arm.xacro", "is a xacro: expand it"),
     ],
 )
 def test_a_bad_name_or_file_is_refused(name, file, message, tmp_path):
-    (tmp_path / "arm.xacro").write_text("<robot/>")
     with pytest.raises(InputError, match=message):
         import_urdf(tmp_path / file, name, tmp_path / "mine")
+
+
+# xacro
+
+
+HEAD = '<robot name="mh24" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+
+
+def test_a_xacro_is_expanded_and_its_meshes_are_found(tmp_path):
+    trimesh.creation.box((0.3, 0.3, 0.2)).export(tmp_path / "foot.stl")
+    path = changed(
+        tmp_path,
+        ('<robot name="mh24">', f'{HEAD}<xacro:property name="arm" value="${{0.5 + 0.26}}"/>'),
+        ('xyz="0 0 0.76"', 'xyz="0 0 ${arm}"'),
+        ('<box size="0.536 0.4 0.208"/>', '<mesh filename="foot.stl"/>'),
+    )
+    source = path.rename(tmp_path / "arm.urdf.xacro")
+    out = tmp_path / "mine"
+    ended = opl("robots", "import-urdf", source, "--name", "mine", "--out", out)
+    assert ended.status == 0, ended.err
+    mine = load_robot(str(out))
+    np.testing.assert_allclose(forward(mine, np.ones(6)), forward(MH24, np.ones(6)), atol=1e-9)
+    assert (out / "meshes" / "foot.stl").is_file()
+    assert "source: arm.urdf.xacro" in (out / "robot.yaml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ('<link name="${w}"/>', r"arm\.xacro: xacro refuses it: line 3: name 'w' is not defined"),
+        ("<xacro:foo/>", r"arm\.xacro: xacro refuses it: line 3: unknown macro name: xacro:foo"),
+        ('<link name="$(arg n)"/>', r"line 3: Undefined .* n: give it a default, or expand it by"),
+        (
+            '<xacro:include filename="$(find ur)/ur.xacro"/>',
+            r"line 3: \$\(find \.\.\.\) asks for a ROS package, .*: xacro arm\.xacro ARGUMENT:=",
+        ),
+        ('<xacro:include filename="none.xacro"/>', r"arm\.xacro: xacro refuses it: line 3: .*none"),
+        ('<xacro:include filename="bad.xacro"/>', r"bad\.xacro: is not XML: .* line 2"),
+        ('<link name="a"/>', r"arm\.xacro: must have six revolute joints"),
+        ('<link name="a"/><link name="b"/>', r"arm\.xacro: must have one root link, has a, b"),
+    ],
+)
+def test_a_bad_xacro_is_refused_with_file_and_line(line, message, tmp_path):
+    (tmp_path / "bad.xacro").write_text("<robot>\n<a></robot>")
+    path = tmp_path / "arm.xacro"
+    path.write_text(f'<?xml version="1.0"?>\n{HEAD}\n{line}</robot>\n')
+    with pytest.raises(InputError, match=message):
+        import_urdf(path, "mine", tmp_path / "mine")
+
+
+def test_a_xacro_without_the_extra_is_refused_with_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xacro", None)
+    path = tmp_path / "arm.xacro"
+    path.write_text(f"{HEAD}</robot>")
+    ended = opl("robots", "import-urdf", path, "--name", "mine", "--out", tmp_path / "mine")
+    assert ended.status == 2 and "pip install 'opl[xacro]'" in ended.err
 
 
 # the command line

@@ -47,36 +47,37 @@ class RecognisedArm:
     max_speed: Array
 
 
-def recognise(urdf: Path) -> RecognisedArm:
-    """Return the closed form of the arm in a URDF.
+def recognise(urdf: Path, source: Path | None = None) -> RecognisedArm:
+    """Return the closed form of the arm in a URDF, made from ``source`` if that is given.
 
     Raises:
         InputError: If the file is no URDF of six revolute joints in a row with a link tool0, or the
             arm has another build than the closed forms; says which axes.
     """
+    where = str(source or urdf)
     try:
         model = pin.buildModelFromUrdf(str(urdf))
     except ValueError as error:
-        raise InputError(str(urdf), "is not a URDF of one robot") from error
+        raise InputError(where, "is not a URDF of one robot") from error
     names = tuple(model.names)[1:]  # the first is the universe
     in_a_row = list(model.parents)[1:] == list(range(len(names)))
     if len(names) != N_JOINTS or model.nq != N_JOINTS or not in_a_row:
         raise InputError(
-            str(urdf),
+            where,
             "must have six revolute joints with limits, one after the other, has "
             f"{' '.join(names) or 'none'}"
             + (", some of them continuous" if model.nq > model.nv else ""),
         )
     if not model.existFrame(FLANGE):
-        raise InputError(str(urdf), f"lacks the link {FLANGE}: flange face, z out of the flange")
+        raise InputError(where, f"lacks the link {FLANGE}: flange face, z out of the flange")
     data = model.createData()
     pin.computeJointJacobians(model, data, np.zeros(N_JOINTS))
     pin.updateFramePlacements(model, data)
     flange = data.oMf[model.getFrameId(FLANGE)].homogeneous
     axes, moments = data.J[3:].T, data.J[:3].T
     if not np.allclose(np.linalg.norm(axes, axis=1), 1.0):
-        raise InputError(str(urdf), "has a joint that does not turn: all six must be revolute")
-    where, points = str(urdf), np.cross(axes, moments)
+        raise InputError(where, "has a joint that does not turn: all six must be revolute")
+    points = np.cross(axes, moments)
     if not _parallel(axes[0], np.array([0.0, 0.0, 1.0])) or np.hypot(*points[0, :2]) > _LENGTH:
         raise InputError(where, "axis 1 must be the z axis of the root link")
     read_off = _parallel_axes if _parallel(axes[1], axes[3]) else _spherical_wrist

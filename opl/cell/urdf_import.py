@@ -22,6 +22,7 @@ from opl.cell.robot import Robot, forward, load_robot
 from opl.cell.robot_file import FROM_URDF
 from opl.cell.singularity import singularity_margins
 from opl.cell.urdf_tree import UrdfTree
+from opl.cell.xacro_file import SUFFIX, expand
 from opl.errors import InputError
 
 N_CHECKED = 500
@@ -57,7 +58,7 @@ def import_urdf(
     """Make a robot folder from a URDF.
 
     Args:
-        urdf: The file; xacro has to be expanded before.
+        urdf: The file, or a xacro that makes it.
         name: Name of the robot, small letters, digits, _ and -.
         folder: Where to write; must not hold a robot already.
         base_at_floor: Whether the base frame shall lie on the mounting face instead of at the
@@ -72,13 +73,10 @@ def import_urdf(
         raise InputError("name", f"must be small letters, digits, _ and -, got {name!r}")
     if not urdf.is_file():
         raise InputError(str(urdf), "no such file")
-    if urdf.suffix == ".xacro":
-        raise InputError(str(urdf), "is a xacro: expand it to a URDF first")
     path = folder / "robot.yaml"
     if path.exists():
         raise InputError(str(path), "exists already; name a new folder")
-    tree = UrdfTree(urdf)
-    found = recognise(urdf)
+    tree, found = _read(urdf)
     height = 0.0 if base_at_floor else found.arm.c1
     controller = tree.base_frame()
     tree.set_base(height)
@@ -106,6 +104,15 @@ def import_urdf(
     robot = load_robot(str(folder))
     files = (path, robot.urdf, *(folder / target for target in meshes))
     return ImportedRobot(robot, files, closure, tuple(cautions))
+
+
+def _read(urdf: Path) -> tuple[UrdfTree, RecognisedArm]:
+    if urdf.suffix != SUFFIX:
+        return UrdfTree(urdf), recognise(urdf)
+    with TemporaryDirectory() as scratch:
+        plain = Path(scratch) / "arm.urdf"
+        plain.write_text(expand(urdf), encoding="utf-8")
+        return UrdfTree(plain, urdf), recognise(plain, urdf)
 
 
 def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:

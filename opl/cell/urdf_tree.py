@@ -18,19 +18,26 @@ _EXACT = 1e-6  # [m], [rad]; URDFs round right angles
 
 
 class UrdfTree:
-    """The elements of one URDF."""
+    """The elements of one URDF.
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    Args:
+        path: The file.
+        source: What it was made from, for messages, and where its relative meshes start.
+    """
+
+    def __init__(self, path: Path, source: Path | None = None) -> None:
+        self._path = source or path
         try:
             builder = ET.TreeBuilder(insert_comments=True)
             self._root = ET.parse(path, ET.XMLParser(target=builder)).getroot()
         except ET.ParseError as error:
-            raise InputError(str(path), f"is not XML: {error}") from error
+            raise InputError(str(self._path), f"is not XML: {error}") from error
         self._joints = {_child(joint): joint for joint in self._root.findall("joint")}
         free = [link for link in self._links() if link not in self._joints]
         if len(free) != 1:
-            raise InputError(str(path), f"must have one root link, has {', '.join(free) or 'none'}")
+            raise InputError(
+                str(self._path), f"must have one root link, has {', '.join(free) or 'none'}"
+            )
         self._root_link = free[0]
 
     def base_frame(self) -> tuple[float, float] | None:

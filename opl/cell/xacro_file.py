@@ -1,0 +1,67 @@
+"""Xacro files expanded to URDFs. Needs the optional extra ``opl[xacro]``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from xml.parsers.expat import ExpatError
+
+from opl.errors import InputError
+
+SUFFIX = ".xacro"
+_BY_HAND = "or expand it by hand: xacro {name} ARGUMENT:=VALUE > arm.urdf"
+
+
+def expand(path: Path) -> str:
+    """Return the URDF that a xacro file makes with the defaults of its arguments.
+
+    Raises:
+        InputError: If the extra is missing, or xacro refuses the file; names the file to blame,
+            which may be an included one, and the line where that can be told.
+    """
+    by_hand = _BY_HAND.format(name=path.name)
+    try:
+        import xacro
+    except ImportError as error:
+        message = f"needs the optional extra for xacro: pip install 'opl[xacro]', {by_hand}"
+        raise InputError(str(path), message) from error
+    try:
+        return str(xacro.process_file(str(path)).toxml())
+    except ExpatError as error:
+        raise InputError(_blamed(xacro.filestack, path), f"is not XML: {error}") from error
+    except Exception as error:  # whatever the expressions in the file raise
+        told = " ".join(str(error).split())
+        blamed = _blamed(xacro.filestack, path)
+        line = _line_of(Path(blamed), told)
+        place = "" if line is None else f"line {line}: "
+        if "ament_index" in told:
+            told = f"$(find ...) asks for a ROS package, and there is no ROS here; {by_hand}"
+        elif told.startswith("Undefined substitution argument"):
+            told = f"{told}: give it a default, {by_hand}"
+        raise InputError(blamed, f"xacro refuses it: {place}{told}") from error
+
+
+def _blamed(files: list[str] | None, path: Path) -> str:
+    """Return the file that was being read, the innermost of those that include each other."""
+    return str(path) if not files or files[-1] is None else str(files[-1])
+
+
+def _line_of(path: Path, told: str) -> int | None:
+    """Return the line that an error speaks of: xacro says what it stumbled over, but not where."""
+    clues = [
+        (r"evaluating expression '(.*)'$", r"\$\{{\s*{}\s*\}}"),
+        (r"unknown macro name: (\S+)", r"<{}[\s/>]"),
+        (r"Undefined substitution argument (\w+)", r"\$\(arg\s+{}\s*\)"),
+        (r"ament_index", r"\$\(find\s"),
+        (r"No such file or directory: .*?([^/ ]+) \[", r"<xacro:include[^>]*{}"),
+    ]
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    for clue, pattern in clues:
+        found = re.search(clue, told)
+        if found is None:
+            continue
+        wanted = pattern.format(*map(re.escape, found.groups())) if found.groups() else pattern
+        for number, line in enumerate(lines, start=1):
+            if re.search(wanted, line):
+                return number
+    return None
