@@ -17,17 +17,18 @@ from opl.geometry.frames import Array
 from opl.planning.bottleneck import tighten_strips
 from opl.planning.box import JointBox, size_of
 from opl.planning.branch import Branch
-from opl.planning.certificate import BoxProof
+from opl.planning.certificate import BoxProof, least_box
 from opl.planning.ladder import Ladder
 from opl.planning.path import BrokenStepError, fill_in
 from opl.planning.problem import GrindingProblem
 from opl.planning.refine import postures_between
 from opl.planning.strips import Strips, strips_of
 
-FIRST_CELLS = 4  # of a step that is looked at closely, twice as many each time it is again
+FIRST_CELLS = 8  # of a step that is looked at closely, twice as many each time it is again
 MOST_CELLS = 32
-LEAST_GAIN = 1e-4  # of the bound, in one round; less is not worth finer cells
-MOST_SUBPROBLEMS = 300  # of one round: what has not closed by then would take far longer
+NODES_GAP = 1e-6  # fraction to which the box of the nodes alone is solved
+LEAST_GAIN = 1e-4  # of a bound that has begun to rise, in one round; less is not worth finer cells
+MOST_SUBPROBLEMS = 1000  # of one round: what has not closed by then would take far longer
 
 
 def raise_bound(
@@ -42,23 +43,33 @@ def raise_bound(
         upper: How large a bound is wanted, in [rad]; there the proof ends.
         deadline: When to stop with what is proven, by `time.monotonic`.
     """
+    nodes = least_box(
+        branch.ladder,
+        branch.blocked_steps,
+        bound=upper,
+        gap=NODES_GAP,
+        seconds=deadline - time.monotonic(),
+    )
+    before = bound = max(bound, nodes.lower_bound)
+    rows, box = nodes.rows, nodes.box
     cells: dict[int, int] = {}
-    while True:
-        strips = _cut(problem, branch, cells)
-        proof = StripProof(branch.ladder, branch.blocked_steps, upper, strips)
-        while proof.open_bound() < min(upper, proof.held) and time.monotonic() < deadline:
-            if proof.subproblems >= MOST_SUBPROBLEMS:
-                break
-            proof.take_next()
-        before, bound = bound, max(bound, min(proof.open_bound(), proof.held, upper))
-        if bound >= upper or proof.rows is None or time.monotonic() >= deadline:
-            return bound
-        outside = _steps_outside(problem, branch, proof.rows, proof.box)
+    while bound < upper and rows is not None and box is not None:
+        outside = _steps_outside(problem, branch, rows, box)
         finer = [step for step in outside if cells.get(step, 0) < MOST_CELLS]
-        if not finer or (cells and bound - before < LEAST_GAIN * bound):
-            return bound
+        if not finer:
+            break
         for step in finer:
             cells[step] = 2 * cells[step] if step in cells else FIRST_CELLS
+        proof = StripProof(branch.ladder, branch.blocked_steps, upper, _cut(problem, branch, cells))
+        while proof.open_bound() < min(upper, proof.held):
+            if proof.subproblems >= MOST_SUBPROBLEMS or time.monotonic() >= deadline:
+                break
+            proof.take_next()
+        last, bound = bound, max(bound, min(proof.open_bound(), proof.held))
+        rows, box = proof.rows, proof.box
+        if before < bound < last * (1.0 + LEAST_GAIN):
+            break
+    return min(bound, upper)
 
 
 class StripProof(BoxProof):
