@@ -5,8 +5,8 @@ replayed, densely: between two checked poses no corner of the held part's box mo
 and no joint turns more than `TURN`.
 
 A pair of solids is measured only when it could have come too near: since it was last measured its
-distance cannot have shrunk by more than its joints moved times their levers. That leaves out
-nothing; it covers the moves between the checked poses as well.
+distance cannot have shrunk by more than the joints between the two moved times their levers. That
+leaves out nothing; it covers the moves between the checked poses as well.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from opl.verification.world import World
 
 STEP = 1e-3  # [m]
 TURN = np.deg2rad(0.5)
-HORIZON = 0.1  # [m] distances beyond this are not measured, only known to be more
+HORIZON = 0.1  # [m] clearances beyond this are not told, only known to be more
+AHEAD = 0.03  # [m] beyond what is asked that is measured: so long a pair can be left alone after
 # Bullet's distance of a mesh from the rim of a cylinder was seen to be off by 0.08 mm; whether the
 # ground point lies on the wheel is checked without it
 GAP_ACCURACY = 1e-4  # [m]
@@ -144,7 +145,10 @@ class _Run:
         self._allowed_error = max_contact_error
         self._pairs = world.pairs()
         self._needed = np.array([pair.clearance for pair in self._pairs])
-        self._levers = world.levers()
+        # how far a turn of each joint by 1 rad can bring each pair together, in [m]
+        joints = range(len(motion.q[0]))
+        moved = [[pair.moved_by(joint) for joint in joints] for pair in self._pairs]
+        self._levers = np.array(moved).reshape(-1, len(joints)) * world.levers()
         # what each pair is at least apart, as far as known, in [m]
         self._apart = np.full(len(self._pairs), -np.inf)
         low, high = cell.part.vertices.min(axis=0), cell.part.vertices.max(axis=0)
@@ -183,15 +187,20 @@ class _Run:
     def _check(self, move: int, q: Array) -> None:
         """Check the pose that the world is in."""
         self.poses += 1
-        moved = float(np.abs(q - self._q) @ self._levers)
+        self._apart -= self._levers @ np.abs(q - self._q)
         self._q = q
-        self._apart -= moved
         hit = False
-        # near pairs are measured at every pose, so that the smallest clearance is found too
-        for k in np.flatnonzero(self._apart < np.maximum(self._needed, self.clearance[move])):
+        # near pairs are measured at every pose, so that the smallest clearance is found too; the
+        # nearest first: it leaves the least to ask of the others
+        for k in self._apart.argsort(kind="stable"):
             pair = self._pairs[k]
-            distance = self._world.distance(pair.first, pair.second, HORIZON) - pair.rounding
-            self._apart[k] = min(distance, HORIZON - pair.rounding)
+            asked = max(pair.clearance, self.clearance[move] if pair.clearance > 0.0 else 0.0)
+            if self._apart[k] > asked:
+                continue
+            within = asked + AHEAD
+            distance = self._world.distance(pair.first, pair.second, within + pair.rounding)
+            distance -= pair.rounding
+            self._apart[k] = min(distance, within)
             if pair.clearance > 0.0:
                 self.clearance[move] = min(self.clearance[move], distance)
             if distance < pair.clearance or distance <= 0.0:
@@ -207,13 +216,14 @@ class _Run:
         touching_down = grinding and motion.stretch[move - 1] is Stretch.APPROACH
         free = not grinding and motion.stretch[move] not in ALONG_NORMAL
         off_wheel = cell.pairs.clearances.get(frozenset((PART, WHEEL)), cell.clearance)
-        horizon = max(off_wheel, FARTHEST_GAP)
-        gap = min(self._world.gap(horizon), horizon)
         needed = off_wheel if free else -cell.contact_allowance
+        farthest = self._allowed_error + GAP_ACCURACY if grinding and not touching_down else np.inf
+        gap = self._world.gap(farthest if farthest < np.inf else max(needed, 0.0))
         if gap < needed:
             self._too_near(move, PART, WHEEL, gap, needed)
             return True
-        if grinding and not touching_down and gap > self._allowed_error + GAP_ACCURACY:
+        if farthest < gap:
+            gap = min(self._world.gap(FARTHEST_GAP), FARTHEST_GAP)
             self._contact_lost(move, gap, "part and wheel do not touch")
         return False
 

@@ -18,8 +18,10 @@ from opl.cell.workcell import PART, WorkCell
 from opl.geometry.frames import Array, pose
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Body, Box, Cylinder
+from opl.verification.drum import Drum
 from opl.verification.engine import pybullet, start
 from opl.verification.meshes import is_inside, triangle_body
+from opl.verification.patches import Patches
 
 BASE_LINK = -1  # Bullet's number of the link that does not move
 # Bullet rounds the edges of a link's boxes by about this much, so that they seem farther away than
@@ -37,6 +39,7 @@ class Solid:
     name: str
     body: int
     link: int
+    moved_by: int = 0  # number of joints, the first ones, that move it
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,11 @@ class Pair:
     clearance: float
     rounding: float = 0.0
 
+    def moved_by(self, joint: int) -> bool:
+        """Return whether a joint moves one of them against the other."""
+        less, more = sorted((self.first.moved_by, self.second.moved_by))
+        return less <= joint < more
+
 
 class World:
     """A physics server with the cell in it; use as a context manager."""
@@ -62,6 +70,7 @@ class World:
     def __init__(self, cell: WorkCell) -> None:
         self._cell = cell
         self._client = start()
+        self._closest_points = self._client.getClosestPoints  # the client looks names up each time
         # else a file is taken for an earlier one of its name
         self._client.setPhysicsEngineParameter(enableFileCaching=0)
         self._robot = self._client.loadURDF(
@@ -78,19 +87,26 @@ class World:
             info = self._client.getJointInfo(self._robot, index)
             if info[2] == pybullet.JOINT_REVOLUTE:
                 self._joints.append(index)
-                self._links.append(Solid(self._link_name(index), self._robot, index))
+                link = Solid(self._link_name(index), self._robot, index, len(self._joints))
+                self._links.append(link)
             if info[12].decode() == "tool0":
                 self._flange = index
         # the part is the first of the held bodies
-        self._held = [(self._add_part(), _position_quaternion(cell.T_flange_workpiece))]
-        self._held += [
-            (self._add(body), _position_quaternion(body.T_parent_body)) for body in cell.fixture
+        part = self._add_mesh(cell.part.triangles.reshape(-1, 3))
+        held = [(part, cell.T_flange_workpiece)]
+        held += [(self._add(body), body.T_parent_body) for body in cell.fixture]
+        self._held = [
+            (replace(solid, moved_by=len(self._joints)), _position_quaternion(T))
+            for solid, T in held
         ]
         wheel = cell.wheel_body()
         self._wheel = self._add(wheel, wheel.T_parent_body)
-        self._wheel_pose = wheel.T_parent_body
-        self._wheel_size = (cell.wheel.radius, cell.wheel.width)
+        self._drum = Drum(wheel.T_parent_body, cell.wheel.radius, cell.wheel.width)
         self._obstacles = [self._add(body, body.T_parent_body) for body in cell.obstacles]
+        # Bullet asks every triangle in the box around the wheel, nearly all of a fine mesh
+        self._patches = Patches.of(cell.part.triangles)
+        self._shown = [self._add_mesh(patch.reshape(-1, 3)) for patch in self._patches.triangles]
+        self.move_to(np.zeros(len(self._joints)))
 
     def __enter__(self) -> World:
         return self
@@ -141,20 +157,31 @@ class World:
         ]
         for held, (position, quaternion) in placed:
             client.resetBasePositionAndOrientation(held.body, position, quaternion)
-        _, (position, quaternion) = placed[0]
+        position, quaternion = self._part_at = placed[0][1]
         R = np.array(client.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
-        return pose(R, np.array(position))
+        self._T_base_workpiece = pose(R, np.array(position))
+        return self._T_base_workpiece
 
     def distance(self, first: Solid, second: Solid, within: float) -> float:
         """Return the distance in [m], negative in penetration, inf beyond ``within``."""
-        contacts = self._client.getClosestPoints(
-            first.body, second.body, within, first.link, second.link
-        )
+        contacts = self._closest_points(first.body, second.body, within, first.link, second.link)
         return min((contact[8] for contact in contacts), default=np.inf)
 
     def gap(self, within: float) -> float:
-        """Return the distance of the part from the wheel in [m], as `distance`."""
-        return self.distance(self._held[0][0], self._wheel, within)
+        """Return the distance of the part from the wheel in [m], as `distance`.
+
+        Measured patch by patch, the most promising first, and none that cannot be nearer than what
+        is known.
+        """
+        bounds = self._patches.least_distances(self._drum, self._T_base_workpiece)
+        place, nearest = self._client.resetBasePositionAndOrientation, np.inf
+        for k in bounds.argsort():
+            if bounds[k] - 2.0 * MARGIN > min(nearest, within):
+                break
+            patch = self._shown[k]
+            place(patch.body, *self._part_at)
+            nearest = min(nearest, self.distance(patch, self._wheel, min(nearest, within)))
+        return nearest
 
     def surrounding(self) -> list[str]:
         """Return the meshes around flange or part as posed: distances are those of surfaces."""
@@ -174,16 +201,9 @@ class World:
     def distance_to_wheel(self, p_base: Array) -> float:
         """Return how far a point, given in the base frame, is from the wheel's surface in [m].
 
-        Negative inside. Written out for a cylinder from its axis, apart from `ContactWheel`.
+        Negative inside.
         """
-        T = self._wheel_pose
-        from_middle = p_base - T[:3, 3]
-        along = abs(float(from_middle @ T[:3, 2]))
-        away = float(np.linalg.norm(np.cross(from_middle, T[:3, 2])))
-        beside, beyond = along - self._wheel_size[1] / 2.0, away - self._wheel_size[0]
-        if max(beside, beyond) <= 0.0:
-            return max(beside, beyond)
-        return float(np.hypot(max(beside, 0.0), max(beyond, 0.0)))
+        return float(self._drum.distances(p_base[None])[0][0])
 
     @property
     def version(self) -> str:
@@ -216,12 +236,12 @@ class World:
             return str(self._client.getBodyInfo(self._robot)[0].decode())
         return str(self._client.getJointInfo(self._robot, index)[12].decode())
 
-    def _add_part(self) -> Solid:
-        mesh = self._cell.part
+    def _add_mesh(self, corners: Array) -> Solid:
+        """Add triangles, their corners of shape (3 m, 3)."""
         shape = self._client.createCollisionShape(
             pybullet.GEOM_MESH,
-            vertices=mesh.vertices.tolist(),
-            indices=mesh.faces.ravel().tolist(),
+            vertices=corners.tolist(),
+            indices=list(range(len(corners))),
             flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
         )
         return self._body(PART, shape)
