@@ -31,6 +31,7 @@ FLOORS = [
     {"result"},
     {"deliver"},
     {"batch"},
+    {"console_times"},
     {"console", "console_robots"},
     {"cli_programs", "cli_robots", "cli_surfaces", "cli_verify"},
     {"cli", "__main__"},
@@ -54,6 +55,7 @@ HOMES = {
     "contourpy": {"geometry/sections"},
     "OCP": {"geometry/cad"},
     "xacro": {"cell/xacro_file"},
+    "toppra": {"planning/time_law"},
     "numba": {"cell/clearance", "planning"},
 }
 
