@@ -15,6 +15,7 @@ from rich.text import Text
 
 from opl.batch import Row
 from opl.cell.inverse import branch_name
+from opl.console_times import told_times
 from opl.geometry.toolpath import CutterPoints
 from opl.job import Job
 from opl.outcome import Outcome
@@ -142,12 +143,12 @@ def _facts(outcome: Outcome) -> Iterator[str]:
             "moves and speeds as proven"
         )
     if outcome.program is not None and found is not None and found.verified is not None:
-        duration = found.verified.motion.duration.sum()
         worst = max((abs(time.error) for time in outcome.program.pass_times), default=0.0)
         yield (
-            f"program: {len(outcome.program.moves)} moves, {duration:.1f} s, passes within "
-            f"{100.0 * worst:.2f} % of their time"
+            f"program: {len(outcome.program.moves)} moves, passes within {100.0 * worst:.2f} % of "
+            "their time"
         )
+        yield from told_times(outcome)
         if robot.unverified_pulses:
             yield (
                 f"caution: the pulse ratios of {', '.join(robot.unverified_pulses)} of "

@@ -105,6 +105,7 @@ class ProcessSection(Document):
     approach_mm_s: Positive = 50.0
     air_speed_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 10.0
     contact_speed: Positive = 40.0
+    max_dwell_s: Positive = 3.0
     max_acceleration_deg_s2: SixPositive | None = None
 
     def robot_as_limited(self, robot: Robot) -> Robot:
@@ -122,6 +123,7 @@ class ProcessSection(Document):
             approach_speed=self.approach_mm_s * MM,
             air_speed=self.air_speed_percent / 100.0,
             contact_speed=self.contact_speed,
+            max_dwell=self.max_dwell_s,
             home=np.deg2rad(self.home_deg),
         )
 

@@ -8,6 +8,7 @@ from opl.errors import NoPathError
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job import Job
+from opl.planning.feed import SlowStretch
 from opl.planning.figures import Figures
 from opl.planning.fixed import FixedContact
 from opl.planning.plan import Plan
@@ -32,6 +33,7 @@ class Outcome:
         paper_start: The path of the paper's search from the paper's own start node, or None if
             there is none.
         compared: The figures of every path, by what it is.
+        slow: Where the ground point is slower than the feed; None without a motion.
         verification: What the replay found.
         program: The moves of the program.
         file: What was found when its files were read back; None where opl cannot.
@@ -50,6 +52,7 @@ class Outcome:
     recursive: Plan | None = None
     paper_start: Plan | None = None
     compared: dict[str, Figures] = field(default_factory=dict)
+    slow: tuple[SlowStretch, ...] | None = None
     verification: Verification | None = None
     program: Program | None = None
     file: FileProof | None = None

@@ -16,12 +16,13 @@ from opl.export import draw, job_date, write_program
 from opl.geometry.toolpath import CutterPoints
 from opl.job import Job
 from opl.outcome import Outcome
+from opl.planning.feed import dwell_refusal, slow_stretches
 from opl.planning.fixed import keep_contact, runs_of
 from opl.planning.layer import wheel_layer
 from opl.planning.nodes import build_nodes
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import unreachable_points
-from opl.planning.timing import timed
+from opl.planning.timing import time_motion
 from opl.proof.read_back import as_told, read_back
 from opl.remedies import find_remedies
 from opl.searches import compare, from_paper_start, search_path
@@ -67,10 +68,15 @@ def run(job: Job, progress: Progress = lambda stage, fraction: None) -> Outcome:
     with clock("motion"):
         # what is proven is what the digits of the program can say
         told = as_told(plan.motion, job)
-        motion = timed(told, points, job.pace, job.cell.robot.max_speed)
+        timing = time_motion(told, points, job.pace, job.cell.robot)
+        outcome.slow = slow_stretches(timing, job.pace)
+    outcome.refusal = dwell_refusal(outcome.slow, job.pace)
+    if outcome.refusal is not None:
+        outcome.status = "no_path"
+        return outcome
     with clock("verification"):
         outcome.verification = verification = replay(
-            job.cell, points, motion, job.search.max_contact_error, clock.share
+            job.cell, points, timing.motion, job.search.max_contact_error, clock.share
         )
     if verification.verified is None:
         outcome.status = "unsafe"

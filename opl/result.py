@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from opl.cell.inverse import branch_name
 from opl.outcome import Outcome
+from opl.planning.feed import SlowStretch
 from opl.planning.figures import Figures
 from opl.planning.plan import Plan
 from opl.proof.read_back import FileProof
@@ -31,6 +33,8 @@ def result(outcome: Outcome) -> dict[str, Any]:
         "fixed": _fixed(outcome),
         "path": _path(outcome, outcome.plan),
         "compared": {name: _figures(figures) for name, figures in outcome.compared.items()},
+        "feed": _feed(outcome),
+        "cycle": _cycle(outcome),
         "verification": _verification(outcome),
         "program": _program(outcome),
         "seconds": {stage: round(spent, 4) for stage, spent in _seconds(outcome).items()},
@@ -110,6 +114,56 @@ def _path(outcome: Outcome, plan: Plan | None) -> dict[str, Any] | None:
         "intermediate_nodes": path.n_intermediate,
         "lower_bound_rad": None if bound is None else _rounded(bound),
         "gap": None if bound is None else _rounded(1.0 - bound / path.joint_range_sum),
+    }
+
+
+def _feed(outcome: Outcome) -> dict[str, Any] | None:
+    slow, pace = outcome.slow, outcome.job.pace
+    if slow is None:
+        return None
+    dwell = max(slow, key=lambda one: one.dwell, default=None)
+    return {
+        "set_mm_s": _rounded(pace.feed * MM),
+        "lowered": [_slow_stretch(one, outcome.job.cell.robot.joint_names) for one in slow],
+        "longest_dwell_s": 0.0 if dwell is None else round(dwell.dwell, 3),
+        "longest_dwell_at": None if dwell is None or not dwell.dwell else round(dwell.dwell_at, 3),
+        "max_dwell_s": pace.max_dwell,
+    }
+
+
+def _slow_stretch(one: SlowStretch, joint_names: Sequence[str]) -> dict[str, Any]:
+    return {
+        "pass": one.pass_index + 1,
+        "from_cutter_point": round(one.start, 3),
+        "to_cutter_point": round(one.end, 3),
+        "lowest_mm_s": round(one.slowest * MM, 3),
+        "lowest_at": round(one.slowest_at, 3),
+        "longer_s": round(one.longer, 3),
+        "limits": [
+            {
+                "kind": share.cause.value,
+                "joint": None if share.joint is None else joint_names[share.joint],
+                "longer_s": round(share.longer, 3),
+            }
+            for share in one.shares
+        ],
+        "dwell_s": round(one.dwell, 3),
+    }
+
+
+def _cycle(outcome: Outcome) -> dict[str, Any] | None:
+    cycle = None if outcome.program is None else outcome.program.cycle
+    if cycle is None:
+        return None
+    return {
+        "passes_s": round(cycle.passes, 3),
+        "approach_and_retract_s": round(cycle.leads, 3),
+        "air_s": round(cycle.air, 3),
+        "waits_s": round(cycle.waits, 3),
+        "total_s": round(cycle.total, 3),
+        "ramps_s": round(cycle.ramps, 3),
+        "open_ended": cycle.open_ended,
+        "accelerations_assumed": outcome.job.cell.robot.acceleration_assumed,
     }
 
 

@@ -39,17 +39,17 @@ def compare(outcome: Outcome) -> dict[str, Figures]:
     """Return the figures of the contact-fixed path and of all that were found."""
     job, points = outcome.job, outcome.points
     assert points is not None
-    max_speed = job.cell.robot.max_speed
+    robot = job.cell.robot
     compared = {}
     if outcome.fixed is not None and outcome.fixed.q is not None:
         q = outcome.fixed.q
-        compared["fixed"] = figures_of_points(q, points, job.pace, max_speed)
+        compared["fixed"] = figures_of_points(q, points, job.pace, robot)
     plans = {"paper_start": outcome.paper_start, "recursive": outcome.recursive}
     if outcome.plan is not outcome.recursive:
         plans["optimal"] = outcome.plan
     for name, plan in plans.items():
         if plan is not None:
-            compared[name] = figures_of_path(plan.path, plan.motion, points, job.pace, max_speed)
+            compared[name] = figures_of_path(plan.path, plan.motion, points, job.pace, robot)
     return compared
 
 

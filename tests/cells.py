@@ -100,13 +100,13 @@ def small_plan():
 def small_motion():
     """Return a free and timed motion over the two rows."""
     problem = small_problem()
-    return timed(small_plan().motion, problem.points, problem.pace, problem.cell.robot.max_speed)
+    return timed(small_plan().motion, problem.points, problem.pace, problem.cell.robot)
 
 
 @cache
 def v_motion():
     problem = v_problem()
-    return timed(v_plan().motion, problem.points, problem.pace, problem.cell.robot.max_speed)
+    return timed(v_plan().motion, problem.points, problem.pace, problem.cell.robot)
 
 
 @cache
@@ -122,7 +122,7 @@ def tiny_problem():
 def tiny_motion():
     problem = tiny_problem()
     motion = plan_recursive(problem).motion
-    return timed(motion, problem.points, problem.pace, problem.cell.robot.max_speed)
+    return timed(motion, problem.points, problem.pace, problem.cell.robot)
 
 
 def replay_tiny(motion=None, cell=None):

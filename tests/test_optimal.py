@@ -113,7 +113,7 @@ def test_the_motion_is_free_in_two_other_scenes():
     scene = FclScene(problem.cell)
     dense, _ = densify(plan.motion.q, RESOLUTION)
     assert all(min(scene.clearances(q).values(), default=1.0) > 0.0 for q in dense[::4])
-    motion = timed(plan.motion, problem.points, problem.pace, problem.cell.robot.max_speed)
+    motion = timed(plan.motion, problem.points, problem.pace, problem.cell.robot)
     allowed = small_job().search.max_contact_error
     verification = replay(problem.cell, problem.points, motion, allowed)
     assert verification.verified is not None, verification.findings

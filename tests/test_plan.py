@@ -402,8 +402,11 @@ def test_no_joint_is_asked_for_more_than_its_speed(problem, motion):
 
 @MOTIONS
 def test_the_feed_is_kept_on_the_wheel_unless_a_joint_could_not_follow(problem, motion):
-    motion, pace = motion(), problem().pace
-    fastest = problem().cell.robot.max_speed
+    pace, points = problem().pace, problem().points
+    # what slow acceleration does to the feed is told in test_timing.py
+    robot = replace(problem().cell.robot, max_acceleration=np.full(6, 1e6))
+    motion = timed(motion(), points, pace, robot)
+    fastest = robot.max_speed
     arc_length = problem().points.arc_length
     arc = np.interp(motion.cutter_point, np.arange(len(arc_length)), arc_length)
     checked = 0
@@ -441,7 +444,8 @@ def test_leads_run_at_the_approach_speed(problem, motion):
 
 def test_a_slow_robot_takes_the_time_it_needs():
     problem, plan = small_problem(), small_plan()
-    slow = timed(plan.motion, problem.points, problem.pace, np.full(6, 0.01))
+    robot = replace(problem.cell.robot, max_speed=np.full(6, 0.01))
+    slow = timed(plan.motion, problem.points, problem.pace, robot)
     speed = np.abs(np.diff(slow.q, axis=0)) / slow.duration[1:, None]
     assert speed.max() == pytest.approx(0.01)
 

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from opl.cell.robot import Robot
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.motion import Motion, Stretch
+from opl.planning.motion import Motion
 from opl.planning.path import GrindingPath
-from opl.planning.timing import Pace, timed
-
-ON_WHEEL = (Stretch.GRIND, Stretch.BETWEEN)
+from opl.planning.timing import Pace, followed, time_motion
 
 
 @dataclass(frozen=True)
@@ -23,7 +22,7 @@ class Figures:
         joint_ranges: Largest minus smallest value of each joint in [rad], shape (6,).
         joint_travel: Sum over steps and joints of the absolute change in [rad].
         contact_travel: Sum over steps of the absolute change of t in belt units.
-        seconds: Time on the wheel at the set feed under the joint speed limits in [s].
+        seconds: Time on the wheel at the set feed, or as fast as the joints can follow, in [s].
     """
 
     joint_ranges: Array
@@ -38,7 +37,7 @@ class Figures:
 
 
 def figures_of_path(
-    path: GrindingPath, motion: Motion, points: CutterPoints, pace: Pace, max_speed: Array
+    path: GrindingPath, motion: Motion, points: CutterPoints, pace: Pace, robot: Robot
 ) -> Figures:
     """Return the figures of a found path.
 
@@ -47,23 +46,19 @@ def figures_of_path(
         motion: The whole motion that it is part of.
         points: Its cutter points.
         pace: The speeds.
-        max_speed: Largest speed of each joint in [rad/s], shape (6,).
+        robot: Whose path.
     """
-    times = timed(motion, points, pace, max_speed).duration
-    stretch = np.array([kind in ON_WHEEL for kind in motion.stretch])
-    # the move onto the first posture of a pass still ends the approach
-    grinding = stretch & np.concatenate([[False], stretch[:-1]])
-    return Figures(
-        path.joint_ranges, path.joint_travel, path.contact_travel, float(times[grinding].sum())
-    )
+    timing = time_motion(motion, points, pace, robot)
+    seconds = timing.motion.duration[~np.isnan(timing.way)].sum()
+    return Figures(path.joint_ranges, path.joint_travel, path.contact_travel, float(seconds))
 
 
-def figures_of_points(q: Array, points: CutterPoints, pace: Pace, max_speed: Array) -> Figures:
+def figures_of_points(q: Array, points: CutterPoints, pace: Pace, robot: Robot) -> Figures:
     """Return the figures of a contact-fixed path, one posture per cutter point, shape (N, 6)."""
     on_wheel = np.diff(points.pass_index) == 0
     turned = np.abs(np.diff(q, axis=0))
     arc = np.abs(np.diff(points.arc_length))
-    seconds = np.maximum(arc / pace.feed, (turned / max_speed).max(axis=1))
-    return Figures(
-        np.ptp(q, axis=0), float(turned[on_wheel].sum()), 0.0, float(seconds[on_wheel].sum())
-    )
+    seconds = np.maximum(arc / pace.feed, (turned / robot.max_speed).max(axis=1))
+    ground = [np.flatnonzero(points.pass_index == k) for k in range(points.n_passes)]
+    total = sum(followed(q[rows], seconds[rows[:-1]], robot).sum() for rows in ground)
+    return Figures(np.ptp(q, axis=0), float(turned[on_wheel].sum()), 0.0, float(total))

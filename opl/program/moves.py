@@ -97,6 +97,32 @@ class PassTime:
 
 
 @dataclass(frozen=True)
+class CycleTime:
+    """How long a program runs, from its first posture to its last.
+
+    Attributes:
+        passes: Grinding in [s].
+        leads: Approaching the wheel and leaving it in [s].
+        air: Moving from and to home and between passes in [s].
+        waits: Standing still because the program says so in [s].
+        ramps: What of all this is beyond the written speeds, coming up to them and to rest, in [s].
+        open_ended: Whether it also waits for inputs or runs other programs, for times unknown.
+    """
+
+    passes: float
+    leads: float
+    air: float
+    waits: float
+    ramps: float
+    open_ended: bool
+
+    @property
+    def total(self) -> float:
+        """All of it in [s]."""
+        return self.passes + self.leads + self.air + self.waits
+
+
+@dataclass(frozen=True)
 class Program:
     """Moves in order, or calls of other programs in order.
 
@@ -106,6 +132,7 @@ class Program:
         moves: What the robot does; the first brings it to where the rest is proven from.
         calls: Names of the programs it runs after its moves.
         pass_times: Of each pass, once it is written for a controller.
+        cycle: How long it runs, once it is written.
     """
 
     name: str
@@ -113,6 +140,7 @@ class Program:
     moves: tuple[Move, ...] = ()
     calls: tuple[str, ...] = ()
     pass_times: tuple[PassTime, ...] = ()
+    cycle: CycleTime | None = None
 
 
 def plan_moves(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from opl.cell.robot import Robot, forward
 from opl.planning.motion import VerifiedMotion
 from opl.program.actions import Action
+from opl.program.cycle import cycle_time
 from opl.program.lines import with_straight_moves
 from opl.program.moves import START_SPEED, Kind, Move, Program, plan_moves
 from opl.program.posts import find_post
@@ -44,7 +45,7 @@ def write_program(
     date: datetime,
     comments: Sequence[str] = (),
 ) -> tuple[Program, dict[str, str]]:
-    """Return the program of a motion, with the time of its passes, and its files.
+    """Return the program of a motion, with the times of its passes and of all, and its files.
 
     Args:
         verified: What the robot shall do.
@@ -70,7 +71,8 @@ def write_program(
     Ts_base_flange = forward(robot, verified.motion.q)
     table = render_table(verified, written, PulseScale.of(robot), Ts_base_flange)
     files = {**written.files, f"{name}.csv": table}
-    return replace(program, pass_times=written.pass_times), files
+    cycle = cycle_time(program, written.times, robot, settings)
+    return replace(program, pass_times=written.pass_times, cycle=cycle), files
 
 
 def try_out(name: str, home: Array, robot: Robot, settings: ProgramSettings) -> None:

@@ -37,7 +37,7 @@ def written_findings(
         motion: The written postures with their labels and written times; one for each visit.
         playback: The moves they are from.
     """
-    asked = timed(motion, points, job.pace, job.cell.robot.max_speed)
+    asked = timed(motion, points, job.pace, job.cell.robot)
     return [
         *_first_moves(playback),
         *_fast_moves(motion, asked, playback),
