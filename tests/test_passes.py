@@ -1,5 +1,9 @@
+import json
+
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
+from scipy.spatial import cKDTree
 from solids import ORIGINS, cylinder, lay, sphere, torus
 from surfaces import cylinder_patch, graph, plane_patch
 
@@ -141,6 +145,48 @@ def test_the_faucet_is_ground_over_both_its_faces_in_one_pass():
     assert laid.points.n_passes == 3
 
 
+def test_a_pass_round_a_periodic_surface_is_one_closed_curve_without_a_kink(tmp_path):
+    # a fluted knob: its ring is a periodic cubic spline, given once round
+    count = 16
+    angles = 2.0 * np.pi * np.arange(count) / count
+    radii = 20.0 + 1.5 * (np.arange(count) % 2)
+    ring = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
+    content = {
+        "degree_u": 3,
+        "degree_v": 1,
+        "knots_u": list(range(count + 1)),
+        "knots_v": [0, 0, 1, 1],
+        "periodic_u": True,
+        "control_points_mm": [[[x, y, z] for z in (0.0, 30.0)] for x, y in ring.tolist()],
+        "weights": np.ones((count, 2)).tolist(),
+    }
+    path = tmp_path / "knob.json"
+    path.write_text(json.dumps(content))
+    bow = 0.01e-3
+    laid = lay(Patchwork(load_faces(path)), Z, pitch=9e-3, margin=3e-3, max_bow_height=bow)
+    assert laid.points.n_passes == 3
+    # the spline itself, wound on as far as its support reaches
+    knots = np.arange(-3.0, count + 4.0)
+    spline = BSpline(knots, 1e-3 * ring[np.arange(count + 3) % count], 3)
+    dense = spline(np.linspace(0.0, count, 200_001))
+    length = np.linalg.norm(np.diff(dense, axis=0), axis=1).sum()
+    for index in range(3):
+        here = laid.points.pass_index == index
+        Ts = laid.points.Ts_workpiece_cutter[here]
+        distance, _ = cKDTree(dense).query(Ts[:, :2, 3])
+        assert distance.max() < 0.5e-6  # half of how dense it is
+        np.testing.assert_allclose(Ts[0], Ts[-1], atol=1e-9)
+        assert laid.points.arc_length[here][-1] == pytest.approx(length, rel=1e-6)
+        assert rotation_angle(Ts[:-1], Ts[1:]).max() < 0.35
+        chords = np.diff(Ts[:, :2, 3], axis=0)
+        near = cKDTree(dense).query(Ts[:, :2, 3])[1]
+        for start, chord, a, b in zip(Ts[:, :2, 3], chords, near, near[1:], strict=False):
+            between = dense[min(a, b) : max(a, b)] if abs(a - b) < 100_000 else dense[:0]
+            across = np.array([-chord[1], chord[0]]) / np.linalg.norm(chord)
+            away = np.abs((between - start) @ across)
+            assert away.max(initial=0.0) <= bow + 1e-9
+
+
 # order, repeats, margins
 
 
@@ -266,6 +312,30 @@ def test_the_pitch_of_a_cylinder_is_that_of_its_straight_side():
     whole = Patchwork((Face(cylinder(length=0.1).surface),))
     expected = 2.0 * np.sqrt(2.0 * 0.15 * 0.02e-3 - 0.02e-3**2)
     assert row_pitch(whole, Z, 0.02e-3, 0.15) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("radius", [0.03, 0.2])
+def test_rows_of_a_scallop_pitch_leave_no_higher_ridges_on_a_round_surface(radius):
+    height, wheel = 0.03e-3, 0.15
+    # rows along z on a cylinder, so that all of it can be seen in the plane of x and y
+    whole = Patchwork((Face(cylinder_patch(radius, 1.0, 2.2)),))
+    pitch = row_pitch(whole, X, height, wheel)
+    laid = lay(whole, X, pitch=pitch)
+    Ts = laid.points.Ts_workpiece_cutter
+    centres = np.unique((Ts[:, :2, 3] + wheel * Ts[:, :2, 2]).round(9), axis=0)
+    assert len(centres) == laid.points.n_passes > 5
+    angles = np.arctan2(centres[:, 1], centres[:, 0])
+    ridges = []
+    for angle in np.linspace(angles.min(), angles.max(), 2000):
+        # what stands along the normal until the first wheel is met
+        up = np.array([np.cos(angle), np.sin(angle)])
+        along, square = centres @ up, np.sum(centres**2, axis=1)
+        reach = along**2 - square + wheel**2
+        met = along[reach > 0.0] - np.sqrt(reach[reach > 0.0])
+        ridges.append(met.min() - radius)
+    assert max(ridges) <= height * 1.001
+    assert max(ridges) > 0.85 * height
+    assert min(ridges) > -1e-9
 
 
 def test_coverage_counts_what_no_pass_comes_by():

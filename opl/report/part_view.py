@@ -227,6 +227,7 @@ def _draw_corner(axes: Axes, view: Array) -> None:
                 push = gap / near if near > 1e-6 else np.array([0.0, 1.0])
                 places[a] += 0.05 * push
                 places[b] -= 0.05 * push
+    inset.text(0.0, -1.9, "workpiece", fontsize=8, color=FAINT, ha="center", va="center")
     for name, tip, place in zip("xyz", tips, places, strict=True):
         colour = AXIS_COLOURS[name]
         inset.plot([0.0, tip[0]], [0.0, tip[1]], color=colour, linewidth=1.4)
