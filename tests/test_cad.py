@@ -14,8 +14,6 @@ from opl.geometry.machined import load_machined
 from opl.geometry.mesh import load_mesh, load_triangles
 from opl.geometry.patchwork import Patchwork
 
-pytest.importorskip("OCP", reason="the optional extra opl[cad] is not installed")
-
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
 from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
 from OCP.BRepMesh import BRepMesh_IncrementalMesh

@@ -254,6 +254,15 @@ def test_a_solid_that_is_open_flat_or_crosses_itself_is_refused(tmp_path, break_
     assert any(part in ended.err for part in message.split("|"))
 
 
+def test_who_lacks_the_extra_is_told_how_to_get_it(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "OCP.TopAbs", None)  # as if it were not installed
+    (tmp_path / "part.step").write_text("ISO-10303-21;")
+    job = write_job(tmp_path, {"workpiece.surface": "part.step"})
+    for ended in (opl("faces", tmp_path / "part.step"), opl("check", job)):
+        assert ended.status == 2
+        assert "needs the optional extra for STEP and IGES: pip install 'opl[cad]'" in ended.err
+
+
 @pytest.mark.parametrize(
     ("name", "key", "message"),
     [("surface.json", "surface", "is empty"), ("v_shape.stl", "mesh", "holds no triangles")],
