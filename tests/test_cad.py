@@ -5,15 +5,6 @@ import numpy as np
 import pytest
 import yaml
 from jobs import document, opl
-from scipy.spatial import cKDTree
-from solids import ORIGINS, lay
-
-from opl.errors import InputError
-from opl.geometry import cad
-from opl.geometry.machined import load_machined
-from opl.geometry.mesh import load_mesh, load_triangles
-from opl.geometry.patchwork import Patchwork
-
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
 from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
@@ -32,6 +23,14 @@ from OCP.StlAPI import StlAPI_Writer
 from OCP.TopAbs import TopAbs_ShapeEnum
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS
+from scipy.spatial import cKDTree
+from solids import ORIGINS, lay
+
+from opl.errors import InputError
+from opl.geometry import cad
+from opl.geometry.machined import load_machined
+from opl.geometry.mesh import load_mesh, load_triangles
+from opl.geometry.patchwork import Patchwork
 
 X, Y, Z = np.eye(3)
 
