@@ -15,6 +15,7 @@ from opl.console_robots import show_robot, show_robots
 from opl.errors import InputError
 from opl.program.parameters import read_parameters
 from opl.program.ratios import mismatches, ratio_file
+from opl.report.arm_view import arm_view
 
 FILE = click.Path(dir_okay=False, path_type=Path)
 FOLDER = click.Path(file_okay=False, path_type=Path)
@@ -53,19 +54,27 @@ def _figures(robot: Robot) -> dict[str, Any]:
 @robots.command("show")
 @click.argument("name")
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
-def show_data(name: str, as_json: bool) -> None:
+@click.option("--picture", type=FILE, help="SVG to write: the arm with its dimensions and limits.")
+def show_data(name: str, as_json: bool, picture: Path | None) -> None:
     """Print what is known of a robot, every number with source and certainty.
 
     NAME is one of those listed by opl robots, or a folder with a robot.yaml.
 
-    Example: opl robots show gp25
+    Example: opl robots show gp25 --picture gp25.svg
     """
     robot, file = load_robot(name), read_robot_file(robot_path(name))
+    if picture is not None:
+        try:
+            picture.write_text(arm_view(robot), encoding="utf-8", newline="\n")
+        except OSError as error:
+            raise InputError(str(picture), f"cannot be written: {error.strerror}") from error
     if as_json:
         told = {**_figures(robot), **file.model_dump(exclude={"name", "title", "maker"})}
         click.echo(json.dumps(told, indent=2))
     else:
         show_robot(robot, file)
+        if picture is not None:
+            click.echo(f"wrote {picture}")
 
 
 @robots.command("import-urdf")
