@@ -106,10 +106,12 @@ def search(part: str, rows: int) -> None:
     recursive = outcome.recursive
     assert recursive is not None and plan.lower_bound is not None
     path, other = plan.path, recursive.path
-    gap = 1.0 - plan.lower_bound / path.joint_range_sum
+    refinement = plan.refinement
+    assert refinement is not None and plan.gap is not None
     print(
         f"{part}, {rows} rows, {len(points)} points: {clock.told('clearance', 'search')}; sum "
-        f"{path.joint_range_sum:.5f} rad, bound {plan.lower_bound:.5f}, gap {100 * gap:.3f} %; "
+        f"{refinement.joint_range_sum:.5f} rad, bound {plan.lower_bound:.5f}, "
+        f"gap {100 * plan.gap:.3f} %, refined {path.joint_range_sum:.5f}; "
         f"joint travel {path.joint_travel:.2f} (recursive {other.joint_travel:.2f}), "
         f"travel of t {path.contact_travel:.1f} (recursive {other.contact_travel:.1f})"
     )

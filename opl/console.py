@@ -20,6 +20,7 @@ from opl.geometry.toolpath import CutterPoints
 from opl.job import Job
 from opl.outcome import Outcome
 from opl.pipeline import Progress as Watch
+from opl.planning.plan import Plan
 from opl.proof.prove import Proof
 from opl.result import search_seconds
 from opl.surfacing import Surfacing
@@ -123,12 +124,7 @@ def _facts(outcome: Outcome) -> Iterator[str]:
         f"path: {len(points)} cutter points in {points.n_passes} passes, "
         f"{path.n_intermediate} intermediate nodes, branch {branch_name(path.branch)}"
     )
-    if plan.lower_bound is not None:
-        gap = 1.0 - plan.lower_bound / path.joint_range_sum
-        yield (
-            f"no path through these points has a joint range sum below {plan.lower_bound:.4f} rad: "
-            f"the one found is within {100.0 * gap:.3f} % of the least there is"
-        )
+    yield from _certified(plan, outcome.job.search.n_contact_positions)
     yield f"search with its collision checks: {search_seconds(outcome):.2f} s"
     if found is not None:
         yield (
@@ -154,6 +150,21 @@ def _facts(outcome: Outcome) -> Iterator[str]:
                 f"caution: the pulse ratios of {', '.join(robot.unverified_pulses)} of "
                 f"{robot.title} are not verified; compare a posture at the pendant before playing"
             )
+
+
+def _certified(plan: Plan, n_positions: int) -> Iterator[str]:
+    if plan.lower_bound is None or plan.gap is None:
+        return
+    yield (
+        f"no path through these points at {n_positions} contact positions has a joint range sum "
+        f"below {plan.lower_bound:.4f} rad: the one found is within {100.0 * plan.gap:.3f} % of "
+        "the least there is"
+    )
+    if plan.refinement is not None and plan.refinement.rounds:
+        yield (
+            f"contact positions between them bring it from {plan.refinement.joint_range_sum:.4f} "
+            f"to {plan.path.joint_range_sum:.4f} rad"
+        )
 
 
 def show_proof(job: Job, points: CutterPoints, proof: Proof) -> None:

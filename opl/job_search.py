@@ -65,6 +65,7 @@ class SearchSection(Document):
     max_contact_change: Positive = 100.0
     widen_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 0.1
     seconds: Positive = 60.0
+    refine_tolerance_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 0.1
     weights: WeightsSection = WeightsSection()
 
     def in_si(self, bow_height_mm: float) -> Search:
@@ -91,7 +92,11 @@ class SearchSection(Document):
                 float(MAX_JOINT_STEP),
             ),
             optimal=OptimalSettings(
-                self.widen_percent / 100.0, self.max_contact_change, costs, self.seconds
+                widen=self.widen_percent / 100.0,
+                max_contact_change=self.max_contact_change,
+                costs=costs,
+                seconds=self.seconds,
+                tolerance=self.refine_tolerance_percent / 100.0,
             ),
         )
 

@@ -12,7 +12,7 @@ from opl.cell.inverse import branch_name
 from opl.outcome import Outcome
 from opl.planning.feed import SlowStretch
 from opl.planning.figures import Figures
-from opl.planning.plan import Plan
+from opl.planning.plan import Plan, Refinement
 from opl.proof.read_back import FileProof
 
 MM = 1e3
@@ -113,7 +113,19 @@ def _path(outcome: Outcome, plan: Plan | None) -> dict[str, Any] | None:
         "nodes": len(path.q) - path.n_intermediate,
         "intermediate_nodes": path.n_intermediate,
         "lower_bound_rad": None if bound is None else _rounded(bound),
-        "gap": None if bound is None else _rounded(1.0 - bound / path.joint_range_sum),
+        "gap": None if plan.gap is None else _rounded(plan.gap),
+        "refinement": _refinement(plan.refinement),
+    }
+
+
+def _refinement(refinement: Refinement | None) -> dict[str, Any] | None:
+    """Return what the bound and the gap speak of, and what was gained on it."""
+    if refinement is None:
+        return None
+    return {
+        "field_joint_range_sum_rad": _rounded(refinement.joint_range_sum),
+        "gain_rad": _rounded(refinement.gain),
+        "rounds": refinement.rounds,
     }
 
 

@@ -18,11 +18,18 @@ from jobs import opl, write_job
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from opl.cell.robot import forward
+from opl.planning.calm import calm_box
+from opl.planning.certificate import least_box
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.check import RESOLUTION, densify
+from opl.planning.costs import roughness
 from opl.planning.optimal import plan_optimal
 from opl.planning.plan import plan_recursive
+from opl.planning.refine import RefinedProblem
+from opl.planning.smooth import Travel, smoothest, travel_of
 from opl.planning.timing import timed
+from opl.planning.tube import REACH, halved, tube
 from opl.verification.replay import replay
 
 SETTINGS = v_job().search.optimal
@@ -32,13 +39,14 @@ ONLY_TRAVEL = replace(
 ONLY_TIME = replace(ONLY_TRAVEL, joint_weights=np.zeros(6), time_weight=1.0)
 
 
+def one_row_job():
+    return replace(small_job(), passes=replace(small_job().passes, rows=1))
+
+
 @cache
 def one_row():
     """Return one pass over the tip of the V part, 20 cutter points at 40 contact positions."""
-    job = small_job()
-    return problem_of(
-        with_positions(replace(job, passes=replace(job.passes, rows=1)), 40), slice(20, 40)
-    )
+    return problem_of(with_positions(one_row_job(), 40), slice(20, 40))
 
 
 @cache
@@ -85,12 +93,39 @@ CELLS = pytest.mark.parametrize("make", [v_row, two_rows], ids=["V row", "two ro
 
 
 @CELLS
-def test_the_bound_lies_below_the_value_and_the_motion_attains_the_value(make):
+def test_the_motion_attains_the_value_and_the_bound_lies_below_that_of_the_field(make):
     plan = optimal(make)
     value = np.ptp(on_wheel(plan.motion), axis=0).sum()
     assert plan.path.joint_range_sum == pytest.approx(value, abs=1e-12)
-    assert plan.lower_bound <= value
     assert value <= recursive(make).path.joint_range_sum
+    assert 0.0 < plan.lower_bound <= plan.refinement.joint_range_sum
+    assert plan.gap == pytest.approx(1.0 - plan.lower_bound / plan.refinement.joint_range_sum)
+
+
+@CELLS
+def test_refinement_never_makes_it_worse_and_tells_its_gain(make):
+    plan = optimal(make)
+    refined = plan.refinement
+    assert refined.gain >= 0.0
+    assert refined.gain == pytest.approx(refined.joint_range_sum - plan.path.joint_range_sum)
+    _, t = at_cutter_points(plan.path)
+    away = np.abs(t[:, None] - make().field.contact_positions).min(axis=1)
+    assert (away.max() > 0.1) == (refined.rounds > 0)  # between the contact positions of the field
+
+
+def test_refinement_ends_where_the_gain_is_below_the_tolerance():
+    # that joints and contact travel too far is to be no reason to go on
+    other = recursive(one_row)
+    q, t = other.path.q, other.path.contact_position
+    far = replace(other, path=replace(other.path, q=1.5 * q, contact_position=10.0 * t))
+    plans = [
+        plan_optimal(one_row(), replace(SETTINGS, tolerance=tolerance), far)
+        for tolerance in (1.0, 1e-9)
+    ]
+    assert plans[0].refinement.rounds == 1
+    assert plans[1].refinement.rounds > 1
+    assert plans[1].path.joint_range_sum < plans[0].path.joint_range_sum
+    assert plans[1].refinement.joint_range_sum == plans[0].refinement.joint_range_sum
 
 
 @CELLS
@@ -104,8 +139,9 @@ def test_every_cutter_point_is_ground_where_the_path_says(make):
 def test_a_row_of_the_v_part_is_within_a_thousandth_of_the_least_there_is():
     found, other = optimal(v_row).path, recursive(v_row).path
     assert found.joint_range_sum <= 1.895
-    assert found.joint_range_sum * (1.0 - 1e-3) <= optimal(v_row).lower_bound
+    assert optimal(v_row).gap <= 1e-3
     assert found.joint_travel <= other.joint_travel
+    assert found.contact_travel <= other.contact_travel + 1e-9
 
 
 def test_the_motion_is_free_in_two_other_scenes():
@@ -120,10 +156,7 @@ def test_the_motion_is_free_in_two_other_scenes():
 
 
 def test_the_same_problem_gives_the_same_bytes():
-    problem = problem_of(
-        with_positions(replace(small_job(), passes=replace(small_job().passes, rows=1)), 40),
-        slice(20, 40),
-    )
+    problem = problem_of(with_positions(one_row_job(), 40), slice(20, 40))
     again = plan_optimal(problem, SETTINGS, plan_recursive(problem))
     assert again.motion.q.tobytes() == optimal(one_row).motion.q.tobytes()
     assert again.lower_bound == optimal(one_row).lower_bound
@@ -145,7 +178,7 @@ def test_what_collides_is_avoided_and_the_bound_still_holds():
     haunted = replace(problem, scene=ghosts)
     plan = plan_optimal(haunted, SETTINGS, plan_recursive(haunted))
     assert not ghosts.collides(densify(plan.motion.q, RESOLUTION)[0]).any()
-    assert plan.lower_bound <= plan.path.joint_range_sum
+    assert plan.lower_bound <= plan.refinement.joint_range_sum
     assert plan.lower_bound >= free.lower_bound - 1e-9  # what is out can only raise it
 
 
@@ -232,3 +265,60 @@ def test_the_least_time_is_a_shortest_path_of_scipy():
     assert plan.checks == 1
     assert spent == pytest.approx(shortest(problem, seconds), abs=1e-9)
     assert spent > arc.sum() * 1.05  # the feed alone does not decide here
+
+
+# the tube around a path, and the calm box in it
+
+
+def test_a_tube_holds_the_path_and_only_postures_that_grind_near_it():
+    problem, path = one_row(), recursive(one_row).path
+    whole = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
+    finer = halved(problem.field.contact_positions)
+    around = tube(whole, path, finer).problem
+    (nodes,) = around.field.branches
+    free = around.free_nodes(nodes)
+    q_path, t_path = at_cutter_points(path)
+    for column, (q, t) in enumerate(zip(q_path, t_path, strict=True)):
+        row = int(np.abs(nodes.contact_position - t).argmin())
+        np.testing.assert_array_equal(nodes.q[column, row], q)
+        assert free[column, row]
+        near = nodes.contact_position[free[column]]
+        assert np.abs(near - t).max() <= REACH * np.diff(finer).max() + 1e-9
+        assert len(near) > 1
+    columns, rows = np.nonzero(free)
+    Ts = forward(problem.cell.robot, nodes.q[free]) @ problem.cell.T_flange_workpiece
+    Ts_base_cutter = Ts @ problem.points.Ts_workpiece_cutter[columns]
+    on_wheel = problem.cell.wheel.T_base_contact(nodes.contact_position[rows])
+    np.testing.assert_allclose(Ts_base_cutter - on_wheel, 0.0, atol=1e-9)
+
+
+def test_halved_contact_positions_keep_the_old_ones_to_the_bit():
+    t = np.linspace(-70.0, 70.0, 140)
+    finer = halved(halved(t))
+    assert np.isin(t, finer).all()
+    np.testing.assert_allclose(np.diff(finer), 140.0 / 139.0 / 4.0)
+
+
+def test_a_calm_box_holds_a_calm_track_and_is_widened_no_more_than_allowed():
+    problem = one_row()
+    found = 0
+    for nodes in problem.field.branches:
+        free = problem.free_nodes(nodes)
+        ladder, nothing = problem.ladder(nodes, free), np.empty(0, dtype=np.int64)
+        costs = roughness(problem, nodes, ONLY_TRAVEL, np.zeros_like(free))
+        box = least_box(ladder, nothing).box
+        if box is None:
+            continue
+        q = np.nan_to_num(nodes.q, nan=np.inf)
+        dear = replace(costs, contact_weight=1.0)
+        before = travel_of(ladder, smoothest(ladder, nothing, box.holds(q), dear).rows)
+        most = Travel(np.inf, before.contact - 4.0)  # one step of t less than the box permits
+        calm = calm_box(ladder, nothing, costs, box, 2.0 * box.size, most)
+        assert calm_box(ladder, nothing, costs, box, box.size, most) is None
+        if calm is not None:
+            found += 1
+            assert box.size < calm.size <= 2.0 * box.size
+            assert (calm.lower <= box.lower).all() and (calm.upper >= box.upper).all()
+            track = smoothest(ladder, nothing, calm.holds(q), dear)
+            assert travel_of(ladder, track.rows).within(most)
+    assert found

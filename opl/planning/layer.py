@@ -1,6 +1,8 @@
-"""The clearance layer of a whole node matrix: part against wheel at every cutter point and t."""
+"""The clearance layer of a node matrix: part against wheel at every cutter point and t, or some."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from opl.cell.clearance import PartTree, wheel_clearance
 from opl.cell.workcell import WorkCell
@@ -25,3 +27,23 @@ def wheel_layer(
     # cutter and contact coincide, whatever robot brings the part there
     Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[:, None]
     return wheel_clearance(part, cell.wheel, Ts_contact0_workpiece, -cell.planned_allowance)
+
+
+def layer_at(
+    cell: WorkCell, part: PartTree, points: CutterPoints, contact_positions: Array, at: np.ndarray
+) -> Array:
+    """Return `wheel_layer` at some nodes, minus infinity at the others: they are not free.
+
+    Args:
+        cell: The cell.
+        part: The triangles of the part.
+        points: N cutter points.
+        contact_positions: M values of t.
+        at: Which nodes, shape (N, M).
+    """
+    columns, rows = np.nonzero(at)
+    Ts_contact0_contact = cell.wheel.T_contact0_contact(contact_positions)[rows]
+    Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[columns]
+    layer = np.full(at.shape, -np.inf)
+    layer[at] = wheel_clearance(part, cell.wheel, Ts_contact0_workpiece, -cell.planned_allowance)
+    return layer

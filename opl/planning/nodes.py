@@ -52,7 +52,8 @@ class NodeField:
     Attributes:
         contact_positions: The values of t, shape (M,).
         q: All inverse solutions as principal angles in [rad], NaN out of reach, shape
-            (n_columns, M, 8, 6). Kept to tell reach from limits when nothing is left.
+            (n_columns, M, 8, 6). Kept to tell reach from limits when nothing is left; without
+            columns where that is not asked.
         branches: The matrices that have a node within the limits, in slot order.
     """
 

@@ -3,8 +3,9 @@
 The certificate says how small a box of joint space that holds a connected track can be, and names
 such a box. Inside it, widened a little, the smoothest track is sought. Between two of its nodes a
 track may still bulge out of the box; where it does, places between the cutter points are taken in
-as columns, and certificate and track are found anew. The lower bound that is told is always that of
-the cutter points alone: it holds for every path through them.
+as columns, and certificate and track are found anew. The lower bound that is told is that of the
+field: it holds for every path through the cutter points at its contact positions. At last positions
+between these are taken in around the path, which may lead to less than is possible without them.
 """
 
 from __future__ import annotations
@@ -17,17 +18,20 @@ import numpy as np
 from opl.planning.bound import raise_bound
 from opl.planning.box import JointBox
 from opl.planning.branch import Branch, Track, branches_of
+from opl.planning.calm import ROUND_OFF, calm_box
 from opl.planning.certificate import least_box
 from opl.planning.costs import Costs, roughness
-from opl.planning.path import BrokenStepError, GrindingPath, fill_in
-from opl.planning.plan import Plan, check_track
+from opl.planning.path import BrokenStepError, fill_in
+from opl.planning.plan import Plan, Refinement, check_track
 from opl.planning.problem import GrindingProblem
 from opl.planning.refine import RefinedProblem, carried, refine
 from opl.planning.smooth import Travel, smoothest_within
 from opl.planning.symmetry import twins, undominated
+from opl.planning.tube import halved, tube
 
 SUBDIVIDE = np.array([0.25, 0.5, 0.75])  # where a step that bulges is given columns
 MOST_REFINEMENTS = 8
+MOST_ROUNDS = 3  # of halving the contact positions: eight times as many
 SMALLEST_STEP = 1.0 / 16.0  # of a step between cutter points that is still given columns
 # fractions to which boxes are solved: what remains of the gap of a path is then that of its track
 PROOF_GAP = 1e-6
@@ -47,12 +51,15 @@ class OptimalSettings:
         max_contact_change: Largest change of t between neighbouring columns in belt units.
         costs: What a track is charged for inside the box.
         seconds: After this time no further improvement is begun.
+        tolerance: Contact positions are halved around the path until that makes its joint range sum
+            smaller by less than this fraction.
     """
 
     widen: float
     max_contact_change: float
     costs: Costs
     seconds: float
+    tolerance: float
 
 
 def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: Plan) -> Plan:
@@ -65,14 +72,58 @@ def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: 
             not travel further than along it.
 
     Returns:
-        The plan with its lower bound.
+        The plan with the lower bound of the field, and what was gained between its positions.
     """
     deadline = time.monotonic() + settings.seconds
-    search = _Search(problem, settings, fallback.path, deadline)
-    plan = search.run()
+    most = _travel(fallback)
+    whole = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
+    search = _Search(whole, settings, most, fallback.path.joint_range_sum, deadline)
+    plan, refined = search.run(PROOF_GAP), search.refined
     if plan is None or plan.path.joint_range_sum > fallback.path.joint_range_sum:
-        plan = fallback
-    return replace(plan, lower_bound=search.lower_bound(plan.path.joint_range_sum))
+        plan, refined = fallback, whole
+    plan = replace(plan, lower_bound=search.lower_bound(plan.path.joint_range_sum))
+    return _between_positions(refined, plan, settings, most, deadline)
+
+
+def _between_positions(
+    refined: RefinedProblem, plan: Plan, settings: OptimalSettings, most: Travel, deadline: float
+) -> Plan:
+    """Return a plan with its contact positions refined, as long as that is worth it.
+
+    Where joints or contact still move further than wanted, what was gained may be spent on that.
+    """
+    start = plan
+    finer = refined.problem.field.contact_positions
+    gain = np.inf
+    rounds = 0
+    while rounds < MOST_ROUNDS and time.monotonic() < deadline:
+        if gain < settings.tolerance and _travel(plan).within(most):
+            break
+        finer = halved(finer)
+        search = _Search(
+            tube(refined, plan.path, finer), settings, most, plan.path.joint_range_sum, deadline
+        )
+        found = search.run(REFINED_GAP)
+        if found is None or found.path.joint_range_sum >= plan.path.joint_range_sum:
+            break
+        gain = 1.0 - found.path.joint_range_sum / plan.path.joint_range_sum
+        plan, refined = replace(found, checks=plan.checks + found.checks), search.refined
+        rounds += 1
+    if rounds and not _travel(plan).within(most):
+        room = start.path.joint_range_sum
+        ceiling = plan.path.joint_range_sum
+        around = tube(refined, plan.path, finer)
+        search = _Search(around, settings, most, ceiling, deadline, room)
+        calm = search.run(REFINED_GAP)
+        if calm is not None and calm.path.joint_range_sum <= room and _travel(calm).within(most):
+            plan = replace(calm, checks=plan.checks + calm.checks)
+    value = start.path.joint_range_sum
+    refinement = Refinement(value, value - plan.path.joint_range_sum, rounds)
+    return replace(plan, lower_bound=start.lower_bound, refinement=refinement)
+
+
+def _travel(plan: Plan) -> Travel:
+    return Travel(plan.path.joint_travel, plan.path.contact_travel)
 
 
 class _Search:
@@ -80,28 +131,34 @@ class _Search:
 
     def __init__(
         self,
-        problem: GrindingProblem,
+        whole: RefinedProblem,
         settings: OptimalSettings,
-        fallback: GrindingPath,
+        most: Travel,
+        ceiling: float,
         deadline: float,
+        room: float | None = None,
     ) -> None:
         self._settings = settings
-        self._most = Travel(fallback.joint_travel, fallback.contact_travel)
-        self._ceiling = fallback.joint_range_sum
+        self._most = most
+        self._ceiling = ceiling
         self._deadline = deadline
-        self._problem = problem
-        self._original = branches_of(problem)
-        self._refined = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
-        self._branches = branches_of(problem)
+        self._room = room
+        self._whole = self.refined = whole
+        self._original = branches_of(whole.problem)
+        self._branches = branches_of(whole.problem)
         self._refinements = 0
         self._checks = 0
         self._blocked_something = False
         self._bound = 0.0
         self._searched = undominated(self._original)
 
-    def run(self) -> Plan | None:
-        """Return the best plan, or None if there is none within time and widenings."""
-        self._bound, best = self._certify(self._original, PROOF_GAP)
+    def run(self, gap: float) -> Plan | None:
+        """Return the best plan, or None if there is none within time and widenings.
+
+        Args:
+            gap: The fraction to which the least box of the columns given is proven.
+        """
+        self._bound, best = self._certify(self._original, gap)
         while best is not None and not self._late():
             refinements = self._refinements
             self._blocked_something = False
@@ -124,7 +181,7 @@ class _Search:
         Args:
             found: The joint range sum of the best path, in [rad].
         """
-        columns = np.searchsorted(self._refined.places, np.arange(len(self._original[0].free)))
+        columns = np.searchsorted(self.refined.places, self._whole.places)
         lost = False
         for original, branch in zip(self._original, self._branches, strict=True):
             lost |= bool((original.free & ~branch.free[columns]).any())
@@ -132,10 +189,11 @@ class _Search:
         if lost:
             self._searched = undominated(self._original)
             self._bound = max(self._bound, self._certify(self._original, PROOF_GAP)[0])
+        problem = self._whole.problem
         wanted = found * (1.0 - CONTENT * self._settings.widen)
         if self._bound < wanted:
             self._bound = min(
-                raise_bound(self._problem, self._original[k], self._bound, wanted, self._deadline)
+                raise_bound(problem, self._original[k], self._bound, wanted, self._deadline)
                 for k in self._searched
             )
         return min(self._bound, found)
@@ -172,11 +230,18 @@ class _Search:
         None if more was learnt of the problem first: bulges became columns, or nothing in the box
         is free.
         """
-        branch, problem = self._branches[index], self._refined.problem
+        branch, problem = self._branches[index], self.refined.problem
         settings = self._settings
         changes = np.where(problem.off_wheel, np.inf, settings.max_contact_change)
         ladder = replace(branch.ladder, max_contact_change=changes)
         allowance = max(self._bound * (1.0 + settings.widen) - box.size, LEAST_WIDENING * box.size)
+        if self._room is not None:
+            costs = roughness(problem, branch.nodes, settings.costs, np.zeros_like(branch.free))
+            steps = branch.blocked_steps
+            calm = calm_box(ladder, steps, costs, box, self._room, self._most)
+            if calm is None:
+                return None
+            box, allowance = calm, ROUND_OFF
         for widening in WIDENINGS:
             wide = box.widened(float(widening) * allowance)
             inside = branch.free & wide.holds(np.nan_to_num(branch.nodes.q, nan=np.inf))
@@ -198,27 +263,27 @@ class _Search:
 
     def _bulges(self, branch: Branch, rows: np.ndarray, box: JointBox) -> np.ndarray:
         """Return the columns from which a track steps through postures outside of a box."""
-        problem = self._refined.problem
+        problem = self.refined.problem
         try:
             path = fill_in(problem.cell, problem.points, branch.nodes, rows, problem.interpolation)
         except BrokenStepError:
             return np.empty(0, dtype=int)  # the check will find and block it
         bulging = np.unique(path.cutter_point[~box.holds(path.q)].astype(int))
         # where t jumps within a smaller step the robot pivots in place: columns do not change that
-        return bulging[np.diff(self._refined.places)[bulging] > SMALLEST_STEP]
+        return bulging[np.diff(self.refined.places)[bulging] > SMALLEST_STEP]
 
     def _refine(self, columns: np.ndarray) -> None:
         """Take in places on the steps that start at these columns."""
-        before = self._refined.places
+        before = self.refined.places
         ends = before[columns], before[columns + 1]
         places = ends[0][:, None] + (ends[1] - ends[0])[:, None] * SUBDIVIDE
-        self._refined = refine(self._refined, places.ravel())
-        self._branches = carried(self._branches, before, self._refined)
+        self.refined = refine(self.refined, places.ravel())
+        self._branches = carried(self._branches, before, self.refined)
         self._refinements += 1
 
     def _check(self, track: Track) -> Plan | None:
         """Return the plan of a track or of a twin of it, if one of them is free."""
-        problem = self._refined.problem
+        problem = self.refined.problem
         robot = problem.cell.robot
         for twin in twins(self._branches, track, robot.lower, robot.upper):
             self._checks += 1
@@ -226,7 +291,7 @@ class _Search:
             if plan is not None:
                 return replace(
                     plan,
-                    path=self._refined.original_path(plan.path),
-                    motion=self._refined.original_motion(plan.motion),
+                    path=self.refined.original_path(plan.path),
+                    motion=self.refined.original_motion(plan.motion),
                 )
         return None

@@ -28,6 +28,21 @@ from opl.planning.symmetry import twins
 
 
 @dataclass(frozen=True)
+class Refinement:
+    """What more contact positions than those of the field have gained.
+
+    Attributes:
+        joint_range_sum: Of the best path found at the field's contact positions in [rad].
+        gain: By how much that of the refined path is smaller in [rad].
+        rounds: How often the contact positions around the path were halved with a gain.
+    """
+
+    joint_range_sum: float
+    gain: float
+    rounds: int
+
+
+@dataclass(frozen=True)
 class Plan:
     """A track and the motion it became.
 
@@ -35,14 +50,26 @@ class Plan:
         path: Postures on the wheel.
         motion: The whole motion, free of collision as far as the planner can tell.
         checks: How many motions were checked, this one included.
-        lower_bound: No path through the cutter points has a smaller joint range sum, in [rad]; None
-            if that was not asked.
+        lower_bound: No path through the cutter points at the field's contact positions has a
+            smaller joint range sum, in [rad]; None if that was not asked.
+        refinement: What contact positions between those of the field have gained; None if they were
+            not tried.
     """
 
     path: GrindingPath
     motion: Motion
     checks: int
     lower_bound: float | None = None
+    refinement: Refinement | None = None
+
+    @property
+    def gap(self) -> float | None:
+        """Fraction by which the best path at the field's contact positions may miss the least."""
+        if self.lower_bound is None:
+            return None
+        path, refinement = self.path, self.refinement
+        value = path.joint_range_sum if refinement is None else refinement.joint_range_sum
+        return 1.0 - self.lower_bound / value
 
 
 def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:

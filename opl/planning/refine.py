@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opl.cell.inverse import inverse
+from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.branch import Branch, branches_of
-from opl.planning.layer import wheel_layer
+from opl.planning.layer import layer_at
 from opl.planning.motion import Motion, Stretch
 from opl.planning.nodes import NodeField, NodeMatrix
 from opl.planning.path import GrindingPath, cutter_frames
@@ -68,12 +69,15 @@ def refine(refined: RefinedProblem, places: Array) -> RefinedProblem:
         np.interp(columns, np.arange(len(points)), points.arc_length),
     )
     t = problem.field.contact_positions
-    layer = wheel_layer(problem.cell, problem.part, added, t)
-    q = _solutions(problem, added.Ts_workpiece_cutter)
+    asked = problem.wheel_clearance > -np.inf
+    asked = _between(asked[before] | asked[before + 1])
+    layer = layer_at(problem.cell, problem.part, added, t, asked)
+    q = np.full((*asked.shape, *problem.field.q.shape[2:]), np.nan)
+    q[asked] = solve_at(problem.cell, added, t, asked)
     at = before + 1
     field = NodeField(
         t,
-        np.insert(problem.field.q, at, q, axis=0),
+        problem.field.q[:0],  # nobody asks what lies beyond the limits between cutter points
         tuple(_insert(problem, nodes, q, before) for nodes in problem.field.branches),
     )
     return RefinedProblem(
@@ -111,6 +115,35 @@ def _solutions(problem: GrindingProblem, Ts_workpiece_cutter: Array) -> Array:
     t = problem.field.contact_positions
     Ts_base_flange = problem.cell.Ts_base_flange(t[None, :], Ts_workpiece_cutter[:, None])
     return inverse(problem.cell.robot.arm, Ts_base_flange)
+
+
+def solve_at(
+    cell: WorkCell, points: CutterPoints, contact_positions: Array, at: np.ndarray
+) -> Array:
+    """Return the inverse solutions of some nodes in [rad], NaN where there are none.
+
+    Args:
+        cell: The cell.
+        points: N cutter points.
+        contact_positions: M values of t.
+        at: Which k nodes, shape (N, M).
+
+    Returns:
+        Shape (k, 8, 6), column by column.
+    """
+    columns, rows = np.nonzero(at)
+    Ts_base_flange = cell.Ts_base_flange(
+        contact_positions[rows], points.Ts_workpiece_cutter[columns]
+    )
+    return inverse(cell.robot.arm, Ts_base_flange)
+
+
+def _between(rows: np.ndarray) -> np.ndarray:
+    """Fill in the rows between the first and the last of each column, shape (k, M) of bool."""
+    return (
+        np.logical_or.accumulate(rows, axis=1)
+        & np.logical_or.accumulate(rows[:, ::-1], axis=1)[:, ::-1]
+    )
 
 
 def _insert(

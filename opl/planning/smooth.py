@@ -108,6 +108,14 @@ def smoothest(
     return SmoothTrack(rows, cost) if np.isfinite(cost) else None
 
 
+def travel_of(ladder: Ladder, rows: np.ndarray) -> Travel:
+    """Return how far joints and contact move along a track, node to node."""
+    on_wheel = ~ladder.off_wheel
+    turned = np.abs(np.diff(ladder.q[np.arange(len(rows)), rows], axis=0))
+    moved = np.abs(np.diff(ladder.contact_position[rows]))
+    return Travel(float(turned[on_wheel].sum()), float(moved[on_wheel].sum()))
+
+
 def smoothest_within(
     ladder: Ladder, blocked: np.ndarray, inside: np.ndarray, roughness: Roughness, most: Travel
 ) -> SmoothTrack | None:
@@ -124,21 +132,14 @@ def smoothest_within(
         most: How far joints and contact should move at the most.
     """
     cheapest = smoothest(ladder, blocked, inside, roughness)
-    if cheapest is None or _travel(ladder, cheapest.rows).within(most):
+    if cheapest is None or travel_of(ladder, cheapest.rows).within(most):
         return cheapest
     for price in DEARER * max(roughness.contact_weight, LEAST_CONTACT_WEIGHT):
         dearer = replace(roughness, contact_weight=float(price))
         track = smoothest(ladder, blocked, inside, dearer)
-        if track is not None and _travel(ladder, track.rows).within(most):
+        if track is not None and travel_of(ladder, track.rows).within(most):
             return track
     return cheapest
-
-
-def _travel(ladder: Ladder, rows: np.ndarray) -> Travel:
-    on_wheel = ~ladder.off_wheel
-    turned = np.abs(np.diff(ladder.q[np.arange(len(rows)), rows], axis=0))
-    moved = np.abs(np.diff(ladder.contact_position[rows]))
-    return Travel(float(turned[on_wheel].sum()), float(moved[on_wheel].sum()))
 
 
 @njit(
