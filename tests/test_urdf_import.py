@@ -7,13 +7,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
-from jobs import opl
+from jobs import V_JOB, opl
 
+from opl.cell.collision import CollisionScene
+from opl.cell.drawing import drawn_arm
 from opl.cell.recognise import recognise
 from opl.cell.robot import controller_poses, forward, known_robots, load_robot
 from opl.cell.robot_file import read_robot_file
 from opl.cell.urdf_import import import_urdf
 from opl.errors import InputError
+from opl.job import load
+from opl.verification.world import World
 
 MH24 = load_robot("mh24")
 
@@ -145,6 +149,44 @@ def test_meshes_come_along_and_are_found(tmp_path):
         InputError, match=r"changed\.urdf: mesh package://my_arm/foot\.stl: no such"
     ):
         import_urdf(path, "mine", tmp_path / "other")
+
+
+def test_planner_and_replay_take_a_mesh_of_a_link_alike(tmp_path):
+    # the fork of the forearm as one concave mesh
+    bars = [[[0.3, -0.085, -0.07], [0.66, 0.096, 0.12]],
+            [[0.6, -0.085, -0.06], [0.858, -0.054, 0.1]],
+            [[0.6, 0.058, -0.06], [0.858, 0.096, 0.1]]]  # fmt: skip
+    trimesh.util.concatenate([trimesh.creation.box(bounds=bar) for bar in bars]).export(
+        tmp_path / "fork.stl"
+    )
+    before, rest = MH24.urdf.read_text(encoding="utf-8").split('<link name="R_link">')
+    own, after = rest.split("</link>", 1)
+    inertial = own.split("<collision")[0]
+    mesh = '<collision><geometry><mesh filename="fork.stl"/></geometry></collision></link>'
+    path = tmp_path / "forked.urdf"
+    path.write_text(f'{before}<link name="R_link">{inertial}{mesh}{after}', encoding="utf-8")
+    made = import_urdf(path, "mine", tmp_path / "mine")
+    assert made.cautions[0].startswith("link R_link: each collision mesh counts as its convex hull")
+    drawn = np.concatenate(
+        [points for joint, points in drawn_arm(made.robot).outlines if joint == 4]
+    )
+    assert np.ptp(drawn[:, 1]) == pytest.approx(0.181)
+    cell = replace(load(V_JOB).cell, robot=made.robot)
+    scene = CollisionScene(cell)
+    q = np.random.default_rng(0).uniform(MH24.lower, MH24.upper, (150, 6))
+    seen = set()
+    with World(cell) as world:
+        pairs = [pair for pair in world.pairs() if "R_link" in (pair.first.name, pair.second.name)]
+        for row in q:
+            world.move_to(row)
+            hits = {hit for hit in scene.colliding_pairs(row) if "R_link" in hit}
+            for pair in pairs:
+                name = (pair.first.name, pair.second.name)
+                apart = world.distance(pair.first, pair.second, 0.1) - pair.clearance
+                hit = name in hits or name[::-1] in hits
+                assert hit == (apart < 0.0) or abs(apart) < 2e-3, (name, apart)
+                seen.add((name, hit))
+    assert (("R_link", "T_link"), True) in seen and len({name for name, hit in seen if hit}) > 3
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,8 @@ class CollisionScene:
     Asked for collision is every pair that could meet: links that are not neighbours, held bodies
     against all links but the flange's, and links and held bodies against wheel and obstacles. Pairs
     with something that is not the robot must stay apart by the clearance of the cell; links of the
-    robot must not touch each other (their primitives already enclose the real castings).
+    robot must not touch each other (their primitives already enclose the real castings). Meshes of
+    links count as their convex hulls.
     The cell may say otherwise of single pairs.
     """
 
@@ -36,6 +37,11 @@ class CollisionScene:
             pin.GeometryType.COLLISION,
             package_dirs=[str(cell.robot.urdf.parent)],  # where relative names of meshes start
         )
+        for link in self._geometry.geometryObjects:
+            if isinstance(link.geometry, coal.BVHModelBase):
+                # as the replay takes it, which else would refuse what is planned
+                link.geometry.buildConvexHull(False, "Qt")
+                link.geometry = link.geometry.convex
         self._n_links = self._geometry.ngeoms
         self._add_bodies(cell)
         self._pairs: list[Pair] = []

@@ -137,6 +137,11 @@ class UrdfTree:
             moved = joint is None or joint.get("type") != "fixed"
             if moved and not link.findall("collision"):
                 yield f"link {name} has no collision shape: nothing of it is checked"
+            if link.find("collision/geometry/mesh") is not None:
+                yield (
+                    f"link {name}: each collision mesh counts as its convex hull; where that is "
+                    "too much, as of a fork, give it in several convex meshes"
+                )
 
     def write(self, path: Path) -> None:
         """Write the file."""
