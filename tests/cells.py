@@ -398,6 +398,12 @@ class Ghosts:
     def colliding_pairs(self, q):
         return [("R_link", "ghost")] if self.collides(q[None])[0] else []
 
+    def against_surroundings(self, reserve):
+        return Ghosts(self._q, self._radius + reserve)
+
+    def levers(self):
+        return np.ones(6)  # distances are those of joint space
+
 
 # the paper's search, as printed
 

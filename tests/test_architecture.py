@@ -56,6 +56,7 @@ HOMES = {
     "OCP": {"geometry/cad"},
     "xacro": {"cell/xacro_file"},
     "toppra": {"planning/time_law"},
+    "ompl": {"planning/sampling"},
     "numba": {"cell/clearance", "planning"},
 }
 

@@ -26,7 +26,6 @@ from cells import (
 
 from opl.cell.robot import forward
 from opl.errors import NoPathError
-from opl.geometry.passes import Order
 from opl.planning.air import UnreachableApproachError, whole_motion
 from opl.planning.check import RESOLUTION, densify, find_faults
 from opl.planning.fixed import keep_contact, runs_of
@@ -210,24 +209,25 @@ def test_a_way_that_only_ends_in_a_collision_is_named():
         plan_recursive(replace(problem, scene=ghosts))
 
 
-def one_way_problem():
-    """Return the end of one pass and the beginning of the next, a long way back."""
-    job = small_job()
-    passes = replace(job.passes, order=Order.ONE_WAY)
-    return problem_of(with_positions(replace(job, passes=passes), 8), points_of=slice(56, 64))
-
-
-def test_a_blocked_link_is_avoided_by_another_step_from_pass_to_pass():
-    problem = one_way_problem()
-    plan = plan_recursive(problem)
-    link = next(k for k, s in enumerate(plan.motion.stretch) if s is Stretch.LINK)
-    middle = (plan.motion.q[link - 1] + plan.motion.q[link]) / 2.0
-    ghosts = Ghosts(middle, radius=0.01)
+def test_what_is_in_the_way_of_a_free_move_is_led_around():
+    problem, plan = small_problem(), small_plan()
+    n = len(plan.motion)
+    links = [k for k in range(n) if plan.motion.stretch[k] is Stretch.LINK]
+    assert len(links) == 1
+    moves = [1, *links, n - 1]
+    middles = np.array([(plan.motion.q[k - 1] + plan.motion.q[k]) / 2.0 for k in moves])
+    ghosts = Ghosts(middles, radius=0.015)
     faults = find_faults(problem.cell, ghosts, problem.part, plan.motion)
-    assert [plan.motion.stretch[fault.move] for fault in faults] == [Stretch.LINK]
+    assert [fault.move for fault in faults] == moves
     other = plan_recursive(replace(problem, scene=ghosts))
-    assert other.checks > 1
+    assert other.checks == 1
+    np.testing.assert_array_equal(other.path.q, plan.path.q)
     assert not ghosts.collides(densify(other.motion.q, RESOLUTION)[0]).any()
+    along = [(s, p) for s, p in zip(other.motion.stretch, other.motion.pass_index, strict=True)]
+    # the postures on the way belong to the stretch that they lead through
+    assert along.count((Stretch.HOME, 0)) >= 2
+    assert along.count((Stretch.LINK, 1)) >= 2
+    assert along.count((Stretch.HOME, -1)) >= 3
 
 
 def test_a_part_that_cannot_touch_without_being_cut_is_told_how_deep():

@@ -18,6 +18,7 @@ from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.wheel import ContactWheel
 
+FEW = 64  # poses that are not worth more than one thread
 TOLERANCE = 2e-5  # [m] clearances told are at most this much too large
 
 
@@ -93,17 +94,10 @@ def wheel_clearance(
     needs = np.array(np.broadcast_to(needed, shape), dtype=float).reshape(-1)
     flat = np.ascontiguousarray(Ts_contact0_workpiece.reshape(-1, 4, 4))
     clearance = np.empty(len(flat))
-    _clearances(
-        flat,
-        part.triangles,
-        part.spheres,
-        part.first,
-        part.child,
-        wheel.width / 2.0,
-        wheel.radius,
-        needs,
-        clearance,
-    )
+    # to call threads costs as much as dozens of poses, and many times that on a busy machine
+    kernel = _few_clearances if len(flat) <= FEW else _clearances
+    tree = part.triangles, part.spheres, part.first, part.child
+    kernel(flat, *tree, wheel.width / 2.0, wheel.radius, needs, clearance)
     return clearance.reshape(shape)
 
 
@@ -241,43 +235,65 @@ def _sphere_bound(T, spheres, index, half_width, radius):  # type: ignore[no-unt
 
 
 @njit(
-    "void(float64[:,:,::1],float64[:,:,::1],float64[:,::1],int64[::1],int64[::1],"
-    "float64,float64,float64[::1],float64[::1])",
+    "float64(float64[:,::1],float64[:,:,::1],float64[:,::1],int64[::1],int64[::1],float64,float64,"
+    "float64)",
     cache=True,
-    parallel=True,
 )
+def _clearance(  # type: ignore[no-untyped-def]
+    T, triangles, spheres, first, child, half_width, radius, needed
+):
+    """Clearance of the part in one pose, as `wheel_clearance` says."""
+    room = np.empty((DEEPEST + 1, 9))
+    waiting = np.empty(64, dtype=np.int64)  # deeper than any halving of an array can go
+    bounds = np.empty(64)
+    waiting[0] = 0
+    bounds[0] = -np.inf
+    n_waiting = 1
+    best = np.inf
+    while n_waiting > 0:
+        n_waiting -= 1
+        if bounds[n_waiting] >= min(best - TOLERANCE, needed):
+            continue
+        node = waiting[n_waiting]
+        if child[node] == 0:
+            best = _nearest_on_triangle(
+                T, triangles, first[node], half_width, radius, needed, best, room
+            )
+            continue
+        one, other = child[node], child[node] + 1
+        low = _sphere_bound(T, spheres, one, half_width, radius)
+        high = _sphere_bound(T, spheres, other, half_width, radius)
+        if low > high:
+            one, other = other, one
+            low, high = high, low
+        # the nearer child is taken next: it soon rules out nearly all the others
+        waiting[n_waiting], bounds[n_waiting] = other, high
+        waiting[n_waiting + 1], bounds[n_waiting + 1] = one, low
+        n_waiting += 2
+    return best
+
+
+_POSES = (
+    "void(float64[:,:,::1],float64[:,:,::1],float64[:,::1],int64[::1],int64[::1],"
+    "float64,float64,float64[::1],float64[::1])"
+)
+
+
+@njit(_POSES, cache=True, parallel=True)
 def _clearances(  # type: ignore[no-untyped-def]
     poses, triangles, spheres, first, child, half_width, radius, needs, clearance
 ):
     for k in prange(len(poses)):
-        T = poses[k]
-        room = np.empty((DEEPEST + 1, 9))
-        waiting = np.empty(64, dtype=np.int64)  # deeper than any halving of an array can go
-        bounds = np.empty(64)
-        waiting[0] = 0
-        bounds[0] = -np.inf
-        n_waiting = 1
-        best = np.inf
-        while n_waiting > 0:
-            n_waiting -= 1
-            if bounds[n_waiting] >= min(best - TOLERANCE, needs[k]):
-                continue
-            node = waiting[n_waiting]
-            if child[node] == 0:
-                best = _nearest_on_triangle(
-                    T, triangles, first[node], half_width, radius, needs[k], best, room
-                )
-                continue
-            one, other = child[node], child[node] + 1
-            low = _sphere_bound(T, spheres, one, half_width, radius)
-            high = _sphere_bound(T, spheres, other, half_width, radius)
-            if low > high:
-                one, other = other, one
-                low, high = high, low
-            # the nearer child is taken next: it soon rules out nearly all the others
-            waiting[n_waiting] = other
-            bounds[n_waiting] = high
-            waiting[n_waiting + 1] = one
-            bounds[n_waiting + 1] = low
-            n_waiting += 2
-        clearance[k] = best
+        clearance[k] = _clearance(
+            poses[k], triangles, spheres, first, child, half_width, radius, needs[k]
+        )
+
+
+@njit(_POSES, cache=True)
+def _few_clearances(  # type: ignore[no-untyped-def]
+    poses, triangles, spheres, first, child, half_width, radius, needs, clearance
+):
+    for k in range(len(poses)):
+        clearance[k] = _clearance(
+            poses[k], triangles, spheres, first, child, half_width, radius, needs[k]
+        )

@@ -6,6 +6,9 @@ Part against wheel is not asked here: that pair may touch, and has a closed form
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from copy import copy
+
 import coal
 import numpy as np
 import pinocchio as pin
@@ -46,18 +49,69 @@ class CollisionScene:
         self._add_bodies(cell)
         self._pairs: list[Pair] = []
         margins = self._choose_pairs(cell)
+        self._margins = np.array(margins)
+        self._prepare(self._margins, range(0))
+
+    def _prepare(self, margins: Array, unasked: Iterable[int]) -> None:
+        """Make ready to ask with these margins in [m], but not about some of the pairs."""
         self._data = self._model.createData()
         self._geometry_data = self._geometry.createData()
         for request, margin in zip(self._geometry_data.collisionRequests, margins, strict=True):
-            request.security_margin = margin
+            request.security_margin = float(margin)
             request.enable_contact = False
             # the default of 1 mm goes on to measure distances of pairs nearly in contact
             request.break_distance = 0.0
+        for index in unasked:
+            self._geometry_data.deactivateCollisionPair(index)
         # asks a pair only where the bounding boxes, widened by its margin, overlap; measured
         # faster here than the managers that sort or nest the boxes
         self._manager = pin.BroadPhaseManager_NaiveCollisionManager(
             self._model, self._geometry, self._geometry_data
         )
+
+    def against_surroundings(self, reserve: float) -> CollisionScene:
+        """Return the scene with more clearance, asked only about what does not move.
+
+        Args:
+            reserve: Distance in [m] to keep beyond the margin of each pair.
+        """
+        scene = copy(self)
+        joints = [geometry.parentJoint for geometry in self._geometry.geometryObjects]
+        both_move = (
+            index
+            for index, pair in enumerate(self._geometry.collisionPairs)
+            if joints[pair.first] > 0 and joints[pair.second] > 0
+        )
+        scene._prepare(self._margins + reserve, both_move)
+        return scene
+
+    def levers(self) -> Array:
+        """Return how far from each joint's axis anything it moves can be, in [m], shape (6,).
+
+        In any posture: when joint k turns by d [rad], no point moves farther than d times lever k.
+        """
+        model = self._model
+        data = model.createData()
+        pin.computeJointJacobians(model, data, pin.neutral(model))
+        levers = np.zeros(model.nq)
+        rest = 0.0  # farthest that anything is from the origin of the joint after this one
+        for joint in range(model.nq, 0, -1):
+            axis = data.oMi[joint].rotation.T @ data.J[3:, joint - 1]
+            spheres = [
+                (
+                    geometry.placement.act(geometry.geometry.aabb_center),
+                    geometry.geometry.aabb_radius,
+                )
+                for geometry in self._geometry.geometryObjects
+                if geometry.parentJoint == joint
+            ]
+            if joint < model.nq:
+                spheres.append((model.jointPlacements[joint + 1].translation, rest))
+            levers[joint - 1] = max(
+                float(np.linalg.norm(np.cross(axis, centre))) + radius for centre, radius in spheres
+            )
+            rest = max(float(np.linalg.norm(centre)) + radius for centre, radius in spheres)
+        return levers
 
     def collides(self, q: Array) -> np.ndarray:
         """Return which postures collide.

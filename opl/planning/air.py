@@ -1,7 +1,8 @@
 """From the path on the wheel to a whole motion: home, approach, passes, retract, links, home.
 
 The part comes to the wheel and leaves it along the contact normal; between passes, and from and to
-home, all joints move together on a straight line in joint space.
+home, all joints move together on a straight line in joint space, or on several around what is in
+the way.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ from opl.cell.inverse import inverse
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.motion import Motion, Stretch
+from opl.planning.links import Links, NoLinkError
+from opl.planning.motion import FREE_MOVES, Motion, Stretch
 from opl.planning.path import GrindingPath
 from opl.planning.timing import Pace, lead_count
 
@@ -31,6 +33,20 @@ class UnreachableApproachError(Exception):
         self.cause = cause
 
 
+class BlockedLinkError(Exception):
+    """The robot cannot come from one place off the wheel to the next.
+
+    Args:
+        move: Index in the motion of the posture that it cannot come to.
+        error: Why.
+    """
+
+    def __init__(self, move: int, error: NoLinkError) -> None:
+        super().__init__(f"way to posture {move}: {error}")
+        self.move = move
+        self.error = error
+
+
 def whole_motion(cell: WorkCell, points: CutterPoints, path: GrindingPath, pace: Pace) -> Motion:
     """Join the passes of a path into one motion from home to home, its times still unknown.
 
@@ -47,8 +63,18 @@ def whole_motion(cell: WorkCell, points: CutterPoints, path: GrindingPath, pace:
     for index in range(int(points.pass_index[-1]) + 1):
         on_pass = np.flatnonzero(path.pass_index == index)
         first, last = int(on_pass[0]), int(on_pass[-1])
-        lead_in = _along_normal(cell, points, path, first, pace)
-        lead_out = _along_normal(cell, points, path, last, pace)
+        lead_in, lead_out = (
+            lead(
+                cell,
+                points,
+                pace,
+                path.branch,
+                int(path.cutter_point[k]),
+                path.contact_position[k],
+                path.q[k],
+            )
+            for k in (first, last)
+        )
         air = Stretch.HOME if index == 0 else Stretch.LINK
         legs.append(_Leg(lead_in[-1:], air, index))
         # the part touches down as an approach; the first cutter point ends that move
@@ -83,6 +109,39 @@ def whole_motion(cell: WorkCell, points: CutterPoints, path: GrindingPath, pace:
     )
 
 
+def linked(motion: Motion, links: Links) -> Motion:
+    """Lead the free moves of a motion around what is in their way.
+
+    Args:
+        motion: The motion, every free move of it a single straight one.
+        links: Finds the ways.
+
+    Raises:
+        BlockedLinkError: If there is none for one of them.
+    """
+    moves = [k for k in range(1, len(motion)) if motion.stretch[k] in FREE_MOVES]
+    on_the_way = []
+    for move in moves:
+        try:
+            on_the_way.append(links.find(motion.q[move - 1], motion.q[move]))
+        except NoLinkError as error:
+            raise BlockedLinkError(move, error) from error
+    before = np.repeat(moves, [len(q) for q in on_the_way])
+    if not len(before):
+        return motion
+    source = np.insert(np.arange(len(motion)), before, before)
+    q = np.insert(motion.q, before, np.concatenate(on_the_way), axis=0)
+    return Motion(
+        q=q,
+        duration=motion.duration[source],
+        stretch=tuple(motion.stretch[k] for k in source),
+        contact_position=motion.contact_position[source],
+        cutter_point=motion.cutter_point[source],
+        pass_index=motion.pass_index[source],
+        clearance=motion.clearance[source],
+    )
+
+
 class _Leg:
     """Some postures of one kind."""
 
@@ -102,26 +161,42 @@ class _Leg:
         self.cutter_point = nothing if cutter_point is None else cutter_point
 
 
-def _along_normal(
-    cell: WorkCell, points: CutterPoints, path: GrindingPath, index: int, pace: Pace
+def lead(
+    cell: WorkCell,
+    points: CutterPoints,
+    pace: Pace,
+    branch: int,
+    column: int,
+    contact_position: float,
+    q_contact: Array,
 ) -> Array:
-    """Return postures from just off the wheel to the end of the retract, shape (k, 6)."""
+    """Return postures from just off the wheel to the end of the retract, shape (k, 6).
+
+    Args:
+        cell: The cell.
+        points: The cutter points.
+        pace: How long it is.
+        branch: Slot of the inverse kinematics.
+        column: The cutter point that is ground.
+        contact_position: Where on the wheel.
+        q_contact: The posture that grinds it in [rad], shape (6,).
+
+    Raises:
+        UnreachableApproachError: If it leaves reach or limits.
+    """
     count = lead_count(pace)
     T_contact_away = np.tile(np.eye(4), (count, 1, 1))
     # z of the contact frame points into the wheel
     T_contact_away[:, 2, 3] = -pace.approach_length * np.arange(1, count + 1) / count
-    column = int(path.cutter_point[index])
-    T_base_contact = cell.wheel.T_base_contact(path.contact_position[index])
-    T_base_flange = cell.Ts_base_flange(
-        path.contact_position[index], points.Ts_workpiece_cutter[column]
-    )
+    T_base_contact = cell.wheel.T_base_contact(contact_position)
+    T_base_flange = cell.Ts_base_flange(contact_position, points.Ts_workpiece_cutter[column])
     T_contact_flange = np.linalg.solve(T_base_contact, T_base_flange)
     Ts_base_flange = T_base_contact @ T_contact_away @ T_contact_flange
-    solutions = inverse(cell.robot.arm, Ts_base_flange, path.q[index])[:, path.branch]
+    solutions = inverse(cell.robot.arm, Ts_base_flange, q_contact)[:, branch]
     if np.isnan(solutions).any():
         raise UnreachableApproachError(column, "reach")
-    q = path.q[index] + np.cumsum(
-        np.remainder(np.diff(solutions, axis=0, prepend=path.q[index][None]) + np.pi, 2 * np.pi)
+    q = q_contact + np.cumsum(
+        np.remainder(np.diff(solutions, axis=0, prepend=q_contact[None]) + np.pi, 2 * np.pi)
         - np.pi,
         axis=0,
     )

@@ -58,6 +58,15 @@ class Branch:
         self.blocked.add(key)
         self.causes[column, cause] += 1
 
+    def block_steps(
+        self, column: int, from_rows: list[int], to_rows: list[int], cause: str
+    ) -> None:
+        """Block every step from some rows of a column to some of the next."""
+        self.blocked.update(
+            self.ladder.step_key(column, row, after) for row in from_rows for after in to_rows
+        )
+        self.causes[column, cause] += len(from_rows) * len(to_rows)
+
     def block_node(self, column: int, row: int, cause: str) -> None:
         """Block one node."""
         self.free[column, row] = False

@@ -11,11 +11,9 @@ from opl.cell.collision import CollisionScene
 from opl.cell.robot import forward
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array
-from opl.planning.motion import Motion, Stretch
+from opl.planning.motion import FREE_MOVES, Motion
 
 RESOLUTION = np.deg2rad(1.0)  # largest joint change between two postures that are asked
-
-FREE_MOVES = (Stretch.HOME, Stretch.LINK)
 
 
 @dataclass(frozen=True)

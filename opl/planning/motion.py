@@ -20,6 +20,9 @@ class Stretch(str, Enum):
     RETRACT = "retract"  # straight along the contact normal, away from the wheel
 
 
+FREE_MOVES = (Stretch.HOME, Stretch.LINK)
+
+
 @dataclass(frozen=True)
 class Motion:
     """Postures in the order they are visited, joined by linear joint interpolation.

@@ -16,10 +16,11 @@ import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
 from opl.errors import NoPathError
-from opl.planning.air import UnreachableApproachError, whole_motion
+from opl.planning.air import BlockedLinkError, UnreachableApproachError, linked, whole_motion
+from opl.planning.blocked_links import block_link
 from opl.planning.branch import Branch, Track, branches_of
 from opl.planning.check import Fault, find_faults
-from opl.planning.motion import Motion, Stretch
+from opl.planning.motion import FREE_MOVES, Motion, Stretch
 from opl.planning.path import BrokenStepError, GrindingPath, fill_in
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import explain
@@ -145,9 +146,22 @@ def check_track(
         branch.block_node(error.column, int(rows[error.column]), f"approach: {error.cause}")
         return None
     faults = find_faults(problem.cell, problem.scene, problem.part, motion)
+    # what is in the way of a free move is led around, unless it is where an approach begins
+    faults = [
+        fault
+        for fault in faults
+        if motion.stretch[fault.move] not in FREE_MOVES
+        or (fault.at_end and motion.pass_index[fault.move] >= 0)
+    ]
     for fault in faults:
         _block(problem, branch, rows, motion, fault)
-    return None if faults else Plan(path, motion, checks)
+    if faults:
+        return None
+    try:
+        return Plan(path, linked(motion, problem.links), checks)
+    except BlockedLinkError as blocked:
+        block_link(problem, branch, rows, motion, blocked)
+        return None
 
 
 def _block(
@@ -170,12 +184,8 @@ def _block(
         branch.block_node(int(on_pass[0]), int(rows[on_pass[0]]), f"approach: {cause}")
     elif stretch is Stretch.RETRACT:
         branch.block_node(int(on_pass[-1]), int(rows[on_pass[-1]]), f"retract: {cause}")
-    elif stretch is Stretch.LINK:
-        branch.block_step(int(on_pass[0]) - 1, rows, f"link: {cause}")
-    elif index == 0:
-        branch.block_node(0, int(rows[0]), f"way from home: {cause}")
-    else:
-        branch.block_node(len(rows) - 1, int(rows[-1]), f"way home: {cause}")
+    else:  # a free move ends where the approach begins
+        branch.block_node(int(on_pass[0]), int(rows[on_pass[0]]), f"approach: {cause}")
 
 
 def no_path(problem: GrindingProblem, branches: list[Branch]) -> NoPathError:

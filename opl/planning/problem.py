@@ -12,6 +12,7 @@ from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.ladder import Ladder
+from opl.planning.links import Links
 from opl.planning.nodes import NodeField, NodeMatrix
 from opl.planning.path import Interpolation
 from opl.planning.timing import Pace
@@ -31,6 +32,8 @@ class GrindingProblem:
             than the contact allowance permits, shape (N, M).
         interpolation: How the path between nodes is filled in.
         pace: Speeds, approach and home.
+        links: Ways through the air, found so far; not to be given, and kept as long as the cell is
+            the same.
     """
 
     cell: WorkCell
@@ -41,6 +44,16 @@ class GrindingProblem:
     wheel_clearance: Array
     interpolation: Interpolation
     pace: Pace
+    links: Links = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        known = self.links
+        if (
+            not isinstance(known, Links)
+            or known.scene is not self.scene
+            or known.cell is not self.cell
+        ):
+            object.__setattr__(self, "links", Links(self.cell, self.scene, self.part))
 
     @property
     def off_wheel(self) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -20,6 +21,7 @@ MOST_RUNS = 8  # of cutter points told one by one; a hundred lines would hide th
 # of a run that are asked what stops them; their shares change little with more
 MOST_COLUMNS = 8
 MOST_POSITIONS = 30
+MOST_ENDS = 3  # cutter points told of, where tracks came through but none was free
 
 
 def explain(problem: GrindingProblem, reached: int, causes: Counter[tuple[int, str]]) -> list[str]:
@@ -104,7 +106,12 @@ def _where_it_ended(
 ) -> list[str]:
     """Every cutter point has a free posture: say what stopped the steps between them."""
     lines = []
-    near = range(max(reached - 2, 0), min(reached + 1, len(problem.points)))
+    near: Sequence[int] = range(max(reached - 2, 0), min(reached + 1, len(problem.points)))
+    if reached == len(problem.points):  # it came through: what counts is what it met most often
+        met_at = Counter[int]()
+        for (column, _), count in causes.items():
+            met_at[column] += count
+        near = sorted(sorted(met_at, key=lambda column: (-met_at[column], column))[:MOST_ENDS])
     for column in near:
         met = [(cause, count) for (where, cause), count in causes.items() if where == column]
         met.sort(key=lambda item: (-item[1], item[0]))

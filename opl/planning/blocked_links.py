@@ -1,0 +1,94 @@
+"""What a link that was not found rules out: all nodes that are no better off than those it joins.
+
+Two postures off the wheel that a free straight move joins can be left and come to in the same ways.
+So where a search from one of them was in vain, the other need not be tried; and mostly all contact
+positions of a branch are joined in this manner.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from opl.geometry.frames import Array
+from opl.planning.air import BlockedLinkError, UnreachableApproachError, lead
+from opl.planning.branch import Branch
+from opl.planning.motion import Motion, Stretch
+from opl.planning.problem import GrindingProblem
+
+
+def block_link(
+    problem: GrindingProblem,
+    branch: Branch,
+    rows: np.ndarray,
+    motion: Motion,
+    blocked: BlockedLinkError,
+) -> None:
+    """Take out of the ladder what a link that was not found rules out.
+
+    Args:
+        problem: What is to be planned.
+        branch: The branch of the track.
+        rows: The row in each column, shape (N,).
+        motion: The motion, its free moves straight.
+        blocked: Which of them found no way, and why.
+    """
+    move, error = blocked.move, blocked.error
+    index = int(motion.pass_index[move])
+    column = len(rows) if index < 0 else int(np.argmax(problem.points.pass_index == index))
+    between = motion.stretch[move] is Stretch.LINK
+    cause = f"{error}" if between else f"{'way home' if index < 0 else 'way from home'}: {error}"
+    before, after = column - 1, column  # the cutter points on either side of the link
+    if between and error.end == 0:
+        branch.block_node(before, int(rows[before]), f"retract: {cause}")
+    elif between and error.end == 1:
+        branch.block_node(after, int(rows[after]), f"approach: {cause}")
+    elif between:
+        from_rows = _joined(problem, branch, before, int(rows[before]), motion.q[move - 1])
+        to_rows = _joined(problem, branch, after, int(rows[after]), motion.q[move])
+        branch.block_steps(before, from_rows, to_rows, f"link: {cause}")
+    else:
+        end, posture = (before, move - 1) if index < 0 else (after, move)
+        for row in _joined(problem, branch, end, int(rows[end]), motion.q[posture]):
+            branch.block_node(end, row, cause)
+
+
+def _joined(
+    problem: GrindingProblem, branch: Branch, column: int, row: int, q_away: Array
+) -> list[int]:
+    """Return the rows whose postures off the wheel are joined to one of them by free moves.
+
+    Args:
+        problem: What is to be planned.
+        branch: The branch.
+        column: The cutter point.
+        row: A row, which is among those returned.
+        q_away: Its posture at the end of approach or retract in [rad], shape (6,).
+    """
+    t = branch.nodes.contact_position
+    free = np.flatnonzero(branch.free[column])
+    found = [row]
+    # outwards on either side, from each to the next that is joined
+    for side in (free[t[free] > t[row]], free[t[free] < t[row]], free[t[free] == t[row]]):
+        last = q_away
+        for other in side[np.argsort(np.abs(t[side] - t[row]), kind="stable")].tolist():
+            q = _away(problem, branch, column, other)
+            if other != row and q is not None and problem.links.joined(last, q):
+                found.append(other)
+                last = q
+    return found
+
+
+def _away(problem: GrindingProblem, branch: Branch, column: int, row: int) -> Array | None:
+    """Return where approach and retract of a node end, None if they cannot be made."""
+    try:
+        return lead(
+            problem.cell,
+            problem.points,
+            problem.pace,
+            branch.nodes.branch,
+            column,
+            branch.nodes.contact_position[row],
+            branch.nodes.q[column, row],
+        )[-1]
+    except UnreachableApproachError:
+        return None
