@@ -32,7 +32,11 @@ MOST_SUBPROBLEMS = 1000  # of one round: what has not closed by then would take 
 
 
 def raise_bound(
-    problem: GrindingProblem, branch: Branch, bound: float, upper: float, deadline: float
+    problem: GrindingProblem,
+    branch: Branch,
+    bound: float,
+    wanted: float,
+    deadline: float,
 ) -> float:
     """Return a lower bound on the joint range sum of one branch, in [rad].
 
@@ -40,28 +44,30 @@ def raise_bound(
         problem: What is to be planned.
         branch: The branch; its free nodes and blocked steps are taken for all there are.
         bound: What is already proven, in [rad].
-        upper: How large a bound is wanted, in [rad]; there the proof ends.
+        wanted: How large a bound is wanted, in [rad]; there the proof ends.
         deadline: When to stop with what is proven, by `time.monotonic`.
     """
     nodes = least_box(
         branch.ladder,
         branch.blocked_steps,
-        bound=upper,
+        bound=wanted,
         gap=NODES_GAP,
         seconds=deadline - time.monotonic(),
     )
     before = bound = max(bound, nodes.lower_bound)
     rows, box = nodes.rows, nodes.box
     cells: dict[int, int] = {}
-    while bound < upper and rows is not None and box is not None:
+    while bound < wanted and rows is not None and box is not None:
         outside = _steps_outside(problem, branch, rows, box)
         finer = [step for step in outside if cells.get(step, 0) < MOST_CELLS]
         if not finer:
             break
         for step in finer:
             cells[step] = 2 * cells[step] if step in cells else FIRST_CELLS
-        proof = StripProof(branch.ladder, branch.blocked_steps, upper, _cut(problem, branch, cells))
-        while proof.open_bound() < min(upper, proof.held):
+        proof = StripProof(
+            branch.ladder, branch.blocked_steps, wanted, _cut(problem, branch, cells)
+        )
+        while proof.open_bound() < min(wanted, proof.held):
             if proof.subproblems >= MOST_SUBPROBLEMS or time.monotonic() >= deadline:
                 break
             proof.take_next()
@@ -69,7 +75,7 @@ def raise_bound(
         rows, box = proof.rows, proof.box
         if before < bound < last * (1.0 + LEAST_GAIN):
             break
-    return min(bound, upper)
+    return min(bound, wanted)
 
 
 class StripProof(BoxProof):

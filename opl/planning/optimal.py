@@ -36,7 +36,7 @@ SMALLEST_STEP = 1.0 / 16.0  # of a step between cutter points that is still give
 # fractions to which boxes are solved: what remains of the gap of a path is then that of its track
 PROOF_GAP = 1e-6
 REFINED_GAP = 1e-5
-CONTENT = 2.0  # times the widening asked for: a gap that calls for no further proof
+CONTENT = 1.8  # times the widening asked for: a gap that calls for no further proof
 WIDENINGS = 2.0 ** np.arange(12)  # times the widening asked for, until a track fits
 LEAST_WIDENING = 1e-4  # fraction of the size of a box
 
