@@ -110,6 +110,9 @@ def _comparison(outcome: Outcome) -> Table:
     table.add_row("joint travel", *(f"{f.joint_travel:.2f}" for _, f in columns))
     table.add_row("travel of t", *(f"{f.contact_travel:.0f}" for _, f in columns))
     table.add_row("time on wheel, s", *(f"{f.seconds:.1f}" for _, f in columns))
+    weights = outcome.job.search.weights_asked
+    if weights is not None:
+        table.add_row("weighted sum", *(f"{weights.value(f):.4f}" for _, f in columns))
     return table
 
 
@@ -153,6 +156,12 @@ def _facts(outcome: Outcome) -> Iterator[str]:
 
 
 def _certified(plan: Plan, n_positions: int) -> Iterator[str]:
+    if plan.weighted is not None:
+        yield (
+            f"no path through these points at {n_positions} contact positions has a weighted sum "
+            f"below {plan.weighted.lower_bound:.4f}: the one found has {plan.weighted.value:.4f}, "
+            f"{100.0 * plan.weighted.gap:.1f} % of which may be too much"
+        )
     if plan.lower_bound is None or plan.gap is None:
         return
     yield (

@@ -7,11 +7,12 @@ from enum import Enum
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from opl.cell.robot import Robot
 from opl.documents import Document
 from opl.planning.costs import Costs
+from opl.planning.objective import ObjectiveWeights
 from opl.planning.optimal import OptimalSettings
 from opl.planning.path import Interpolation
 from opl.planning.starts import Start
@@ -40,6 +41,7 @@ class Objective(str, Enum):
     RANGE = "range"  # joint range sum; inside its box the smoothest motion
     TRAVEL = "travel"  # joint travel
     TIME = "time"  # time on the wheel
+    WEIGHTED = "weighted"  # a weighted sum of the three
 
 
 class WeightsSection(Document):
@@ -53,11 +55,26 @@ class WeightsSection(Document):
     push_away: NotNegative = 0.02
 
 
+class ObjectiveWeightsSection(Document):
+    """What the weighted objective charges: per radian of range sum and of travel, per second."""
+
+    range: NotNegative = 1.0
+    travel: NotNegative = 0.1
+    time: NotNegative = 0.0
+
+    @model_validator(mode="after")
+    def _not_nothing(self) -> ObjectiveWeightsSection:
+        if self.range == self.travel == self.time == 0.0:
+            raise ValueError("needs at least one of range, travel and time above 0")
+        return self
+
+
 class SearchSection(Document):
     """How the path is sought."""
 
     method: Literal["recursive", "optimal"] = "optimal"
-    objective: Literal["range", "travel", "time"] = "range"
+    objective: Literal["range", "travel", "time", "weighted"] = "range"
+    objective_weights: ObjectiveWeightsSection = ObjectiveWeightsSection()
     start: Literal["best", "nearest"] = "best"
     contact_positions: Annotated[int, Field(ge=2)]
     max_contact_step: Positive
@@ -83,6 +100,11 @@ class SearchSection(Document):
         return Search(
             method=Method(self.method),
             objective=Objective(self.objective),
+            objective_weights=ObjectiveWeights(
+                self.objective_weights.range,
+                self.objective_weights.travel,
+                self.objective_weights.time,
+            ),
             start=Start(self.start),
             n_contact_positions=self.contact_positions,
             max_contact_error=self.max_contact_error_mm * MM,
@@ -140,6 +162,7 @@ class Search:
     Attributes:
         method: The search.
         objective: What the optimal method keeps small.
+        objective_weights: What the weighted objective charges.
         start: Start node of the recursive method.
         n_contact_positions: M, the number of values of t.
         max_contact_error: Largest distance of the ground point from the wheel's surface in [m].
@@ -149,8 +172,14 @@ class Search:
 
     method: Method
     objective: Objective
+    objective_weights: ObjectiveWeights
     start: Start
     n_contact_positions: int
     max_contact_error: float
     interpolation: Interpolation
     optimal: OptimalSettings
+
+    @property
+    def weights_asked(self) -> ObjectiveWeights | None:
+        """The weights of the objective, if it is a weighted sum."""
+        return self.objective_weights if self.objective is Objective.WEIGHTED else None

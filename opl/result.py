@@ -12,6 +12,7 @@ from opl.cell.inverse import branch_name
 from opl.outcome import Outcome
 from opl.planning.feed import SlowStretch
 from opl.planning.figures import Figures
+from opl.planning.objective import ObjectiveWeights, WeightedValue
 from opl.planning.plan import Plan, Refinement
 from opl.proof.read_back import FileProof
 
@@ -32,7 +33,10 @@ def result(outcome: Outcome) -> dict[str, Any]:
         "remedies": outcome.remedies,
         "fixed": _fixed(outcome),
         "path": _path(outcome, outcome.plan),
-        "compared": {name: _figures(figures) for name, figures in outcome.compared.items()},
+        "compared": {
+            name: _figures(figures, outcome.job.search.weights_asked)
+            for name, figures in outcome.compared.items()
+        },
         "feed": _feed(outcome),
         "cycle": _cycle(outcome),
         "verification": _verification(outcome),
@@ -88,13 +92,14 @@ def _by_pass(outcome: Outcome) -> list[list[float]] | None:
     return [_rounded(np.ptp(q, axis=0)) for q in passes]
 
 
-def _figures(figures: Figures) -> dict[str, Any]:
+def _figures(figures: Figures, weights: ObjectiveWeights | None) -> dict[str, Any]:
     return {
         "joint_ranges_rad": _rounded(figures.joint_ranges),
         "joint_range_sum_rad": _rounded(figures.joint_range_sum),
         "joint_travel_rad": _rounded(figures.joint_travel),
         "contact_travel": _rounded(figures.contact_travel),
         "seconds_on_wheel": _rounded(figures.seconds),
+        "weighted_sum": None if weights is None else _rounded(weights.value(figures)),
     }
 
 
@@ -115,6 +120,17 @@ def _path(outcome: Outcome, plan: Plan | None) -> dict[str, Any] | None:
         "lower_bound_rad": None if bound is None else _rounded(bound),
         "gap": None if plan.gap is None else _rounded(plan.gap),
         "refinement": _refinement(plan.refinement),
+        "weighted": _weighted(plan.weighted),
+    }
+
+
+def _weighted(weighted: WeightedValue | None) -> dict[str, Any] | None:
+    if weighted is None:
+        return None
+    return {
+        "value": _rounded(weighted.value),
+        "lower_bound": _rounded(weighted.lower_bound),
+        "gap": _rounded(weighted.gap),
     }
 
 

@@ -8,10 +8,12 @@ from opl.job_search import Method, Objective
 from opl.outcome import Outcome
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.figures import Figures, figures_of_path, figures_of_points
+from opl.planning.objective import ObjectiveWeights
 from opl.planning.optimal import plan_optimal
 from opl.planning.plan import Plan, plan_recursive, try_recursive
 from opl.planning.problem import GrindingProblem
 from opl.planning.starts import Start
+from opl.planning.weighted import plan_weighted
 
 # of motions from the paper's start node, which are sought for comparison only
 MOST_CHECKS = 20
@@ -29,10 +31,20 @@ def search_path(outcome: Outcome, problem: GrindingProblem) -> Plan:
         return plan
     if search.objective is Objective.RANGE:
         return plan_optimal(problem, search.optimal, plan)
+    if search.objective is Objective.WEIGHTED:
+        weights, change = search.objective_weights, search.optimal.max_contact_change
+        return plan_weighted(problem, weights, change, search.optimal.seconds, plan)
     travel, time = (0.0, 1.0) if search.objective is Objective.TIME else (1.0, 0.0)
-    weights = search.optimal.costs
-    costs = replace(weights, joint_weights=travel * weights.joint_weights, time_weight=time)
-    return plan_cheapest(problem, costs, search.optimal.max_contact_change)
+    prices = search.optimal.costs
+    costs = replace(prices, joint_weights=travel * prices.joint_weights, time_weight=time)
+    cheapest = plan_cheapest(problem, costs, search.optimal.max_contact_change)
+    # the cheapest at the cutter points need not be so on the way between them
+    alone, robot = ObjectiveWeights(0.0, travel, time), problem.cell.robot
+    values = [
+        alone.value(figures_of_path(one.path, one.motion, problem.points, problem.pace, robot))
+        for one in (cheapest, plan)
+    ]
+    return cheapest if values[0] <= values[1] else replace(plan)
 
 
 def compare(outcome: Outcome) -> dict[str, Figures]:

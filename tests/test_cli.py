@@ -432,3 +432,33 @@ def test_figures_in_the_result_are_never_nan(result):
         return [value] if isinstance(value, float) else []
 
     assert all(math.isfinite(number) for number in numbers(result))
+
+
+def test_a_weighted_objective_tells_its_sum_for_every_path_and_how_far_it_may_be_from_the_least(
+    tmp_path,
+):
+    weights = {"range": 1.0, "travel": 0.3, "time": 0.02}
+    changes = {"search.objective": "weighted", "search.objective_weights": weights}
+    ended = opl("run", write_job(tmp_path, changes), "--out", tmp_path / "out")
+    assert ended.status == 0, ended.err
+    assert "weighted sum" in ended.out
+    told = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    for figures in told["compared"].values():
+        wanted = (
+            figures["joint_range_sum_rad"]
+            + 0.3 * figures["joint_travel_rad"]
+            + 0.02 * figures["seconds_on_wheel"]
+        )
+        assert figures["weighted_sum"] == pytest.approx(wanted, abs=1e-5)
+    found = told["path"]["weighted"]
+    assert found["value"] == told["compared"]["optimal"]["weighted_sum"]
+    assert found["lower_bound"] <= found["value"]
+    assert found["value"] <= told["compared"]["recursive"]["weighted_sum"]
+
+
+def test_weights_that_charge_for_nothing_are_refused(tmp_path):
+    changes = {"search.objective_weights": {"range": 0, "travel": 0, "time": 0}}
+    ended = opl("check", write_job(tmp_path, changes))
+    assert ended.status == 2
+    assert "search.objective_weights" in ended.err
+    assert "at least one of range, travel and time" in ended.err

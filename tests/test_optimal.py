@@ -24,12 +24,15 @@ from opl.planning.certificate import least_box
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.check import RESOLUTION, densify
 from opl.planning.costs import roughness
+from opl.planning.figures import figures_of_path
+from opl.planning.objective import ObjectiveWeights
 from opl.planning.optimal import plan_optimal
 from opl.planning.plan import plan_recursive
 from opl.planning.refine import RefinedProblem
 from opl.planning.smooth import Travel, smoothest, travel_of
 from opl.planning.timing import timed
 from opl.planning.tube import REACH, halved, tube
+from opl.planning.weighted import plan_weighted
 from opl.verification.replay import replay
 
 SETTINGS = v_job().search.optimal
@@ -265,6 +268,67 @@ def test_the_least_time_is_a_shortest_path_of_scipy():
     assert plan.checks == 1
     assert spent == pytest.approx(shortest(problem, seconds), abs=1e-9)
     assert spent > arc.sum() * 1.05  # the feed alone does not decide here
+
+
+# a weighted sum
+
+WEIGHTS = ObjectiveWeights(joint_range=1.0, travel=0.5, time=0.05)
+
+
+def weighted(problem, weights, fallback):
+    return plan_weighted(problem, weights, SETTINGS.max_contact_change, 60.0, fallback)
+
+
+def sum_of(problem, plan, weights):
+    robot = problem.cell.robot
+    figures = figures_of_path(plan.path, plan.motion, problem.points, problem.pace, robot)
+    return (
+        weights.joint_range * np.ptp(on_wheel(plan.motion), axis=0).sum()
+        + weights.travel * figures.joint_travel
+        + weights.time * figures.seconds
+    )
+
+
+def test_a_weighted_sum_is_what_the_motion_has_and_no_more_than_other_methods_have():
+    problem = one_row()
+    plan = weighted(problem, WEIGHTS, recursive(one_row))
+    assert plan.weighted.value == pytest.approx(sum_of(problem, plan, WEIGHTS), abs=1e-12)
+    assert 0.0 < plan.weighted.lower_bound <= plan.weighted.value
+    travel = plan_cheapest(problem, ONLY_TRAVEL, SETTINGS.max_contact_change)
+    for other in (recursive(one_row), travel):
+        assert plan.weighted.value <= sum_of(problem, other, WEIGHTS) + 1e-12
+    again = weighted(problem, WEIGHTS, recursive(one_row))
+    assert again.motion.q.tobytes() == plan.motion.q.tobytes()
+
+
+@pytest.mark.parametrize("first", [22, 36, 57])
+def test_no_track_of_a_tiny_field_has_less_than_the_bound_of_the_weighted_sum(first):
+    problem = problem_of(with_positions(small_job(), 7), slice(first, first + 4))
+    plan = weighted(problem, WEIGHTS, plan_recursive(problem))
+    robot, pace, points = problem.cell.robot, problem.pace, problem.points
+    arc = np.abs(np.diff(points.arc_length)) / pace.feed
+    on = np.diff(points.pass_index) == 0
+    least = np.inf
+    for q, t in free_tracks(problem):
+        turned = np.abs(np.diff(q, axis=0))
+        sliding = np.abs(np.diff(t)) / pace.contact_speed
+        seconds = np.maximum(np.maximum(arc, sliding), (turned / robot.max_speed).max(axis=1))
+        total = np.ptp(q, axis=0).sum() + 0.5 * turned[on].sum() + 0.05 * seconds[on].sum()
+        least = min(least, total)
+    assert plan.weighted.lower_bound <= least + 1e-9
+    assert plan.weighted.value >= least - 1e-9
+
+
+def test_one_part_alone_has_the_bound_of_that_part():
+    problem = one_row()
+    only_range = weighted(problem, ObjectiveWeights(1.0, 0.0, 0.0), recursive(one_row))
+    ladders = [problem.ladder(nodes, problem.free_nodes(nodes)) for nodes in problem.field.branches]
+    nothing = np.empty(0, dtype=np.int64)
+    least = min(least_box(ladder, nothing).lower_bound for ladder in ladders)
+    assert only_range.weighted.lower_bound == pytest.approx(least, rel=2e-4)
+    only_travel = weighted(problem, ObjectiveWeights(0.0, 1.0, 0.0), recursive(one_row))
+    bound = shortest(problem, lambda a, b, *_: np.abs(b - a).sum(axis=1))
+    assert only_travel.weighted.lower_bound == pytest.approx(bound, abs=1e-9)
 
 
 # the tube around a path, and the calm box in it

@@ -21,6 +21,7 @@ from opl.planning.blocked_links import block_link
 from opl.planning.branch import Branch, Track, branches_of
 from opl.planning.check import Fault, find_faults
 from opl.planning.motion import FREE_MOVES, Motion, Stretch
+from opl.planning.objective import WeightedValue
 from opl.planning.path import BrokenStepError, GrindingPath, fill_in
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import explain
@@ -55,6 +56,7 @@ class Plan:
             smaller joint range sum, in [rad]; None if that was not asked.
         refinement: What contact positions between those of the field have gained; None if they were
             not tried.
+        weighted: The weighted sum that was kept small; None if that was not asked.
     """
 
     path: GrindingPath
@@ -62,6 +64,7 @@ class Plan:
     checks: int
     lower_bound: float | None = None
     refinement: Refinement | None = None
+    weighted: WeightedValue | None = None
 
     @property
     def gap(self) -> float | None:
