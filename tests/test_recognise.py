@@ -19,6 +19,7 @@ from opl.verification.between import frames_at, place_between
 from opl.verification.contact import Touches, contact_positions, find_touches, misfit
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import replay
+from opl.verification.ways import Ways
 
 RULE = Rule(
     1e-4, small_job().search.interpolation.max_contact_step, small_job().pace.approach_length
@@ -172,6 +173,22 @@ def test_what_goes_back_is_not_explained():
     assert (np.diff(found) >= 0.0).all()
     step = np.linalg.norm(np.diff(points.Ts_workpiece_cutter[3:5, :3, 3], axis=0))
     assert apart[1:3].sum() > 0.25 * step  # it went back by 0.3 of the step
+
+
+def test_of_several_touches_of_a_flat_the_one_is_taken_that_the_ways_around_bear():
+    problem = small_problem()
+    wheel, points = problem.cell.wheel, problem.points
+    # a flat slides off the wheel's flat onto its edge: it touches point 26 three times
+    place = [25.0, 25.9804, 25.9853, 25.9902, 26.0, 26.4, 27.0]
+    t = [-23.7, 24.696, 24.943, 25.190, 25.684, 27.5, 29.7]
+    found = find_touches(wheel, points, parts_at(wheel, points, place, t), 5e-5)
+    at = [int(k) for k in np.flatnonzero(found.point == 26)]
+    assert found.posture[at].tolist() == [1, 3, 4]
+    ends = [int(np.flatnonzero(found.point == n)[0]) for n in (25, 27)]
+    ways = Ways(wheel, points, parts_at(wheel, points, place, t), np.ones(7), found)
+    assert ways.between(at[0], ends[1]).farthest > 1e-4
+    settled = ways.settled(np.array([ends[0], at[0], ends[1]]), 1e-4)
+    assert found.posture[settled].tolist() == [0, 4, 6]
 
 
 def test_only_points_at_their_place_on_the_wheel_touch():

@@ -8,7 +8,7 @@ places that never go back and lie nearest to the contact model.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,9 @@ from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.motion import Motion, Stretch
 from opl.verification.align import align
-from opl.verification.between import place_between
 from opl.verification.contact import ALIGNED, Touches, find_touches
 from opl.verification.place import where
+from opl.verification.ways import Way, Ways
 from opl.verification.world import World
 
 # [m] that a posture may be off the contact model at the cutter point it grinds: what the digits of
@@ -86,8 +86,11 @@ def recognise(
     tolerance = min(AT_POINT, rule.max_contact_error)
     touches = find_touches(cell.wheel, points, Ts_contact0_workpiece[stations], tolerance)
     ground = align(touches, points.pass_index, tolerance, rule.max_contact_step)
+    touches = replace(touches, posture=stations[touches.posture])
+    ways = Ways(cell.wheel, points, Ts_contact0_workpiece, duration, touches)
+    ground = ways.settled(ground, rule.max_contact_error)
     labels = _Labels(cell, points, Ts_contact0_workpiece, rule)
-    labels.grind(touches, ground, stations, duration)
+    labels.grind(touches, ground, ways)
     return labels.recognition(q, duration)
 
 
@@ -109,15 +112,9 @@ class _Labels:
         self._also: dict[int, list[tuple[int, float]]] = {}  # more cutter points at a posture
         self._astray: list[tuple[int, float]] = []
 
-    def grind(
-        self,
-        touches: Touches,
-        ground: NDArray[np.intp],
-        stations: NDArray[np.intp],
-        duration: Array,
-    ) -> None:
+    def grind(self, touches: Touches, ground: NDArray[np.intp], ways: Ways) -> None:
         """Label everything, given which touches are the ground cutter points."""
-        posture, point = stations[touches.posture[ground]], touches.point[ground]
+        posture, point = touches.posture[ground], touches.point[ground]
         t = touches.contact_position[ground]
         pass_index = self._points.pass_index[point]
         for k, i, position in zip(posture, point, t, strict=True):
@@ -125,7 +122,8 @@ class _Labels:
                 self._also.setdefault(int(k), []).append((int(i), float(position)))
                 continue
             self._mark(k, Stretch.GRIND, self._points.pass_index[i], position, i)
-        self._fill_between(posture, point, t, np.diff(pass_index) == 0, duration)
+        for m in np.flatnonzero(np.diff(pass_index) == 0):
+            self._fill_in(ways.between(int(ground[m]), int(ground[m + 1])), int(pass_index[m]))
         first, last = self._lead_ins(posture, point, t, pass_index)
         self._name_the_air(first, last)
 
@@ -165,40 +163,13 @@ class _Labels:
         self._stretch[k], self._pass[k] = stretch, pass_index
         self._t[k], self._place[k] = t, place
 
-    def _fill_between(
-        self,
-        posture: NDArray[np.intp],
-        point: NDArray[np.intp],
-        t: Array,
-        goes_on: NDArray[np.bool_],
-        duration: Array,
-    ) -> None:
-        """Label the postures between those that grind cutter points.
-
-        Args:
-            posture: Those that do, shape (n,).
-            point: The cutter points, shape (n,).
-            t: The contact positions, shape (n,).
-            goes_on: After which of them the pass goes on, shape (n - 1,).
-            duration: Time of the move that ends at each posture in [s].
-        """
-        for m in np.flatnonzero(goes_on):
-            between = np.arange(posture[m] + 1, posture[m + 1])
-            if not len(between):
-                continue
-            place, position, apart = place_between(
-                self._wheel,
-                self._points,
-                self._Ts[between],
-                duration[between[0] : posture[m + 1] + 1],
-                (int(point[m]), int(point[m + 1])),
-                (float(t[m]), float(t[m + 1])),
-            )
-            for row, k in enumerate(between):
-                pass_index = int(self._points.pass_index[point[m]])
-                self._mark(k, Stretch.BETWEEN, pass_index, position[row], place[row])
-                if apart[row] > self._rule.max_contact_error:
-                    self._astray.append((int(k), float(apart[row])))
+    def _fill_in(self, way: Way, pass_index: int) -> None:
+        """Label the postures between two that grind cutter points."""
+        columns = (way.postures, way.place, way.contact_position, way.apart)
+        for k, place, t, apart in zip(*columns, strict=True):
+            self._mark(int(k), Stretch.BETWEEN, pass_index, t, place)
+            if apart > self._rule.max_contact_error:
+                self._astray.append((int(k), float(apart)))
 
     def _lead_ins(
         self,
