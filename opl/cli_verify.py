@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import click
 
 from opl.console import show_proof
+from opl.deliver import RESULT
 from opl.errors import InputError, UnsafeError
+from opl.findings import Finding
 from opl.job import Job, load
+from opl.proof.digest import changed_since, digests_in
 from opl.proof.prove import Proof, prove
 from opl.surfacing import cut_surface
 
@@ -28,7 +33,8 @@ def verify(job: Path, programs: tuple[Path, ...], as_json: bool, quiet: bool) ->
 
     Nothing is known of how it was planned: pulses or positions are turned back into postures, the
     moves made as the controller makes them, and what is ground is recognised from where the part
-    is. Give the master and all parts of a program that is split.
+    is. Give the master and all parts of a program that is split. Beside the result.json of its run,
+    a program must be what was written then to the last byte.
 
     Ends with status 0 if the program is proven, with 4 and the reasons if not.
 
@@ -36,11 +42,15 @@ def verify(job: Path, programs: tuple[Path, ...], as_json: bool, quiet: bool) ->
     """
     loaded = load(job)
     points = cut_surface(loaded).points
-    proof = prove(loaded, points, {str(path): _content(path) for path in programs})
+    files = {path: _content(path) for path in programs}
+    proof = prove(loaded, points, {str(path): content for path, content in files.items()})
+    changed, as_written = _compared_with_results(files)
+    proof = replace(proof, findings=(*proof.findings, *changed))
     if as_json:
-        click.echo(json.dumps(told(loaded, len(points), proof), indent=2))
+        found = {**told(loaded, len(points), proof), "as_written": as_written}
+        click.echo(json.dumps(found, indent=2))
     elif not quiet:
-        show_proof(loaded, points, proof)
+        show_proof(loaded, points, proof, as_written)
     if not proof.proven:
         raise UnsafeError("\n".join(["not proven", *map(str, proof.findings)]))
 
@@ -69,6 +79,21 @@ def told(job: Job, n_points: int, proof: Proof) -> dict[str, Any]:
             {"kind": one.kind, "where": one.where, "message": one.message} for one in proof.findings
         ],
     }
+
+
+def _compared_with_results(files: Mapping[Path, bytes]) -> tuple[list[Finding], bool | None]:
+    """Return what differs from what a run wrote, and whether all is as written; None if unknown."""
+    findings, known = [], True
+    for path, content in files.items():
+        try:
+            digests = digests_in((path.parent / RESULT).read_bytes())
+        except OSError:
+            digests = {}
+        if path.name in digests:
+            findings += changed_since(str(path), content, digests[path.name])
+        else:
+            known = False
+    return findings, False if findings else True if known else None
 
 
 def _content(path: Path) -> bytes:

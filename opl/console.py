@@ -176,8 +176,15 @@ def _certified(plan: Plan, n_positions: int) -> Iterator[str]:
         )
 
 
-def show_proof(job: Job, points: CutterPoints, proof: Proof) -> None:
-    """Print what was proven of a program, or how far the proof came."""
+def show_proof(job: Job, points: CutterPoints, proof: Proof, as_written: bool | None) -> None:
+    """Print what was proven of a program, or how far the proof came.
+
+    Args:
+        job: Its job.
+        points: The cutter points of the job.
+        proof: What was found out.
+        as_written: Whether the files are to the byte what a run proved; None if nobody can tell.
+    """
     console = _console()
     lines = [f"read {path}" for path in proof.files]
     lines += [f"calls {name}, which was not looked at" for name in proof.foreign]
@@ -197,6 +204,10 @@ def show_proof(job: Job, points: CutterPoints, proof: Proof) -> None:
             f"caution: the pulse ratios of {', '.join(job.cell.robot.unverified_pulses)} of "
             f"{job.cell.robot.title} are not verified; the proof rests on them"
         )
+    if as_written is None:
+        lines.append("no result.json beside it tells whether opl run wrote these very bytes")
+    elif as_written:
+        lines.append("to the last byte what opl run proved and wrote")
     lines.append("proven" if proof.proven else f"not proven: {len(proof.findings)} findings")
     for line in lines:
         console.print(line, markup=False)

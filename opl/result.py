@@ -14,6 +14,7 @@ from opl.planning.feed import SlowStretch
 from opl.planning.figures import Figures
 from opl.planning.objective import ObjectiveWeights, WeightedValue
 from opl.planning.plan import Plan, Refinement
+from opl.proof.digest import digest
 from opl.proof.read_back import FileProof
 
 MM = 1e3
@@ -230,6 +231,7 @@ def _program(outcome: Outcome) -> dict[str, Any] | None:
     assert verified is not None
     return {
         "files": list(outcome.files),
+        "sha256": {name: digest(text.encode()) for name, text in outcome.files.items()},
         "moves": len(outcome.program.moves),
         "duration_s": round(float(verified.motion.duration.sum()), 3),
         "passes": [

@@ -24,6 +24,7 @@ from opl.program.inform.playback import play
 from opl.program.inform.post import write_jobs
 from opl.program.profiles import DX200
 from opl.program.pulses import PulseScale
+from opl.proof.digest import digests_in
 
 # two rows of the V, few contact positions, long steps, and a home near the wheel
 FEW = {
@@ -162,6 +163,31 @@ def test_proven_and_written_postures_are_one():
 
 
 # the file tampered with
+
+
+def test_one_pulse_changed_by_one_is_found_beside_the_result_of_the_run(tmp_path):
+    """It moves the part by a hundredth of a millimetre: what the program says is proven still."""
+    for name in ("result.json", "V_SHAPE.JBI"):
+        shutil.copy(planned() / "out" / name, tmp_path)
+    job = planned() / "job.yaml"
+    told = json.loads(opl("verify", job, tmp_path / "V_SHAPE.JBI", "--json").out)
+    assert told["as_written"] is True and told["proven"] is True
+    number = ground(20)
+    text = Text()
+    pulses = text.pulses(number)
+    pulses[4] += 1
+    changed = text.put(number, pulses)
+    ended = verify(tmp_path, changed, job=job)
+    assert refuses(ended, "file at", "V_SHAPE.JBI", "not the bytes that opl run proved")
+    assert len(ended.err.splitlines()) == 2  # nothing else is wrong
+    (tmp_path / "result.json").unlink()
+    ended = verify(tmp_path, changed, job=job)
+    assert ended.status == 0 and "no result.json beside it" in ended.out
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"program": null}', '{"program": {"sha256": 3}}'])
+def test_a_result_that_tells_no_digests_vouches_for_nothing(content):
+    assert digests_in(content.encode()) == {}
 
 
 @pytest.mark.parametrize("joint", [0, 4, 5])
