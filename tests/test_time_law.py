@@ -114,7 +114,7 @@ def test_samples_keep_the_limits_and_the_law_is_no_faster_than_wanted(seed, at_r
     law = fastest_law(rounded_line(q, times), limits, at_rest)
     assert max(sampled_loads(law, limits)) <= 1.001
     assert (np.diff(law.node_times) >= times * (1.0 - 1e-9)).all()
-    assert max(law.speed_load.max(), law.acceleration_load.max()) <= 1.0 + 1e-6
+    assert max(law.speed_load.max(), law.acceleration_load.max()) <= 1.0 + 1e-4
     ends = law.postures(np.array([0.0, law.time[-1]]))
     np.testing.assert_allclose(ends, q[[0, -1]], atol=1e-9)
     if at_rest:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 from toppra.algorithm import TOPPRA
 from toppra.constraint import LinearConstraint
 from toppra.interpolator import AbstractGeometricPath
@@ -26,6 +27,7 @@ SAMPLE = 1e-3  # [s] between the samples at which a law is looked at again
 # Where on a straight piece the path speed may begin to change otherwise, from either end on.
 _GRADED = np.array([1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4])
 GRADES = np.concatenate([_GRADED, [1 / 2], 1.0 - _GRADED[::-1]])
+AROUND = 24  # places first taken on either side of what is too fast to be gone over evenly
 SHORT = 1e-3  # [s]: a straight piece not longer than this is halved only
 
 
@@ -107,13 +109,7 @@ def fastest_law(line: RoundedLine, limits: JointLimits, at_rest: bool) -> TimeLa
     place = _grid(whole, limits)
     slope = whole.slopes(place)
     bend = np.diff(slope, axis=0) / np.diff(place)[:, None]
-    pace = None
-    if not at_rest:
-        steady = np.ones(len(place))
-        loads = _loads(slope, bend, place, steady, limits)
-        pace = steady if max(load.max() for load in loads) <= 1.0 else None
-    if pace is None:
-        pace = _fastest_pace(place, slope, bend, limits)
+    pace = _pace(place, slope, bend, limits, at_rest)
     inside = slice(
         int(np.searchsorted(place, line.knots[0] - 1e-12)),
         int(np.searchsorted(place, line.knots[-1] - 1e-12)) + 1,
@@ -164,16 +160,57 @@ def _loads(
     return np.maximum(speed[:-1], speed[1:]), acceleration
 
 
-def _fastest_pace(place: Array, slope: Array, bend: Array, limits: JointLimits) -> Array:
+def _pace(place: Array, slope: Array, bend: Array, limits: JointLimits, at_rest: bool) -> Array:
+    """Return the highest pace at each place, shape (g,).
+
+    The whole pace is kept but around the pieces that do not allow it. They are solved one by one,
+    with as much before and after as it takes to come down to their pace and up again.
+    """
+    steady = np.ones(len(place))
+    hot = np.maximum(*_loads(slope, bend, place, steady, limits)).max(axis=1) > 1.0
+    hot[[0, -1]] |= at_rest
+    last, around = len(place) - 1, AROUND
+    while True:
+        near = maximum_filter1d(hot.astype(int), 2 * around + 1, mode="constant")
+        edges = np.flatnonzero(np.diff(near, prepend=0, append=0))
+        pace = steady.copy()
+        for start, end in edges.reshape(-1, 2):
+            part = slice(start, end + 1)
+            found = _fastest_pace(
+                place[part], slope[part], bend[start:end], limits, start > 0, end < last
+            )
+            if found is None:
+                break
+            pace[part] = found
+        else:
+            return pace
+        if around >= last:
+            raise UnsafeError(
+                "no time law keeps the joints' speeds and accelerations; raise "
+                "process.max_acceleration_deg_s2 if the robot can do more"
+            )
+        around = min(4 * around, last)
+
+
+def _fastest_pace(
+    place: Array, slope: Array, bend: Array, limits: JointLimits, enters: bool, leaves: bool
+) -> Array | None:
+    """Return the highest pace over some pieces, None if toppra finds none.
+
+    Args:
+        place: Where the pieces end, shape (g,).
+        slope: There, shape (g, 6).
+        bend: Of each piece, shape (g - 1, 6).
+        limits: What the joints can do.
+        enters: Whether it comes at the whole pace, not from rest.
+        leaves: Whether it goes on at the whole pace, not at rest.
+    """
     constraint = _Limits(place, slope, bend, limits)
     search = TOPPRA([constraint], _Place(place), gridpoints=place, solver_wrapper="seidel")
-    search.compute_parameterization(0.0, 0.0)
+    search.compute_parameterization(float(enters), float(leaves))
     pace = search.problem_data.sd_vec
     if pace is None or np.isnan(pace).any() or (np.maximum(pace[:-1], pace[1:]) <= 0.0).any():
-        raise UnsafeError(
-            "no time law keeps the joints' speeds and accelerations; raise "
-            "process.max_acceleration_deg_s2 if the robot can do more"
-        )
+        return None
     return np.asarray(pace)
 
 
