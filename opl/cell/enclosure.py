@@ -24,7 +24,7 @@ def enclosing_bodies(cell: WorkCell, q: Array) -> list[tuple[str, str]]:
     return [
         (name, body.name)
         for body in cell.obstacles
-        if isinstance(body.shape, TriangleMesh)
+        if isinstance(body.shape, TriangleMesh) and body.shape.is_closed
         for name, p_base in points.items()
         if abs(winding_number(body.shape, transform(inverse(body.T_parent_body), p_base))) > 0.5
     ]

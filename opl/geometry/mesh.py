@@ -58,6 +58,12 @@ class TriangleMesh:
         return self.vertices[self.faces]
 
     @property
+    def is_closed(self) -> bool:
+        """Return whether every edge belongs to an even number of triangles: there is an inside."""
+        edges = np.sort(self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        return bool((np.unique(edges, axis=0, return_counts=True)[1] % 2 == 0).all())
+
+    @property
     def volume(self) -> float:
         """Return the enclosed volume in [m^3], negative if the triangles face inwards."""
         a, b, c = np.moveaxis(self.triangles, 1, 0)
@@ -105,6 +111,25 @@ def load_triangles(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
         InputError: If the file cannot be read, has no triangles with an area, or if neighbouring
             triangles face opposite sides.
     """
+    mesh = load_shell(path, unit)
+    directed = mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    if len(np.unique(directed, axis=0)) < len(directed):
+        raise InputError(str(path), "has neighbouring triangles that face opposite sides")
+    return mesh
+
+
+def load_shell(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
+    """Read triangles that only stand in the way: they may be open, cross and face either side.
+
+    Corners at the same place become one vertex; triangles without area are left out.
+
+    Args:
+        path: The file.
+        unit: What one unit of the file is; mesh files do not say.
+
+    Raises:
+        InputError: If the file cannot be read or has no triangles with an area.
+    """
     mesh = _read(path)
     a, b, c = np.moveaxis(np.asarray(mesh.triangles), 1, 0)
     longest = np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=2).max(axis=0)
@@ -112,11 +137,7 @@ def load_triangles(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
     flat = twice_area <= _FLAT_AREA * longest**2
     if flat.all():
         raise InputError(str(path), "holds no triangle with an area")
-    faces = np.asarray(mesh.faces)[~flat]
-    directed = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    if len(np.unique(directed, axis=0)) < len(directed):
-        raise InputError(str(path), "has neighbouring triangles that face opposite sides")
-    return TriangleMesh(_METRES[unit] * np.asarray(mesh.vertices), faces)
+    return TriangleMesh(_METRES[unit] * np.asarray(mesh.vertices), np.asarray(mesh.faces)[~flat])
 
 
 def _read(path: Path) -> trimesh.Trimesh:

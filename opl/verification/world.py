@@ -191,7 +191,7 @@ class World:
         points = [np.array(state[4]), R_base_part @ self._cell.part.vertices[0] + held[0]]
         found = []
         for body in self._cell.obstacles:
-            if isinstance(body.shape, TriangleMesh):
+            if isinstance(body.shape, TriangleMesh) and body.shape.is_closed:
                 R, p = body.T_parent_body[:3, :3], body.T_parent_body[:3, 3]
                 corners = body.shape.vertices[body.shape.faces] @ R.T + p
                 if any(is_inside(corners, point) for point in points):
