@@ -13,6 +13,7 @@ import click
 
 from opl import __version__
 from opl import batch as batch_jobs
+from opl.cli_cell import cell
 from opl.cli_programs import show, templates
 from opl.cli_robots import robots
 from opl.cli_surfaces import faces, points
@@ -20,7 +21,9 @@ from opl.cli_verify import verify
 from opl.console import progress_bar, show_batch, show_check, show_outcome
 from opl.deliver import check_folder, deliver
 from opl.errors import InputError, NoPathError, OplError, UnsafeError
-from opl.job import JobFile, load
+from opl.job import load
+from opl.job_cell import CellFile
+from opl.job_file import JobFile
 from opl.job_search import Method
 from opl.outcome import Outcome
 from opl.pipeline import run
@@ -180,13 +183,14 @@ def init(directory: Path) -> None:
 
 
 @main.command()
-def schema() -> None:
+@click.option("--cell", "of_cells", is_flag=True, help="Of cell files instead.")
+def schema(of_cells: bool) -> None:
     """Print the JSON schema of job files, for editors that check YAML while one types.
 
     Example: opl schema > job.schema.json
     """
-    click.echo(json.dumps(JobFile.model_json_schema(), indent=2))
+    click.echo(json.dumps((CellFile if of_cells else JobFile).model_json_schema(), indent=2))
 
 
-for _command in (robots, show, templates, faces, points, verify):
+for _command in (cell, robots, show, templates, faces, points, verify):
     main.add_command(_command)

@@ -15,6 +15,7 @@ from rich.text import Text
 
 from opl.batch import Row
 from opl.cell.inverse import branch_name
+from opl.console_cell import cell_lines, wheel_lines
 from opl.console_times import told_times
 from opl.geometry.toolpath import CutterPoints
 from opl.job import Job
@@ -227,8 +228,14 @@ def show_check(job: Job, surfacing: Surfacing) -> None:
         f"{job.passes.max_bow_height * 1e3:g} mm",
         f"node matrix {n_points} x {job.search.n_contact_positions}, search "
         f"{job.search.method.value} for the least {job.search.objective.value}",
-        f"obstacles: {', '.join(body.name for body in cell.obstacles) or 'none'}",
     ]
+    around = job.around
+    if around.cell is not None:
+        lines.append(f"cell {around.cell.path}:")
+        lines += [f"  {line}" for line in cell_lines(around.cell)]
+    else:
+        lines += list(wheel_lines(cell.robot, around.placed))[1:]
+        lines.append(f"obstacles: {', '.join(body.name for body in cell.obstacles) or 'none'}")
     if cell.robot.unverified_pulses:
         lines.append(f"pulse ratios not verified: {', '.join(cell.robot.unverified_pulses)}")
     lines += [f"warning: {finding}" for finding in surfacing.warnings]

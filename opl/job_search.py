@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from opl.cell.robot import Robot
 from opl.documents import Document
+from opl.geometry.frames import Array
 from opl.planning.costs import Costs
 from opl.planning.objective import ObjectiveWeights
 from opl.planning.optimal import OptimalSettings
@@ -127,7 +128,7 @@ class ProcessSection(Document):
     """How fast the robot moves, and where it starts and ends."""
 
     feed_mm_s: Positive
-    home_deg: Six
+    home_deg: Six | None = None  # else the cell file says it
     approach_mm: Positive = 50.0
     approach_mm_s: Positive = 50.0
     air_speed_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 10.0
@@ -142,8 +143,8 @@ class ProcessSection(Document):
         limits = np.deg2rad(self.max_acceleration_deg_s2)
         return replace(robot, max_acceleration=limits, acceleration_assumed=False)
 
-    def in_si(self) -> Pace:
-        """Return the section's values."""
+    def in_si(self, home: Array) -> Pace:
+        """Return the section's values; home in [rad], shape (6,)."""
         return Pace(
             feed=self.feed_mm_s * MM,
             approach_length=self.approach_mm * MM,
@@ -151,7 +152,7 @@ class ProcessSection(Document):
             air_speed=self.air_speed_percent / 100.0,
             contact_speed=self.contact_speed,
             max_dwell=self.max_dwell_s,
-            home=np.deg2rad(self.home_deg),
+            home=home,
         )
 
 

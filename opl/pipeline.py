@@ -131,21 +131,20 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
         raise InputError(
             f"{job.path}: workpiece.surface",
             f"out of reach of {job.cell.robot.title} at every contact position: cutter points "
-            f"{runs_of(unreachable)} of {len(points)}; check wheel.T_base_contact0_mm and "
+            f"{runs_of(unreachable)} of {len(points)}; check {job.around.wheel_key} and "
             "fixture.T_flange_workpiece_mm",
         )
     inside = enclosing_bodies(job.cell, job.pace.home)
     if inside:
         pairs = ", ".join(" inside of ".join(pair) for pair in inside)
-        raise InputError(f"{job.path}: process.home_deg", f"at home one is in the other: {pairs}")
+        raise InputError(job.around.home_key, f"at home one is in the other: {pairs}")
     hits = [*scene.colliding_pairs(job.pace.home), *_part_near_wheel(job, part)]
     if hits:
         pairs = ", ".join(" and ".join(pair) for pair in hits)
-        raise InputError(
-            f"{job.path}: process.home_deg",
-            f"at home these are nearer to each other than {1e3 * job.cell.clearance:g} mm "
-            f"(clearance_mm) or collide: {pairs}",
-        )
+        needed = f"{1e3 * job.cell.clearance:g} mm (clearance_mm)"
+        needed += " or their own clearance" if job.cell.pairs.clearances else ""
+        told = f"at home these are nearer to each other than {needed} or collide: {pairs}"
+        raise InputError(job.around.home_key, told)
     return problem
 
 

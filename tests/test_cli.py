@@ -310,7 +310,8 @@ def schema_faults(schema, value, definitions, place=""):
     for choices in ("anyOf", "oneOf"):
         if choices in schema:
             found = [schema_faults(option, value, definitions, place) for option in schema[choices]]
-            return [] if [] in found else [f"{place}: fits no choice"]
+            if [] not in found:
+                return [f"{place}: fits no choice"]
     types = {
         "object": dict,
         "array": list,
@@ -322,8 +323,8 @@ def schema_faults(schema, value, definitions, place=""):
     }
     if "type" in schema and not isinstance(value, types[schema["type"]]):
         return [f"{place}: is no {schema['type']}"]
-    if isinstance(value, dict) and "properties" in schema:
-        known = schema["properties"]
+    if isinstance(value, dict) and {"properties", "required"} & schema.keys():
+        known = schema.get("properties", {})
         faults = [
             f"{place}.{key}: missing" for key in schema.get("required", []) if key not in value
         ]

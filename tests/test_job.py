@@ -98,12 +98,12 @@ def test_a_job_may_name_its_own_joint_accelerations(tmp_path):
         (
             {"wheel.colour": "red"},
             "wheel.colour: unknown key; known here: T_base_contact0_mm, contact_allowance_mm, "
-            "max_roll_deg, radius_mm, width_mm",
+            "max_roll_deg, pendant, radius_mm, touched, width_mm",
         ),
         (
             {"obstacles.0.colour": "red"},
-            "obstacles.0.colour: unknown key; known here: at_mm, box_mm, cylinder_mm, name, "
-            "rotation_deg",
+            "obstacles.0.colour: unknown key; known here: at_mm, box_mm, cylinder_mm, mesh, "
+            "mesh_unit, name, rotation_deg",
         ),
         ({"wheel.width_mm": 0}, "wheel.width_mm: must be more than 0, got 0"),
         ({"wheel.width_mm": -3}, "wheel.width_mm: must be more than 0, got -3"),
@@ -182,7 +182,7 @@ def test_a_unit_in_the_key_that_is_not_known_is_told_with_the_one_that_is(tmp_pa
         "2 faults",
         "  wheel.width_mm: is missing",
         "  wheel.width_cm: unknown key; known here: T_base_contact0_mm, contact_allowance_mm, "
-        "max_roll_deg, radius_mm, width_mm",
+        "max_roll_deg, pendant, radius_mm, touched, width_mm",
     ]
 
 

@@ -140,7 +140,7 @@ def test_collinear_points_are_refused():
         "right_edge": [-0.025 * line / np.linalg.norm(line)],
         "axle": [0.15 * line / np.linalg.norm(line)],
     }
-    with pytest.raises(TouchedError, match="mm from where the other points put it|leave open"):
+    with pytest.raises(TouchedError, match=r"mm from where the other points put it|leave open"):
         fit_touched(points, WIDTH, RADIUS, ALLOWED)
 
 

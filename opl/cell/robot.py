@@ -173,6 +173,16 @@ def controller_poses(robot: Robot, q: Array) -> Array:
     return robot.T_controller_base @ forward(robot, q)
 
 
+def link_names(robot: Robot) -> tuple[str, ...]:
+    """Return the links that carry its shapes, from the foot to the one with the flange."""
+    model = _model(robot.urdf)
+    bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
+    return tuple(
+        next(str(frame.name) for frame in bodies if frame.parentJoint == joint)
+        for joint in range(N_JOINTS + 1)
+    )
+
+
 @cache
 def _model(urdf: Path) -> pin.Model:
     return pin.buildModelFromUrdf(str(urdf))

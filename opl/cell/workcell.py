@@ -94,10 +94,11 @@ class WorkCell:
 
     def wheel_body(self) -> Body:
         """Return the wheel as a solid in the base frame: its axis is x of contact frame 0."""
-        axis_z_is_contact0_x = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-        T_contact0_axle = pose(axis_z_is_contact0_x, np.array([0.0, 0.0, self.wheel.radius]))
-        return Body(
-            WHEEL,
-            Cylinder(self.wheel.radius, self.wheel.width),
-            self.wheel.T_base_contact0 @ T_contact0_axle,
-        )
+        return wheel_solid(self.wheel, WHEEL)
+
+
+def wheel_solid(wheel: ContactWheel, name: str) -> Body:
+    """Return a wheel as a named cylinder in the base frame."""
+    axis_z_is_contact0_x = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    T_contact0_axle = pose(axis_z_is_contact0_x, np.array([0.0, 0.0, wheel.radius]))
+    return Body(name, Cylinder(wheel.radius, wheel.width), wheel.T_base_contact0 @ T_contact0_axle)

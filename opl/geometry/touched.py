@@ -97,7 +97,7 @@ def fit_touched(
     if strength[-1] < _FEEBLE:
         free = _WAYS[int(np.abs(directions[-1]).argmax())]
         raise TouchedError(f"the points leave open how far the wheel is {free} of contact frame 0")
-    worst = int(residuals.argmax())
+    worst = int(np.round(residuals, 9).argmax())  # of equal ones the first
     if residuals[worst] > largest_residual:
         told = ", ".join(
             f"{label} {1e3 * away:.2f}" for label, away in zip(rows.labels, residuals, strict=True)

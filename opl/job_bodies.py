@@ -1,0 +1,113 @@
+"""Bodies and poses as job and cell files give them: lengths in mm, angles in degrees."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import AfterValidator, Field, field_validator, model_validator
+
+from opl.cell.workcell import PART, WHEEL
+from opl.documents import Document
+from opl.errors import InputError
+from opl.geometry.frames import Array, NotARotationError, from_roll_pitch_yaw, nearest_pose
+from opl.geometry.mesh import TriangleMesh, load_shell
+from opl.geometry.shapes import Body, Box, Cylinder
+
+MM = 1e-3
+# [m] a body outside of this is one in the wrong unit
+SMALLEST, LARGEST = 1e-3, 100.0
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
+Six = Annotated[list[float], Field(min_length=6, max_length=6)]
+_Row = Annotated[list[float], Field(min_length=4, max_length=4)]
+
+
+def _proper(rows: list[list[float]]) -> list[list[float]]:
+    """Check a 4x4 matrix with its origin in mm, as a calibration prints it."""
+    try:
+        nearest_pose(np.array(rows))
+    except NotARotationError as error:
+        raise ValueError(f"{error}, at most 0.02 is taken for rounding") from error
+    return rows
+
+
+Matrix = Annotated[list[_Row], Field(min_length=4, max_length=4), AfterValidator(_proper)]
+
+
+def pose_of(matrix_mm: list[list[float]]) -> Array:
+    """Return the proper pose of a rounded matrix, its origin in [m]."""
+    matrix = np.array(matrix_mm)
+    matrix[:3, 3] *= MM
+    return nearest_pose(matrix)
+
+
+class BodySection(Document):
+    """A named solid."""
+
+    name: Annotated[str, Field(min_length=1)]
+    at_mm: Triple
+    rotation_deg: Triple = Field(default=[0.0, 0.0, 0.0])
+    box_mm: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = None
+    cylinder_mm: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None
+    mesh: str | None = None
+    mesh_unit: Literal["mm", "m"] | None = None
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> BodySection:
+        if sum(shape is not None for shape in (self.box_mm, self.cylinder_mm, self.mesh)) != 1:
+            raise ValueError(
+                "needs either box_mm (edges along x, y, z) or cylinder_mm (radius, length along z) "
+                "or mesh (a file)"
+            )
+        if (self.mesh is None) != (self.mesh_unit is None):
+            raise ValueError("mesh_unit, mm or m, goes with mesh: mesh files do not say their unit")
+        return self
+
+    @field_validator("name")
+    @classmethod
+    def _not_taken(cls, name: str) -> str:
+        if name in (PART, WHEEL):
+            raise ValueError("is the name of something else in the cell")
+        return name
+
+    def in_si(self, path: Path, key: str) -> Body:
+        """Return the body.
+
+        Args:
+            path: The file that it stands in.
+            key: Its place there.
+
+        Raises:
+            InputError: If its mesh cannot be used.
+        """
+        shape: Box | Cylinder | TriangleMesh
+        if self.box_mm is not None:
+            shape = Box((self.box_mm[0] * MM, self.box_mm[1] * MM, self.box_mm[2] * MM))
+        elif self.cylinder_mm is not None:
+            shape = Cylinder(*(edge * MM for edge in self.cylinder_mm))
+        else:
+            shape = self._load(path, key)
+        origin = np.array(self.at_mm) * MM
+        return Body(self.name, shape, from_roll_pitch_yaw(np.deg2rad(self.rotation_deg), origin))
+
+    def _load(self, path: Path, key: str) -> TriangleMesh:
+        try:
+            mesh = load_shell(path.parent / str(self.mesh), self.mesh_unit or "mm")
+        except InputError as error:
+            raise InputError(f"{path}: {key}.mesh", str(error)) from error
+        size = float(np.ptp(mesh.vertices, axis=0).max())
+        if not SMALLEST <= size <= LARGEST:
+            raise InputError(
+                f"{path}: {key}.mesh_unit",
+                f"{self.mesh_unit} makes {self.name} {size / MM:g} mm long, which nothing is",
+            )
+        return mesh
+
+
+def bodies_in_si(path: Path, key: str, bodies: list[BodySection]) -> tuple[Body, ...]:
+    """Return the bodies of a list; arguments and errors as of `BodySection.in_si`."""
+    return tuple(body.in_si(path, f"{key}.{place}") for place, body in enumerate(bodies))

@@ -1,0 +1,146 @@
+"""Pairs of bodies by the names that a cell file gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+
+from opl.cell.pairs import PairRules
+from opl.cell.workcell import PART, WHEEL
+from opl.errors import InputError
+
+ROBOT = "robot"  # every link
+FIXTURE = "fixture"  # every body of the job's own fixture
+
+Names = tuple[str, ...]
+Said = tuple[Names, float | None]  # None: may touch
+
+
+@dataclass(frozen=True)
+class PairNames:
+    """What there is to be named in a cell.
+
+    Attributes:
+        links: Links of the robot, from the foot to the flange.
+        held: Bodies of the gripper.
+        wheels: The wheels.
+        obstacles: What else stands around.
+        fixture: Bodies of the job's own fixture, once it is known.
+    """
+
+    links: Names
+    held: Names
+    wheels: Names
+    obstacles: Names
+    fixture: Names = ()
+
+    @property
+    def known(self) -> Names:
+        """Every name that a pair may be given by."""
+        own = (ROBOT, PART, FIXTURE, *self.held, *self.wheels, *self.obstacles)
+        return (*own, *self.links)
+
+    def meant(self, name: str) -> Names:
+        """Return the links or bodies that a name stands for."""
+        return {ROBOT: self.links, FIXTURE: self.fixture}.get(name, (name,))
+
+    def move_apart(self, first: str, second: str) -> bool:
+        """Return whether two links or bodies can move against each other, or share a bearing."""
+        places = sorted((self._place(first), self._place(second)))
+        if first in self.links and second in self.links:
+            return places[1] - places[0] > 1
+        return places[0] != places[1]
+
+    def _place(self, name: str) -> int:
+        """Return the link that a thing moves with, counted from the foot."""
+        if name in self.links:
+            return self.links.index(name)
+        return 0 if name in (*self.wheels, *self.obstacles) else len(self.links) - 1
+
+
+@dataclass(frozen=True)
+class SaidOfPairs:
+    """What a cell file says of pairs, by its own names.
+
+    Attributes:
+        names: What there is to be named.
+        said: Pairs and the distance to keep between them in [m], None if they may touch.
+    """
+
+    names: PairNames
+    said: tuple[Said, ...]
+
+    def rules(self, wheel: str, fixture: Names) -> PairRules:
+        """Return the rules by the names that collisions are told by.
+
+        What is said of a single pair goes before what is said of all links or the whole fixture.
+
+        Args:
+            wheel: The wheel that is picked.
+            fixture: The bodies of the job's own fixture.
+        """
+        names = replace(self.names, fixture=fixture)
+        needed: dict[frozenset[str], float | None] = {}
+        for pair, distance in sorted(self.said, key=lambda said: is_single(said[0])):
+            for both in product(*map(names.meant, pair)):
+                needed[frozenset(WHEEL if name == wheel else name for name in both)] = distance
+        return PairRules(
+            frozenset(pair for pair, distance in needed.items() if distance is None),
+            {pair: distance for pair, distance in needed.items() if distance is not None},
+        )
+
+
+def is_single(pair: Names) -> bool:
+    """Return whether both names stand for one body each."""
+    return not {ROBOT, FIXTURE} & set(pair)
+
+
+def said_of_pairs(
+    path: Path,
+    names: PairNames,
+    allowed: Sequence[Names],
+    clearances: Sequence[tuple[Names, float]],
+) -> SaidOfPairs:
+    """Check what a cell file says of pairs.
+
+    Args:
+        path: The cell file.
+        names: What there is to be named.
+        allowed: Of ``allowed_contacts``.
+        clearances: Of ``clearances``, in [m].
+
+    Raises:
+        InputError: If a name is unknown, or a pair is given twice or makes no sense.
+    """
+    said: list[tuple[str, Names, float | None]] = [
+        (f"allowed_contacts.{place}", pair, None) for place, pair in enumerate(allowed)
+    ]
+    said += [
+        (f"clearances.{place}.pair", pair, distance)
+        for place, (pair, distance) in enumerate(clearances)
+    ]
+    seen: dict[frozenset[str], str] = {}
+    for key, pair, distance in said:
+        where = f"{path}: {key}"
+        for name in pair:
+            if name not in names.known:
+                known = ", ".join(names.known)
+                raise InputError(where, f"no body {name!r} in the cell; have: {known}")
+        told, fault = " and ".join(pair), ""
+        if frozenset(pair) in seen:
+            fault = f"are given in {seen[frozenset(pair)]} already"
+        elif pair[0] == pair[1]:
+            fault = "are one and the same"
+        elif distance is None and PART in pair and set(pair) & set(names.wheels):
+            fault = "how deep a part may sink into the belt is the wheel's contact_allowance_mm"
+        elif distance is not None and is_single(pair) and not names.move_apart(*pair):
+            fault = (
+                "do not move against each other, or share a bearing: no distance between them is "
+                "looked at"
+            )
+        if fault:
+            raise InputError(where, f"{told}: {fault}")
+        seen[frozenset(pair)] = key
+    return SaidOfPairs(names, tuple((pair, distance) for _, pair, distance in said))
