@@ -66,7 +66,9 @@ def part_view(
         _draw_part(one, view, vertices, faces)
         facing = uncovered_normals @ view[2] > 0.0
         missed = MM * uncovered[facing] @ view.T
-        one.plot(missed[:, 0], missed[:, 1], "s", color=MISSED, markersize=1.3, zorder=1.5)
+        # as pixels: thousands of squares are more than some viewers of SVG take
+        squares: dict[str, Any] = {"color": MISSED, "markersize": 1.3, "rasterized": True}
+        one.plot(missed[:, 0], missed[:, 1], "s", zorder=1.5, **squares)
         _draw_passes(one, view, Ts_workpiece_cutter, pass_index, doubtful, numbered=key != "b")
         _draw_frames(one, view, Ts_workpiece_cutter, pass_index, size)
         one.autoscale_view()
