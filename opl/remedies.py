@@ -17,15 +17,20 @@ from opl.planning.layer import wheel_layer
 from opl.planning.nodes import build_nodes
 from opl.planning.plan import try_recursive
 from opl.planning.problem import GrindingProblem
+from opl.planning.reasons import free_at
 from opl.planning.starts import Start
 
 MM = 1e3
-MOST_CHECKS = 30  # of motions for each change: more would be no easy remedy
+# the work is bounded by counts, so that the same job always gets the same answer
+MOST_CHECKS = 10  # of motions for each change: more would be no easy remedy
+MOST_IN_ALL = 60  # of motions for all changes together
+ASKED_COLUMNS = 8  # cutter points that must have a free posture before a change is planned again
 
 # smallest first: of each kind the first that opens the job is told
 MORE_ROLL_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)
 OTHER_WIDTH_MM = (-5.0, 10.0, -10.0, -20.0, 25.0, -30.0)
 MORE_ALLOWANCE_MM = (0.25, 0.5, 1.0, 2.0)
+ROUND_THE_RIM_DEG = (15.0, -15.0, 30.0, -30.0, 60.0, -60.0, 90.0, -90.0, 180.0)
 TURNED_FIXTURE_DEG = (10.0, -10.0, 20.0, -20.0, 45.0, -45.0, 90.0, -90.0, 180.0)
 
 Change = tuple[str, WorkCell]
@@ -37,21 +42,40 @@ def find_remedies(job: Job, points: CutterPoints) -> list[str]:
     Args:
         job: A job for which no path was found.
         points: Its cutter points.
+
+    Returns:
+        A line for each kind of change that helps; where the tries ended early, one that says so.
     """
     kinds: list[Callable[[WorkCell], Iterator[Change]]] = [
         _more_roll,
         _other_width,
         _more_allowance,
+        _other_side,
+        _fed_the_other_way,
         _turned_fixture,
     ]
+    columns = np.unique(np.linspace(0, len(points) - 1, ASKED_COLUMNS).astype(int))
+    some = CutterPoints(
+        points.Ts_workpiece_cutter[columns],
+        np.zeros(len(columns), dtype=np.int64),
+        points.arc_length[columns],
+    )
     found = []
+    left = MOST_IN_ALL
     for kind in kinds:
         for told, cell in kind(job.cell):
-            total = _plan_again(job, cell, points)
-            if total is not None:
+            if not _open_at(_changed(job, cell, some)):
+                continue
+            if left <= 0:
+                found.append(f"not all changes were tried: {MOST_IN_ALL} motions were checked")
+                return found
+            problem = _changed(job, cell, points)
+            plan = try_recursive(problem, Start.BEST, min(MOST_CHECKS, left))
+            left -= min(MOST_CHECKS, left) if plan is None else plan.checks
+            if plan is not None:
                 found.append(
                     f"would be possible with {told} (planned again: joint range sum "
-                    f"{total:.3f} rad, not verified)"
+                    f"{plan.path.joint_range_sum:.3f} rad, not verified)"
                 )
                 break
     return found
@@ -81,6 +105,31 @@ def _more_allowance(cell: WorkCell) -> Iterator[Change]:
         yield told, replace(cell, contact_allowance=(now + more) / MM)
 
 
+def _other_side(cell: WorkCell) -> Iterator[Change]:
+    """Grind elsewhere on the rim: contact frame 0 turned about the axle of the wheel."""
+    axle = np.array([0.0, 0.0, cell.wheel.radius])  # a point of it in contact frame 0
+    for turn in ROUND_THE_RIM_DEG:
+        T_contact0_turned = from_roll_pitch_yaw(np.deg2rad([turn, 0.0, 0.0]), axle)
+        T_contact0_turned[:3, 3] -= T_contact0_turned[:3, :3] @ axle
+        T_base_contact0 = cell.wheel.T_base_contact0 @ T_contact0_turned
+        told = (
+            f"the contact on another side of the wheel, {turn:g} degrees round its rim "
+            "(wheel.T_base_contact0_mm turned about the axle)"
+        )
+        yield told, replace(cell, wheel=replace(cell.wheel, T_base_contact0=T_base_contact0))
+
+
+def _fed_the_other_way(cell: WorkCell) -> Iterator[Change]:
+    """Hold the part the other way round against the belt: the frame turned about its normal."""
+    T_contact0_turned = from_roll_pitch_yaw(np.array([0.0, 0.0, np.pi]), np.zeros(3))
+    T_base_contact0 = cell.wheel.T_base_contact0 @ T_contact0_turned
+    told = (
+        "the part fed the other way across the wheel (wheel.T_base_contact0_mm turned 180 degrees "
+        "about its z)"
+    )
+    yield told, replace(cell, wheel=replace(cell.wheel, T_base_contact0=T_base_contact0))
+
+
 def _turned_fixture(cell: WorkCell) -> Iterator[Change]:
     for turn in TURNED_FIXTURE_DEG:
         about_z = np.array([0.0, 0.0, np.deg2rad(turn)])
@@ -89,11 +138,11 @@ def _turned_fixture(cell: WorkCell) -> Iterator[Change]:
         yield told, replace(cell, T_flange_workpiece=T_flange_turned @ cell.T_flange_workpiece)
 
 
-def _plan_again(job: Job, cell: WorkCell, points: CutterPoints) -> float | None:
-    """Return the joint range sum in [rad] that a changed cell permits, None if there is no path."""
+def _changed(job: Job, cell: WorkCell, points: CutterPoints) -> GrindingProblem:
+    """Return what is to be planned in a changed cell."""
     positions = cell.wheel.positions(job.search.n_contact_positions)
     part = part_tree(cell.part)
-    problem = GrindingProblem(
+    return GrindingProblem(
         cell,
         CollisionScene(cell),
         part,
@@ -103,10 +152,9 @@ def _plan_again(job: Job, cell: WorkCell, points: CutterPoints) -> float | None:
         job.search.interpolation,
         job.pace,
     )
-    open_everywhere = (
-        problem.free_nodes(nodes).any(axis=1).all() for nodes in problem.field.branches
-    )
-    if not any(open_everywhere):
-        return None
-    plan = try_recursive(problem, Start.BEST, MOST_CHECKS)
-    return None if plan is None else plan.path.joint_range_sum
+
+
+def _open_at(problem: GrindingProblem) -> bool:
+    """Return whether each cutter point has a free posture, all of them on one branch at least."""
+    every = (problem.free_nodes(nodes).any(axis=1).all() for nodes in problem.field.branches)
+    return any(every) and all(free_at(problem, column) for column in range(len(problem.points)))

@@ -36,7 +36,7 @@ def explain(problem: GrindingProblem, reached: int, causes: Counter[tuple[int, s
         One line for each run of cutter points where no posture is free; if there is none, lines on
         the cutter points where the search ended.
     """
-    shut = np.array([not _free_at(problem, column) for column in range(len(problem.points))])
+    shut = np.array([not free_at(problem, column) for column in range(len(problem.points))])
     if not shut.any():
         return _where_it_ended(problem, reached, causes)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], shut, [False]]).astype(int)))
@@ -47,7 +47,7 @@ def explain(problem: GrindingProblem, reached: int, causes: Counter[tuple[int, s
     return lines
 
 
-def _free_at(problem: GrindingProblem, column: int) -> bool:
+def free_at(problem: GrindingProblem, column: int) -> bool:
     """Return whether any node of a column is free of limits, wheel and robot collisions."""
     for nodes in problem.field.branches:
         free = problem.free_nodes(nodes)[column]
