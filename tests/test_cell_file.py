@@ -1,6 +1,7 @@
 """Cell files: what they say, what is refused, and the same job on arm after arm."""
 
 import copy
+import csv
 import json
 import shutil
 
@@ -513,3 +514,22 @@ def test_the_same_job_in_the_same_cell_on_another_arm(robot, tmp_path):
     assert result["robot"]["name"] == robot
     assert result["verification"]["collisions"] == 0
     assert result["verification"]["limit_violations"] == 0
+
+
+def test_a_program_that_breaks_a_limit_of_the_cell_is_not_proven(tmp_path):
+    job = write_both(tmp_path)
+    ended = opl("run", job, "--out", tmp_path / "out", "--quiet")
+    assert ended.status == 0, ended.err
+    program = tmp_path / "out" / "V_SHAPE.JBI"
+    with (tmp_path / "out" / "V_SHAPE.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    wound = [float(row["R_deg"]) + float(row["T_deg"]) for row in rows]
+    home, far = wound[0], max(wound, key=lambda angle: abs(angle - wound[0]))
+    assert abs(far - home) > 10.0
+    for beyond, status in ((1.0, 0), (-1.0, 4)):
+        ends = sorted((home - np.sign(far - home) * 5.0, far + np.sign(far - home) * beyond))
+        limit = {"lower_deg": float(ends[0]), "upper_deg": float(ends[1])}
+        write_cell(tmp_path, {"coupled_limits": [{"coefficients": {"R": 1, "T": 1}, **limit}]})
+        ended = opl("verify", job, program)
+        assert ended.status == status, ended.err
+        assert ("R+T: " in ended.err) == (status == 4)
