@@ -165,6 +165,9 @@ def _certified(plan: Plan, n_positions: int) -> Iterator[str]:
         )
     if plan.lower_bound is None or plan.gap is None:
         return
+    if plan.lower_bound <= 0.0:
+        yield "the time was up before anything was proven of the least joint range sum there is"
+        return
     yield (
         f"no path through these points at {n_positions} contact positions has a joint range sum "
         f"below {plan.lower_bound:.4f} rad: the one found is within {100.0 * plan.gap:.3f} % of "

@@ -12,9 +12,9 @@ from pydantic import Field, model_validator
 from opl.cell.robot import Robot
 from opl.documents import Document
 from opl.geometry.frames import Array
+from opl.planning.box_search import OptimalSettings
 from opl.planning.costs import Costs
 from opl.planning.objective import ObjectiveWeights
-from opl.planning.optimal import OptimalSettings
 from opl.planning.path import Interpolation
 from opl.planning.starts import Start
 from opl.planning.timing import Pace
