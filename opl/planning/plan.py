@@ -20,6 +20,7 @@ from opl.planning.air import BlockedLinkError, UnreachableApproachError, linked,
 from opl.planning.blocked_links import block_link
 from opl.planning.branch import Branch, Track, branches_of
 from opl.planning.check import Fault, find_faults
+from opl.planning.impasse import shortest_impasse
 from opl.planning.motion import FREE_MOVES, Motion, Stretch
 from opl.planning.objective import WeightedValue
 from opl.planning.path import BrokenStepError, GrindingPath, fill_in
@@ -198,7 +199,7 @@ def no_path(problem: GrindingProblem, branches: list[Branch]) -> NoPathError:
     for branch in branches:
         causes.update(branch.causes)
     n = len(problem.points)
-    reasons = explain(problem, reached, causes)
+    reasons = explain(problem, reached, causes, shortest_impasse(branches))
     if reached == 0:
         return NoPathError(
             f"no path: no free posture at cutter point 0 (0 of {n} reached)", reasons

@@ -9,6 +9,7 @@ import numpy as np
 
 from opl.cell.inverse import turns
 from opl.cell.workcell import PART, WHEEL
+from opl.planning.impasse import Impasse
 from opl.planning.problem import GrindingProblem
 
 
@@ -24,13 +25,19 @@ MOST_POSITIONS = 30
 MOST_ENDS = 3  # cutter points told of, where tracks came through but none was free
 
 
-def explain(problem: GrindingProblem, reached: int, causes: Counter[tuple[int, str]]) -> list[str]:
+def explain(
+    problem: GrindingProblem,
+    reached: int,
+    causes: Counter[tuple[int, str]],
+    impasse: Impasse | None = None,
+) -> list[str]:
     """Say at which cutter points nothing is free, and why.
 
     Args:
         problem: What was to be planned.
         reached: Number of cutter points the search came through.
         causes: How often the search met each cause, by cutter point.
+        impasse: The shortest run of cutter points that no track leads through, if there is one.
 
     Returns:
         One line for each run of cutter points where no posture is free; if there is none, lines on
@@ -38,7 +45,7 @@ def explain(problem: GrindingProblem, reached: int, causes: Counter[tuple[int, s
     """
     shut = np.array([not free_at(problem, column) for column in range(len(problem.points))])
     if not shut.any():
-        return _where_it_ended(problem, reached, causes)
+        return _where_it_ended(problem, reached, causes, impasse)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], shut, [False]]).astype(int)))
     runs = list(zip(edges[::2], edges[1::2] - 1, strict=True))
     lines = [_describe_run(problem, int(first), int(last)) for first, last in runs[:MOST_RUNS]]
@@ -102,23 +109,34 @@ def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
 
 
 def _where_it_ended(
-    problem: GrindingProblem, reached: int, causes: Counter[tuple[int, str]]
+    problem: GrindingProblem,
+    reached: int,
+    causes: Counter[tuple[int, str]],
+    impasse: Impasse | None,
 ) -> list[str]:
     """Every cutter point has a free posture: say what stopped the steps between them."""
     lines = []
     near: Sequence[int] = range(max(reached - 2, 0), min(reached + 1, len(problem.points)))
+    if impasse is not None:
+        first, last = impasse.first, impasse.last
+        run = f"cutter point {first}" if first == last else f"cutter points {first} to {last}"
+        lines.append(
+            f"{run}: the shortest run that cannot be passed, on the branch that came farthest"
+        )
+        near = range(first, last + 1)
     if reached == len(problem.points):  # it came through: what counts is what it met most often
         met_at = Counter[int]()
         for (column, _), count in causes.items():
             met_at[column] += count
         near = sorted(sorted(met_at, key=lambda column: (-met_at[column], column))[:MOST_ENDS])
+    told_of = len(lines)
     for column in near:
         met = [(cause, count) for (where, cause), count in causes.items() if where == column]
         met.sort(key=lambda item: (-item[1], item[0]))
         if met:
             told = ", ".join(f"{cause} ({count} times)" for cause, count in met[:4])
             lines.append(f"cutter point {column}: steps refused: {told}")
-    if not lines:
+    if len(lines) == told_of:
         lines.append(
             "no continuous step leads on: the arm would have to change its branch or jump; "
             "a wider range of contact positions or a turned fixture may help"
