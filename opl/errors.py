@@ -47,6 +47,10 @@ class NoPathError(OplError):
         self.reasons = tuple(reasons)
 
 
+class NoWayError(NoPathError):
+    """Paths on the wheel there are, but no way through the air leads to one, on or back home."""
+
+
 class UnsafeError(OplError):
     """A motion was planned but could not be proven safe, so no program was written."""
 

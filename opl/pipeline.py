@@ -11,7 +11,7 @@ from opl.cell.collision import CollisionScene
 from opl.cell.enclosure import enclosing_bodies
 from opl.cell.robot import forward
 from opl.cell.workcell import PART, WHEEL
-from opl.errors import InputError, NoPathError
+from opl.errors import InputError, NoPathError, NoWayError
 from opl.export import draw, job_date, write_program
 from opl.geometry.toolpath import CutterPoints
 from opl.job import Job
@@ -59,6 +59,8 @@ def run(job: Job, progress: Progress = lambda stage, fraction: None) -> Outcome:
             outcome.plan = plan = search_path(outcome, problem)
     except NoPathError as error:
         outcome.status, outcome.refusal = "no_path", error
+        if isinstance(error, NoWayError):
+            return outcome  # on the wheel nothing has to change
         with clock("remedies"):
             outcome.remedies = find_remedies(job, points)
         return outcome

@@ -104,9 +104,15 @@ def cage():
 
 def test_a_home_that_nothing_leads_out_of_is_refused_and_the_pair_named(tmp_path, monkeypatch):
     monkeypatch.setattr("opl.planning.links.MOST_ASKED", 3000)
-    monkeypatch.setattr("opl.pipeline.find_remedies", lambda job, points: [])
     job = write_job(tmp_path / "j", {**with_bodies(*cage()), "process.home_deg": SIDEWAYS})
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 3
-    assert "way from home: " in ended.err
-    assert "and cage " in ended.err
+    told = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    message, *ways, advice = told["reasons"]
+    assert message.endswith("there is no way through the air")
+    assert ways[0].startswith("way from home: ")
+    assert " and cage " in ways[0]
+    assert advice.startswith("would help: another home posture, or cage ")
+    assert all(line in ended.err for line in told["reasons"])
+    # nothing at the wheel is to blame, so nothing there was tried
+    assert told["remedies"] == []

@@ -36,7 +36,11 @@ def block_link(
     index = int(motion.pass_index[move])
     column = len(rows) if index < 0 else int(np.argmax(problem.points.pass_index == index))
     between = motion.stretch[move] is Stretch.LINK
-    cause = f"{error}" if between else f"{'way home' if index < 0 else 'way from home'}: {error}"
+    way = "way between passes" if between else "way home" if index < 0 else "way from home"
+    cause = f"{error}" if between else f"{way}: {error}"
+    home_end = None if between else int(index < 0)
+    if error.end in (None, home_end):
+        branch.cut_off[way, error.pair] += 1
     before, after = column - 1, column  # the cutter points on either side of the link
     if between and error.end == 0:
         branch.block_node(before, int(rows[before]), f"retract: {cause}")

@@ -9,6 +9,7 @@ import numpy as np
 
 from opl.cell.collision import CollisionScene
 from opl.planning.ladder import Ladder
+from opl.planning.links import Blocker
 from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
 
@@ -36,6 +37,8 @@ class Branch:
         free: Which nodes may be used; shrinks, shape (n_columns, n_rows).
         blocked: Keys of the steps that may not be used; grows.
         causes: How often each cause blocked something, by cutter point.
+        cut_off: How many tracks, otherwise free, were refused for a way through the air: by which
+            way, and the pair that is in it.
         reached: Largest number of columns that a search passed.
     """
 
@@ -44,6 +47,7 @@ class Branch:
     free: np.ndarray
     blocked: set[int] = field(default_factory=set)
     causes: Counter[tuple[int, str]] = field(default_factory=Counter)
+    cut_off: Counter[tuple[str, Blocker]] = field(default_factory=Counter)
     reached: int = 0
     _swept: set[int] = field(default_factory=set)
 

@@ -15,7 +15,7 @@ from itertools import islice
 import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
-from opl.errors import NoPathError
+from opl.errors import NoPathError, NoWayError
 from opl.planning.air import BlockedLinkError, UnreachableApproachError, linked, whole_motion
 from opl.planning.blocked_links import block_link
 from opl.planning.branch import Branch, Track, branches_of
@@ -25,7 +25,7 @@ from opl.planning.motion import FREE_MOVES, Motion, Stretch
 from opl.planning.objective import WeightedValue
 from opl.planning.path import BrokenStepError, GrindingPath, fill_in
 from opl.planning.problem import GrindingProblem
-from opl.planning.reasons import explain
+from opl.planning.reasons import explain, explain_air
 from opl.planning.starts import Start, tracks_from_best_start, tracks_from_nearest_start
 from opl.planning.symmetry import twins
 
@@ -85,7 +85,8 @@ def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
         start: Which start nodes to try.
 
     Raises:
-        NoPathError: If there is none; says where it ends and why.
+        NoWayError: If nothing but its ways through the air stops the motion of some path.
+        NoPathError: If there is none for another reason; says where it ends and why.
     """
     branches = branches_of(problem)
     plan = _first_free(problem, branches, _tracks(problem, branches, start))
@@ -194,6 +195,12 @@ def _block(
 
 def no_path(problem: GrindingProblem, branches: list[Branch]) -> NoPathError:
     """Return the error that says how far the searches came and what stopped them."""
+    cut_off = sum((branch.cut_off for branch in branches), Counter())
+    if cut_off:
+        return NoWayError(
+            "no path: the passes can be ground, but there is no way through the air",
+            explain_air(problem.cell, cut_off),
+        )
     reached = max((branch.reached for branch in branches), default=0)
     causes: Counter[tuple[int, str]] = Counter()
     for branch in branches:

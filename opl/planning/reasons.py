@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from opl.cell.inverse import turns
-from opl.cell.workcell import PART, WHEEL
+from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.planning.impasse import Impasse
+from opl.planning.links import Blocker
 from opl.planning.problem import GrindingProblem
 
 
@@ -22,6 +23,7 @@ MOST_RUNS = 8  # of cutter points told one by one; a hundred lines would hide th
 # of a run that are asked what stops them; their shares change little with more
 MOST_COLUMNS = 8
 MOST_POSITIONS = 30
+MOST_WAYS = 3  # blocked ways through the air told of
 MOST_ENDS = 3  # cutter points told of, where tracks came through but none was free
 
 
@@ -51,6 +53,24 @@ def explain(
     lines = [_describe_run(problem, int(first), int(last)) for first, last in runs[:MOST_RUNS]]
     if len(runs) > MOST_RUNS:
         lines.append(f"and {len(runs) - MOST_RUNS} more runs of cutter points")
+    return lines
+
+
+def explain_air(cell: WorkCell, cut_off: Counter[tuple[str, Blocker]]) -> list[str]:
+    """Say which ways through the air are blocked, by what, and what would help.
+
+    Args:
+        cell: The cell.
+        cut_off: How many tracks were refused for each way and pair in it; not empty.
+    """
+    met = sorted(cut_off.items(), key=lambda item: (-item[1], item[0]))[:MOST_WAYS]
+    lines = [f"{way}: {' and '.join(pair)} ({count} times)" for (way, pair), count in met]
+    from_or_to_home = any("home" in way for (way, _), _ in met)
+    movable = {body.name for body in cell.obstacles}
+    elsewhere = sorted({name for (_, pair), _ in met for name in pair if name in movable})
+    helps = ["another home posture"] if from_or_to_home else ["a longer approach"]
+    helps += [f"{name} elsewhere or smaller" for name in elsewhere]
+    lines.append(f"would help: {', or '.join(helps)}; no change of wheel or fixture was tried")
     return lines
 
 
