@@ -17,10 +17,9 @@ from opl.cell.workcell import PART, SECOND_OPINION, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.planning.check import RESOLUTION, densify
 
-# [m] a piece may be as long as to move no point farther than this from its middle; where a distance
-# beyond the clearance smaller than the last would be needed, postures are asked that near together
-RESERVES = (0.064, 0.016, 0.004, 0.001)
-FINEST = 0.00025
+# [m] a piece may be as long as to move no point farther than this from its middle; what would need
+# a distance beyond the clearance smaller than the last is taken to be too near
+RESERVES = (0.064, 0.016, 0.004, 0.001, 0.00025, 0.00005)
 # the part as spheres around its pieces and as corners of it, to see soon that it is far from the
 # wheel, or near
 MOST_SPHERES = 32
@@ -45,8 +44,7 @@ class FreeMoves:
         corners = part.triangles.reshape(-1, 3)
         self._corners = corners[:: max(len(corners) // MOST_CORNERS, 1)]
         self._wider = {
-            reserve: scene.against_surroundings(SECOND_OPINION + reserve)
-            for reserve in (0.0, *RESERVES)
+            reserve: scene.against_surroundings(SECOND_OPINION + reserve) for reserve in RESERVES
         }
 
     def free(self, start: Array, end: Array) -> bool:
@@ -68,17 +66,16 @@ class FreeMoves:
             pieces = pieces[self._near(start, end, pieces, reserve)]
             if not len(pieces):
                 return True
-        pieces = _cut(pieces, 2.0 * FINEST / max(way, FINEST))
-        return not self._near(start, end, pieces, 0.0).any()
+        return False
 
     def pair_at(self, q: Array) -> Pair | None:
         """Return the first pair that is too near at a posture, shape (6,), or None."""
-        if self._too_near_wheel(q[None], 0.0)[0]:
+        if self._too_near_wheel(q[None], RESERVES[-1])[0]:
             return PART, WHEEL
         return next(
             (
                 pair
-                for scene in (self._scene, self._wider[0.0])
+                for scene in (self._scene, self._wider[RESERVES[-1]])
                 for pair in scene.colliding_pairs(q)
             ),
             None,
