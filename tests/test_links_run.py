@@ -15,8 +15,9 @@ from scipy.spatial.transform import Rotation
 from test_links import margin_along
 
 from opl.cell.robot import forward, load_robot
+from opl.deliver import deliver
 from opl.job import load
-from opl.pipeline import cutter_points, pose_problem
+from opl.pipeline import cutter_points, pose_problem, run
 from opl.planning.plan import plan_recursive
 
 # a plate of the machine's frame above the wheel, across the straight way from home
@@ -42,10 +43,12 @@ def with_bodies(*bodies):
 
 @cache
 def under_the_hood():
-    """Run the job under the hood; return how it ended, the job file and the folder."""
+    """Run the job under the hood; return what became of it, the job file and the folder."""
     home = Path(mkdtemp())
     job = write_job(home / "j", {**with_bodies(HOOD), **BACK_UNDER_IT})
-    return opl("run", job, "--out", home / "out"), job, home / "out"
+    outcome = run(load(job))
+    deliver(outcome, home / "out")
+    return outcome, job, home / "out"
 
 
 def table(folder):
@@ -58,8 +61,7 @@ def table(folder):
 
 
 def test_a_frame_across_the_straight_way_is_led_around_and_proven():
-    ended, _, out = under_the_hood()
-    assert ended.status == 0, ended.err
+    _, _, out = under_the_hood()
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
     assert result["status"] == "ok"
     assert result["verification"]["collisions"] == 0
@@ -69,11 +71,11 @@ def test_a_frame_across_the_straight_way_is_led_around_and_proven():
 
 
 def test_a_plate_between_two_passes_is_led_around():
-    _, job, out = under_the_hood()
+    outcome, _, out = under_the_hood()
     kinds, q = table(out)
     first, last = kinds.index("link") - 1, len(kinds) - 1 - kinds[::-1].index("link")
     assert kinds[first] == "retract" and set(kinds[first + 1 : last + 1]) == {"link"}
-    way, cell = q[first : last + 1], load(job).cell
+    way, cell = q[first : last + 1], outcome.job.cell
     assert len(way) > 2
     assert margin_along(cell, way[[0, -1]], 2.0) < 0.0
     assert margin_along(cell, way, 2.0) > 0.0
@@ -86,14 +88,14 @@ def test_a_program_with_postures_on_the_way_is_read_back_and_proven():
 
 
 def planned(job):
-    """Return the postures of the motion of a job, as bytes."""
+    """Return the postures of the motion of a job, as bytes; for another process."""
     loaded = load(Path(job))
     problem = pose_problem(loaded, cutter_points(loaded), lambda stage: nullcontext())
     return plan_recursive(problem, loaded.search.start).motion.q.tobytes()
 
 
 def test_another_process_finds_the_same_ways():
-    _, job, _ = under_the_hood()
+    outcome, job, _ = under_the_hood()
     script = (
         "import sys; sys.path.insert(0, 'tests'); import test_links_run as t;"
         f"print(t.planned({str(job)!r}).hex())"
@@ -101,7 +103,7 @@ def test_another_process_finds_the_same_ways():
     told = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     ).stdout
-    assert bytes.fromhex(told) == planned(job)
+    assert bytes.fromhex(told) == outcome.plan.motion.q.tobytes()
 
 
 def cage():
