@@ -17,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
-from opl.job import load
+from opl.job.load import load
 from opl.outcome import Outcome
 from opl.pipeline import cutter_points, pose_problem
-from opl.planning.ladder import Ladder
-from opl.planning.smooth import Roughness, smoothest
+from opl.search.ladder import Ladder
+from opl.search.smooth import Roughness, smoothest
 from opl.searches import search_path
 
 WORKPIECES = Path(__file__).resolve().parent.parent / "workpieces"

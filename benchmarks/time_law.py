@@ -13,8 +13,8 @@ import time
 import numpy as np
 
 from opl.cell.robot import load_robot
-from opl.planning.rounded import rounded_line
-from opl.planning.time_law import JointLimits, fastest_law
+from opl.motion.rounded import rounded_line
+from opl.motion.time_law import JointLimits, fastest_law
 
 N_POINTS = 1000
 STEP = 0.05  # [s] at the feed between two points

@@ -14,7 +14,7 @@ from opl import documents
 from opl.cell.clearance import use_threads
 from opl.deliver import deliver
 from opl.errors import InputError, NoPathError, OplError, UnsafeError
-from opl.job import load
+from opl.job.load import load
 from opl.pipeline import run
 from opl.result import reasons, result
 

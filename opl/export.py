@@ -9,8 +9,8 @@ import numpy as np
 
 from opl.errors import InputError
 from opl.geometry.frames import transform
+from opl.motion.motion import VerifiedMotion
 from opl.outcome import Outcome
-from opl.planning.motion import VerifiedMotion
 from opl.planning.problem import GrindingProblem
 from opl.planning.states import NodeState, node_states
 from opl.program.moves import Program

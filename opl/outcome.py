@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from opl.errors import NoPathError
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
-from opl.job import Job
-from opl.planning.feed import SlowStretch
-from opl.planning.figures import Figures
+from opl.job.load import Job
+from opl.motion.feed import SlowStretch
+from opl.motion.figures import Figures
 from opl.planning.fixed import FixedContact
 from opl.planning.plan import Plan
 from opl.program.moves import Program

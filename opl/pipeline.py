@@ -13,16 +13,16 @@ from opl.cell.robot import forward
 from opl.cell.workcell import PART, WHEEL
 from opl.errors import InputError, NoPathError, NoWayError
 from opl.export import draw, job_date, write_program
+from opl.field.layer import wheel_layer
+from opl.field.nodes import build_nodes
 from opl.geometry.toolpath import CutterPoints
-from opl.job import Job
+from opl.job.load import Job
+from opl.motion.feed import dwell_refusal, slow_stretches
+from opl.motion.timing import time_motion
 from opl.outcome import Outcome
-from opl.planning.feed import dwell_refusal, slow_stretches
 from opl.planning.fixed import keep_contact, runs_of
-from opl.planning.layer import wheel_layer
-from opl.planning.nodes import build_nodes
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import unreachable_points
-from opl.planning.timing import time_motion
 from opl.proof.read_back import as_told, read_back
 from opl.remedies import find_remedies
 from opl.searches import compare, from_paper_start, search_path

@@ -10,11 +10,11 @@ import numpy as np
 from opl.cell.clearance import part_tree
 from opl.cell.collision import CollisionScene
 from opl.cell.workcell import WorkCell
+from opl.field.layer import wheel_layer
+from opl.field.nodes import build_nodes
 from opl.geometry.frames import from_roll_pitch_yaw
 from opl.geometry.toolpath import CutterPoints
-from opl.job import Job
-from opl.planning.layer import wheel_layer
-from opl.planning.nodes import build_nodes
+from opl.job.load import Job
 from opl.planning.plan import try_recursive
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import free_at

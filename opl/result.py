@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from opl.cell.inverse import branch_name
+from opl.motion.feed import SlowStretch
+from opl.motion.figures import Figures
 from opl.outcome import Outcome
-from opl.planning.feed import SlowStretch
-from opl.planning.figures import Figures
 from opl.planning.objective import ObjectiveWeights, WeightedValue
 from opl.planning.plan import Plan, Refinement
 from opl.proof.digest import digest

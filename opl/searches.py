@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from opl.job_search import Method, Objective
+from opl.job.search import Method, Objective
+from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.outcome import Outcome
 from opl.planning.cheapest import plan_cheapest
-from opl.planning.figures import Figures, figures_of_path, figures_of_points
 from opl.planning.objective import ObjectiveWeights
 from opl.planning.optimal import plan_optimal
 from opl.planning.plan import Plan, plan_recursive, try_recursive

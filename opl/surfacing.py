@@ -10,7 +10,7 @@ from opl.geometry.inspection import Inspection, inspect
 from opl.geometry.nurbs import DegenerateNormalError
 from opl.geometry.passes import LaidPasses, lay_passes
 from opl.geometry.toolpath import CutterPoints
-from opl.job import Job
+from opl.job.load import Job
 
 # what errors of the geometry begin with and a job can change
 _KEYS = ("plane_normal", "rows", "kind")

@@ -14,19 +14,19 @@ from opl.cell.clearance import part_tree
 from opl.cell.collision import CollisionScene
 from opl.cell.robot import load_robot
 from opl.cell.workcell import WorkCell
+from opl.field.layer import wheel_layer
+from opl.field.nodes import build_nodes
 from opl.geometry.frames import pose
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Body, Box
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import ContactWheel
-from opl.job import load
+from opl.job.load import load
+from opl.motion.motion import Motion, Stretch
+from opl.motion.timing import timed
 from opl.pipeline import cutter_points
-from opl.planning.layer import wheel_layer
-from opl.planning.motion import Motion, Stretch
-from opl.planning.nodes import build_nodes
 from opl.planning.plan import plan_recursive
 from opl.planning.problem import GrindingProblem
-from opl.planning.timing import timed
 from opl.resources import folder
 from opl.verification.replay import replay
 

@@ -11,7 +11,7 @@ import numpy as np
 import trimesh
 import yaml
 
-from opl.cli import main
+from opl.cli.commands import main
 from opl.resources import folder
 
 V_SHAPE = folder("workpieces") / "v_shape"

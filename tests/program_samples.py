@@ -6,7 +6,7 @@ from datetime import datetime
 import numpy as np
 
 from opl.cell.robot import load_robot
-from opl.planning.motion import Motion, Stretch, VerifiedMotion
+from opl.motion.motion import Motion, Stretch, VerifiedMotion
 from opl.program.pulses import PulseScale
 
 JOINT_NAMES = ("S", "L", "U", "R", "B", "T")

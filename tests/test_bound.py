@@ -5,15 +5,15 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from opl.job import load
+from opl.field.path import BrokenStepError, fill_in
+from opl.job.load import load
 from opl.planning.bound import StripProof, raise_bound
 from opl.planning.branch import branches_of
-from opl.planning.certificate import least_box
-from opl.planning.ladder import Ladder
-from opl.planning.path import BrokenStepError, fill_in
 from opl.planning.refine import RefinedProblem, refine
-from opl.planning.strips import Strips, no_strips, strips_of
 from opl.resources import folder
+from opl.search.certificate import least_box
+from opl.search.ladder import Ladder
+from opl.search.strips import Strips, no_strips, strips_of
 from tests.cells import problem_of, with_positions
 
 NOTHING = np.empty(0, dtype=np.int64)

@@ -17,8 +17,8 @@ from opl.cell.robot import link_names, load_robot
 from opl.errors import InputError
 from opl.geometry.frames import pose, rotation_angle, transform
 from opl.geometry.mesh import TriangleMesh
-from opl.job import load
-from opl.job_cell import load_cell
+from opl.job.cell import load_cell
+from opl.job.load import load
 from opl.resources import folder
 
 WORKPIECES = folder("workpieces")

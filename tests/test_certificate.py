@@ -8,10 +8,10 @@ import pytest
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from opl.planning.box import JointBox
-from opl.planning.certificate import least_box
-from opl.planning.ladder import Ladder
-from opl.planning.smooth import Roughness, Travel, smoothest, smoothest_within
+from opl.search.box import JointBox
+from opl.search.certificate import least_box
+from opl.search.ladder import Ladder
+from opl.search.smooth import Roughness, Travel, smoothest, smoothest_within
 
 
 def random_field(seed):

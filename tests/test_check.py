@@ -21,8 +21,8 @@ from opl.cell.clearance import part_tree
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse import inverse
 from opl.cell.robot import forward
-from opl.planning.check import RESOLUTION, densify, find_faults
-from opl.planning.motion import Stretch
+from opl.motion.check import RESOLUTION, densify, find_faults
+from opl.motion.motion import Stretch
 
 postures = arrays(float, st.tuples(st.integers(2, 6), st.just(6)), elements=st.floats(-3, 3))
 

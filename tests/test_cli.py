@@ -14,7 +14,7 @@ import pytest
 import yaml
 from jobs import V_JOB, Ended, document, opl, write_job
 
-from opl.cli import main
+from opl.cli.commands import main
 
 EPOCH = "1700000000"
 FILES = ["V_SHAPE.JBI", "V_SHAPE.csv", "V_SHAPE_contact.svg", "V_SHAPE_joints.svg"]
@@ -23,7 +23,7 @@ JOINTS = "SLURBT"
 
 def opl_process(*arguments):
     """Run a command in a process of its own, where C code too could print."""
-    command = [sys.executable, "-c", "from opl.cli import main; main(prog_name='opl')"]
+    command = [sys.executable, "-c", "from opl.cli.commands import main; main(prog_name='opl')"]
     return subprocess.run(
         [*command, *map(str, arguments)],
         capture_output=True,

@@ -14,7 +14,7 @@ from opl.cell.clearance import part_tree, wheel_clearance
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse import inverse
 from opl.cell.robot import forward
-from opl.job import load
+from opl.job.load import load
 from opl.pipeline import cutter_points
 from opl.resources import folder
 from opl.verification.replay import GAP_ACCURACY

@@ -9,7 +9,7 @@ from jobs import POST, document, opl, write_job, write_robot, write_trough
 
 from opl import deliver
 from opl.errors import InputError, NoPathError
-from opl.job import load
+from opl.job.load import load
 from opl.pipeline import Outcome
 
 PROGRAM = ["V_SHAPE.JBI", "V_SHAPE.csv", "V_SHAPE_contact.svg", "V_SHAPE_joints.svg"]

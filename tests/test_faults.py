@@ -24,7 +24,7 @@ from opl.cell.robot import forward
 from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.toolpath import CutterPoints
-from opl.job import Job, load
+from opl.job.load import Job, load
 from opl.pipeline import cutter_points
 from opl.program.inform.files import program_jobs
 from opl.program.inform.playback import play

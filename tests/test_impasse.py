@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from opl.planning.impasse import Impasse, impasses
-from opl.planning.ladder import Ladder
+from opl.search.ladder import Ladder
 from tests.test_certificate import all_tracks, keys_of, random_field
 
 

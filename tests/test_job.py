@@ -10,7 +10,7 @@ from jobs import GONE, V_JOB, V_SHAPE, document, opl, write_job, write_robot, wr
 from opl.cell.robot import known_robots
 from opl.errors import InputError
 from opl.geometry.frames import inverse
-from opl.job import load
+from opl.job.load import load
 
 WHEEL_POSE = document()["wheel"]["T_base_contact0_mm"]
 

@@ -6,7 +6,7 @@ from program_samples import HOME, ROBOT, UNVERIFIED
 
 from opl.documents import check, keys
 from opl.errors import InputError
-from opl.job_program import ProgramSection
+from opl.job.program import ProgramSection
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.inform import TEMPLATE
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings

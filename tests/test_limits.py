@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opl.cell.limits import Limit
-from opl.planning.air import UnreachableApproachError, whole_motion
-from opl.planning.motion import Stretch
-from opl.planning.nodes import build_nodes
-from opl.planning.path import BrokenStepError, fill_in
+from opl.field.nodes import build_nodes
+from opl.field.path import BrokenStepError, fill_in
+from opl.motion.air import UnreachableApproachError, whole_motion
+from opl.motion.motion import Stretch
 from opl.planning.plan import plan_recursive
 from opl.planning.reasons import explain
 from opl.planning.states import NodeState, node_states

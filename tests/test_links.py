@@ -14,10 +14,10 @@ from opl.cell.collision import CollisionScene
 from opl.cell.robot import forward
 from opl.geometry.frames import pose, transform
 from opl.geometry.shapes import Body, Box
-from opl.planning.check import RESOLUTION, densify
-from opl.planning.free_moves import FreeMoves
-from opl.planning.links import Links, NoLinkError
-from opl.planning.sampling import fewest, sample_way
+from opl.motion.check import RESOLUTION, densify
+from opl.motion.free_moves import FreeMoves
+from opl.motion.links import Links, NoLinkError
+from opl.motion.sampling import fewest, sample_way
 
 HOME = np.deg2rad([0.0, -20.0, -20.0, 0.0, 30.0, 0.0])
 AWAY = np.deg2rad([80.0, -10.0, -30.0, 40.0, 40.0, 60.0])
@@ -181,7 +181,7 @@ def caged(cell, q):
 
 
 def test_a_posture_that_is_shut_in_is_told_with_what_shuts_it_in(monkeypatch):
-    monkeypatch.setattr("opl.planning.links.MOST_ASKED", 3000)
+    monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
     links = links_in(caged(open_cell(), HOME))
     for way in ((HOME, AWAY), (AWAY, HOME)):
         with pytest.raises(NoLinkError) as caught:
@@ -192,7 +192,7 @@ def test_a_posture_that_is_shut_in_is_told_with_what_shuts_it_in(monkeypatch):
 
 
 def test_what_is_joined_to_an_end_sought_in_vain_is_not_sought_again(monkeypatch):
-    monkeypatch.setattr("opl.planning.links.MOST_ASKED", 3000)
+    monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
     links = links_in(caged(open_cell(), HOME))
     with pytest.raises(NoLinkError) as first:
         links.find(HOME, AWAY)
@@ -200,7 +200,7 @@ def test_what_is_joined_to_an_end_sought_in_vain_is_not_sought_again(monkeypatch
     def searched(*arguments):
         raise AssertionError("searched again")
 
-    monkeypatch.setattr("opl.planning.links.sample_way", searched)
+    monkeypatch.setattr("opl.motion.links.sample_way", searched)
     near = AWAY + np.deg2rad([2.0, 0.0, 0.0, 0.0, 0.0, 5.0])
     with pytest.raises(NoLinkError) as second:
         links.find(near, HOME)

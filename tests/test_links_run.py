@@ -16,7 +16,7 @@ from test_links import margin_along
 
 from opl.cell.robot import forward, load_robot
 from opl.deliver import deliver
-from opl.job import load
+from opl.job.load import load
 from opl.pipeline import cutter_points, pose_problem, run
 from opl.planning.plan import plan_recursive
 
@@ -140,7 +140,7 @@ def cage():
 
 
 def test_a_home_that_nothing_leads_out_of_is_refused_and_the_pair_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("opl.planning.links.MOST_ASKED", 3000)
+    monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
     job = write_job(tmp_path / "j", {**with_bodies(*cage()), "process.home_deg": SIDEWAYS})
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 3

@@ -6,7 +6,7 @@ import pytest
 from program_samples import HOME, JOINT_NAMES, MAX_SPEED, verified_motion
 
 from opl.errors import OplError, UnsafeError
-from opl.planning.motion import Motion, Stretch, VerifiedMotion
+from opl.motion.motion import Motion, Stretch, VerifiedMotion
 from opl.program.moves import START_SPEED, Move, Program, plan_moves
 from opl.program.split import split
 

@@ -19,20 +19,20 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from opl.cell.robot import forward
-from opl.planning.calm import calm_box
-from opl.planning.certificate import least_box
+from opl.motion.check import RESOLUTION, densify
+from opl.motion.figures import figures_of_path
+from opl.motion.timing import timed
 from opl.planning.cheapest import plan_cheapest
-from opl.planning.check import RESOLUTION, densify
 from opl.planning.costs import roughness
-from opl.planning.figures import figures_of_path
 from opl.planning.objective import ObjectiveWeights
 from opl.planning.optimal import plan_optimal
 from opl.planning.plan import plan_recursive
 from opl.planning.refine import RefinedProblem
-from opl.planning.smooth import Travel, smoothest, travel_of
-from opl.planning.timing import timed
 from opl.planning.tube import REACH, halved, tube
 from opl.planning.weighted import plan_weighted
+from opl.search.calm import calm_box
+from opl.search.certificate import least_box
+from opl.search.smooth import Travel, smoothest, travel_of
 from opl.verification.replay import replay
 
 SETTINGS = v_job().search.optimal

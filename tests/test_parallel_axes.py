@@ -15,7 +15,7 @@ from opl.cell.inverse import inverse
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot import controller_poses, forward, known_robots, load_robot
 from opl.cell.singularity import singularity_margins
-from opl.planning.nodes import _lift
+from opl.field.nodes import _lift
 
 UR10E = load_robot("ur10e")
 # no real robot: nothing is zero, nothing is symmetrical

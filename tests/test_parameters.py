@@ -4,7 +4,7 @@ from click.testing import CliRunner
 from program_samples import ROBOT, UNVERIFIED
 
 from opl.cell.robot import load_robot
-from opl.cli import main
+from opl.cli.commands import main
 from opl.errors import InputError
 from opl.program.parameters import read_parameters
 from opl.program.pulses import PulseScale, require_accepted

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from opl.cell.robot import forward
 from opl.geometry.frames import pose
 from opl.geometry.wheel import ContactWheel
-from opl.job import load
+from opl.job.load import load
 from opl.resources import folder
 from opl.verification.drum import Drum
 from opl.verification.engine import pybullet, start

@@ -8,10 +8,10 @@ from cells import FclScene, small_plan, small_problem, v_plan, v_problem
 from scipy.spatial.transform import Rotation
 
 from opl.cell.inverse import inverse
+from opl.field.nodes import NodeMatrix
+from opl.field.path import BrokenStepError, GrindingPath, fill_in
 from opl.geometry.frames import pose
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.nodes import NodeMatrix
-from opl.planning.path import BrokenStepError, GrindingPath, fill_in
 
 PLANS = pytest.mark.parametrize(
     ("problem", "plan"), [(small_problem, small_plan), (v_problem, v_plan)], ids=["small", "V"]

@@ -26,16 +26,16 @@ from cells import (
 
 from opl.cell.robot import forward
 from opl.errors import NoPathError
-from opl.planning.air import UnreachableApproachError, whole_motion
-from opl.planning.check import RESOLUTION, densify, find_faults
+from opl.field.path import BrokenStepError, fill_in
+from opl.motion.air import UnreachableApproachError, whole_motion
+from opl.motion.check import RESOLUTION, densify, find_faults
+from opl.motion.motion import Motion, Stretch
+from opl.motion.timing import timed
 from opl.planning.fixed import keep_contact, runs_of
-from opl.planning.motion import Motion, Stretch
-from opl.planning.path import BrokenStepError, fill_in
 from opl.planning.plan import plan_recursive
 from opl.planning.reasons import explain, unreachable_points
 from opl.planning.starts import Start
 from opl.planning.states import NodeState, node_states
-from opl.planning.timing import timed
 
 PAPER_FIXED = [0.4711, 0.3512, 0.2951, 2.8134, 0.8810, 1.5024]  # [rad], table 2, S L U R B T
 PAPER_RECURSIVE = 2.5287  # [rad]

@@ -8,9 +8,9 @@ from click.testing import CliRunner
 from program_samples import DATE, MAX_SPEED, ROBOT, UNVERIFIED, verified_motion
 
 from opl.cell.robot import forward
-from opl.cli import main
+from opl.cli.commands import main
 from opl.errors import InputError, OplError
-from opl.planning.motion import VerifiedMotion
+from opl.motion.motion import VerifiedMotion
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.inform import find_faults, parse
 from opl.program.inform.layout import VARIABLES, JobLayout, Step

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opl.geometry.frames import inverse
-from opl.job import load
+from opl.job.load import load
+from opl.motion.motion import Stretch
 from opl.pipeline import cutter_points
-from opl.planning.motion import Stretch
 from opl.resources import folder
 from opl.verification.align import align
 from opl.verification.between import frames_at, place_between

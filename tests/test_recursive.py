@@ -8,8 +8,8 @@ from cells import printed_recursion, range_sum
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opl.planning.ladder import Ladder, middle_count
-from opl.planning.recursive import add_dead_ends, descend
+from opl.search.ladder import Ladder, middle_count
+from opl.search.recursive import add_dead_ends, descend
 
 NONE = np.empty(0, dtype=np.int64)
 

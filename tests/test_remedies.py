@@ -8,7 +8,7 @@ from cells import v_job
 from jobs import POST, opl, write_job, write_trough
 from scipy.spatial.transform import Rotation
 
-from opl.job import load
+from opl.job.load import load
 from opl.pipeline import cutter_points
 from opl.remedies import _fed_the_other_way, _other_side, find_remedies
 

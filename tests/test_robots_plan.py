@@ -13,7 +13,7 @@ from program_samples import DATE, HOME, SCALE
 from opl.cell.robot import load_robot
 from opl.cell.urdf_import import import_urdf
 from opl.errors import InputError, UnsafeError
-from opl.job import load
+from opl.job.load import load
 from opl.program.moves import Move, Program
 from opl.program.pulses import PulseScale, require_known
 from opl.program.settings import ProgramSettings

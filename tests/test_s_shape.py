@@ -9,7 +9,7 @@ import yaml
 from cells import problem_of, with_positions
 from jobs import opl
 
-from opl.job import load
+from opl.job.load import load
 from opl.planning.fixed import keep_contact
 from opl.resources import folder
 

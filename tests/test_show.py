@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from program_samples import DATE, ROBOT, verified_motion
 
-from opl.cli import main
+from opl.cli.commands import main
 from opl.errors import InputError
 from opl.program.inform import parse, read_jobs, unparse, write_jobs
 from opl.program.inform.compare import differences_in_meaning

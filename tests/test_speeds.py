@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from program_samples import DATE, MAX_SPEED, ROBOT, verified_motion
 
 from opl.errors import OplError
-from opl.planning.motion import VerifiedMotion
+from opl.motion.motion import VerifiedMotion
 from opl.program.inform import parse, write_jobs
 from opl.program.moves import plan_moves
 from opl.program.profiles import DX200, NX100

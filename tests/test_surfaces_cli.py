@@ -12,7 +12,7 @@ import pytest
 import trimesh
 from jobs import GONE, opl, write_job
 
-from opl.job import load
+from opl.job.load import load
 from opl.resources import folder
 from opl.surfacing import cut_surface
 

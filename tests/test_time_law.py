@@ -8,8 +8,8 @@ from scipy.optimize import linprog
 from scipy.sparse import coo_matrix
 
 from opl.errors import UnsafeError
-from opl.planning.rounded import CORNER_CUT, rounded_line
-from opl.planning.time_law import JointLimits, TimeLaw, fastest_law, require_limits
+from opl.motion.rounded import CORNER_CUT, rounded_line
+from opl.motion.time_law import JointLimits, TimeLaw, fastest_law, require_limits
 
 LIMITS = JointLimits(np.array([3.0, 3.0, 3.5, 7.0, 7.0, 10.0]), np.full(6, 8.0))
 

@@ -9,13 +9,13 @@ import pytest
 from cells import problem_of, v_plan, v_problem, with_positions
 from jobs import opl, write_job
 
-from opl.job import load
-from opl.planning.feed import HARDLY_MOVES, dwell_refusal, slow_stretches
-from opl.planning.motion import Motion, Stretch
+from opl.job.load import load
+from opl.motion.feed import HARDLY_MOVES, dwell_refusal, slow_stretches
+from opl.motion.motion import Motion, Stretch
+from opl.motion.rounded import rounded_line
+from opl.motion.time_law import JointLimits, fastest_law
+from opl.motion.timing import Cause, time_motion
 from opl.planning.plan import plan_recursive
-from opl.planning.rounded import rounded_line
-from opl.planning.time_law import JointLimits, fastest_law
-from opl.planning.timing import Cause, time_motion
 from opl.resources import folder
 
 HARD = 1.0 / 20.0

@@ -16,7 +16,7 @@ from opl.cell.robot import controller_poses, forward, known_robots, load_robot
 from opl.cell.robot_file import read_robot_file
 from opl.cell.urdf_import import import_urdf
 from opl.errors import InputError
-from opl.job import load
+from opl.job.load import load
 from opl.verification.world import World
 
 MH24 = load_robot("mh24")

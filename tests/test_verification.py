@@ -32,7 +32,7 @@ from opl.findings import Level
 from opl.geometry.frames import pose
 from opl.geometry.shapes import Body, Cylinder
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.motion import Motion, Stretch, VerifiedMotion
+from opl.motion.motion import Motion, Stretch, VerifiedMotion
 from opl.verification.replay import HORIZON, STEP, TURN, replay, where
 from opl.verification.world import World
 

@@ -18,7 +18,7 @@ from jobs import V_SHAPE, opl, write_job, write_robot
 from opl import pipeline
 from opl.cell.inverse import inverse
 from opl.cell.robot import forward
-from opl.job import load
+from opl.job.load import load
 from opl.program.inform.files import load_jobs
 from opl.program.inform.playback import play
 from opl.program.inform.post import write_jobs

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.air import BlockedLinkError, UnreachableApproachError, lead
+from opl.motion.air import BlockedLinkError, UnreachableApproachError, lead
+from opl.motion.motion import Motion, Stretch
 from opl.planning.branch import Branch
-from opl.planning.motion import Motion, Stretch
 from opl.planning.problem import GrindingProblem
 
 

@@ -13,16 +13,16 @@ import time
 
 import numpy as np
 
+from opl.field.path import BrokenStepError, fill_in
 from opl.geometry.frames import Array
-from opl.planning.bottleneck import tighten_strips
-from opl.planning.box import JointBox, size_of
 from opl.planning.branch import Branch
-from opl.planning.certificate import BoxProof, least_box
-from opl.planning.ladder import Ladder
-from opl.planning.path import BrokenStepError, fill_in
 from opl.planning.problem import GrindingProblem
 from opl.planning.refine import postures_between
-from opl.planning.strips import Strips, strips_of
+from opl.search.bottleneck import tighten_strips
+from opl.search.box import JointBox, size_of
+from opl.search.certificate import BoxProof, least_box
+from opl.search.ladder import Ladder
+from opl.search.strips import Strips, strips_of
 
 FIRST_CELLS = 8  # of a step that is looked at closely, twice as many each time it is again
 MOST_CELLS = 32

@@ -14,17 +14,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opl.field.path import BrokenStepError, fill_in
 from opl.planning.bound import raise_bound
-from opl.planning.box import JointBox
 from opl.planning.branch import Branch, Track, branches_of
-from opl.planning.calm import ROUND_OFF, calm_box
-from opl.planning.certificate import least_box
 from opl.planning.costs import Costs, roughness
-from opl.planning.path import BrokenStepError, fill_in
 from opl.planning.plan import Plan, check_track
 from opl.planning.refine import RefinedProblem, carried, refine
-from opl.planning.smooth import Travel, smoothest_within
 from opl.planning.symmetry import twins, undominated
+from opl.search.box import JointBox
+from opl.search.calm import ROUND_OFF, calm_box
+from opl.search.certificate import least_box
+from opl.search.smooth import Travel, smoothest_within
 
 SUBDIVIDE = np.array([0.25, 0.5, 0.75])  # where a step that bulges is given columns
 MOST_REFINEMENTS = 8

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from opl.cell.collision import CollisionScene
-from opl.planning.ladder import Ladder
-from opl.planning.links import Blocker
-from opl.planning.nodes import NodeMatrix
+from opl.field.nodes import NodeMatrix
+from opl.motion.links import Blocker
 from opl.planning.problem import GrindingProblem
+from opl.search.ladder import Ladder
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from opl.planning.branch import Track, branches_of
 from opl.planning.costs import Costs, roughness
 from opl.planning.plan import Plan, check_track, no_path
 from opl.planning.problem import GrindingProblem
-from opl.planning.smooth import smoothest
 from opl.planning.symmetry import twins
+from opl.search.smooth import smoothest
 
 
 def plan_cheapest(problem: GrindingProblem, costs: Costs, max_contact_change: float) -> Plan:

@@ -8,10 +8,10 @@ import numpy as np
 
 from opl.cell.collision import CollisionScene
 from opl.cell.singularity import singularity_margins
+from opl.field.nodes import NodeMatrix
 from opl.geometry.frames import Array
-from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
-from opl.planning.smooth import Roughness
+from opl.search.smooth import Roughness
 
 NEAR_LIMIT = np.deg2rad(10.0)  # from where on nearness to a joint limit is charged
 NEAR_SINGULARITY = 0.2  # as in `singularity_margins`; for the wrist 11.5 degrees

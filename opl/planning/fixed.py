@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
+from opl.field.layer import wheel_layer
+from opl.field.nodes import build_nodes
 from opl.geometry.frames import Array
-from opl.planning.layer import wheel_layer
-from opl.planning.nodes import build_nodes
 from opl.planning.plan import try_recursive
 from opl.planning.problem import GrindingProblem
-from opl.planning.recursive import add_dead_ends, descend
 from opl.planning.starts import Start
+from opl.search.recursive import add_dead_ends, descend
 
 MOST_CHECKS = 50  # of contact-fixed motions, which differ in the counts of turns only
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.planning.branch import Branch
-from opl.planning.ladder import Ladder
+from opl.search.ladder import Ladder
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from opl.planning.figures import Figures
+from opl.motion.figures import Figures
 
 
 @dataclass(frozen=True)

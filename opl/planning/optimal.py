@@ -16,8 +16,8 @@ from opl.planning.box_search import PROOF_GAP, REFINED_GAP, BoxSearch, OptimalSe
 from opl.planning.plan import Plan, Refinement
 from opl.planning.problem import GrindingProblem
 from opl.planning.refine import RefinedProblem
-from opl.planning.smooth import Travel
 from opl.planning.tube import halved, tube
+from opl.search.smooth import Travel
 
 MOST_ROUNDS = 3  # of halving the contact positions: eight times as many
 

@@ -16,14 +16,14 @@ import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
 from opl.errors import NoPathError, NoWayError
-from opl.planning.air import BlockedLinkError, UnreachableApproachError, linked, whole_motion
+from opl.field.path import BrokenStepError, GrindingPath, fill_in
+from opl.motion.air import BlockedLinkError, UnreachableApproachError, linked, whole_motion
+from opl.motion.check import Fault, find_faults
+from opl.motion.motion import FREE_MOVES, Motion, Stretch
 from opl.planning.blocked_links import block_link
 from opl.planning.branch import Branch, Track, branches_of
-from opl.planning.check import Fault, find_faults
 from opl.planning.impasse import shortest_impasse
-from opl.planning.motion import FREE_MOVES, Motion, Stretch
 from opl.planning.objective import WeightedValue
-from opl.planning.path import BrokenStepError, GrindingPath, fill_in
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import explain, explain_air
 from opl.planning.starts import Start, tracks_from_best_start, tracks_from_nearest_start

@@ -9,13 +9,13 @@ import numpy as np
 from opl.cell.clearance import PartTree
 from opl.cell.collision import CollisionScene
 from opl.cell.workcell import WorkCell
+from opl.field.nodes import NodeField, NodeMatrix
+from opl.field.path import Interpolation
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.ladder import Ladder
-from opl.planning.links import Links
-from opl.planning.nodes import NodeField, NodeMatrix
-from opl.planning.path import Interpolation
-from opl.planning.timing import Pace
+from opl.motion.links import Links
+from opl.motion.timing import Pace
+from opl.search.ladder import Ladder
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import numpy as np
 
 from opl.cell.inverse import turns
 from opl.cell.workcell import PART, WHEEL, WorkCell
+from opl.motion.links import Blocker
 from opl.planning.impasse import Impasse
-from opl.planning.links import Blocker
 from opl.planning.problem import GrindingProblem
 
 

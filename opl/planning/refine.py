@@ -12,13 +12,13 @@ import numpy as np
 
 from opl.cell.inverse import inverse
 from opl.cell.workcell import WorkCell
+from opl.field.layer import layer_at
+from opl.field.nodes import NodeField, NodeMatrix
+from opl.field.path import GrindingPath, cutter_frames
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
+from opl.motion.motion import Motion, Stretch
 from opl.planning.branch import Branch, branches_of
-from opl.planning.layer import layer_at
-from opl.planning.motion import Motion, Stretch
-from opl.planning.nodes import NodeField, NodeMatrix
-from opl.planning.path import GrindingPath, cutter_frames
 from opl.planning.problem import GrindingProblem
 
 

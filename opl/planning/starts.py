@@ -10,7 +10,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.planning.branch import Branch, Track
-from opl.planning.recursive import Descent, add_dead_ends, descend
+from opl.search.recursive import Descent, add_dead_ends, descend
 
 
 class Start(str, Enum):

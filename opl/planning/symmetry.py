@@ -10,9 +10,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from opl.field.nodes import NodeMatrix
 from opl.geometry.frames import Array
 from opl.planning.branch import Branch, Track
-from opl.planning.nodes import NodeMatrix
 
 SAME_SUM = 1e-6  # [rad] two tracks whose joint range sums differ by less are equally good
 

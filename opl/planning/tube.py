@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from opl.field.layer import layer_at
+from opl.field.nodes import NodeField, NodeMatrix
+from opl.field.path import GrindingPath
 from opl.geometry.frames import Array
-from opl.planning.layer import layer_at
-from opl.planning.nodes import NodeField, NodeMatrix
-from opl.planning.path import GrindingPath
 from opl.planning.refine import RefinedProblem, solve_at
 
 REACH = 8  # finer contact positions on either side of the path's own

@@ -16,16 +16,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from opl.planning.box import JointBox
+from opl.motion.figures import Figures, figures_of_path
 from opl.planning.branch import Branch, Track, branches_of
-from opl.planning.certificate import least_box
 from opl.planning.costs import Costs, roughness
-from opl.planning.figures import Figures, figures_of_path
 from opl.planning.objective import ObjectiveWeights, WeightedValue
 from opl.planning.plan import Plan, check_track
 from opl.planning.problem import GrindingProblem
-from opl.planning.smooth import Roughness, smoothest
 from opl.planning.symmetry import twins, undominated
+from opl.search.box import JointBox
+from opl.search.certificate import least_box
+from opl.search.smooth import Roughness, smoothest
 
 # by which fraction of its size the least box is widened; at last not bounded at all
 WIDENINGS = (1e-6, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, np.inf)

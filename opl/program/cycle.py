@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from opl.cell.robot import Robot
-from opl.planning.rounded import rounded_line
-from opl.planning.time_law import JointLimits, fastest_law
+from opl.motion.rounded import rounded_line
+from opl.motion.time_law import JointLimits, fastest_law
 from opl.program.actions import Call, Dwell, WaitInput
 from opl.program.moves import CycleTime, Kind, Move, Program
 from opl.program.settings import ByKind, ProgramSettings

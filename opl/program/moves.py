@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opl.errors import UnsafeError
-from opl.planning.motion import Motion, Stretch, VerifiedMotion
+from opl.motion.motion import Motion, Stretch, VerifiedMotion
 from opl.program.actions import NO_ACTIONS, Action, Actions
 from opl.program.stops import ON_WHEEL, actions_at, stops_at
 

@@ -1,4 +1,4 @@
-"""What a job asks of its program, in SI units; the YAML keys are known in `opl.job` only."""
+"""What a job asks of its program, in SI units; the YAML keys are known in `opl.job.load` only."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.planning.motion import Motion, Stretch
+from opl.motion.motion import Motion, Stretch
 from opl.program.actions import Action, Actions
 
 # Sharpest turn in joint space [rad] that a move off the wheel goes through without a stop. Rounding

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from opl import resources
 from opl.geometry.frames import roll_pitch_yaw
-from opl.planning.motion import VerifiedMotion
+from opl.motion.motion import VerifiedMotion
 from opl.program.layout import fill
 from opl.program.posts import Written
 from opl.program.pulses import PulseScale

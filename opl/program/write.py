@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opl.cell.robot import Robot, forward
-from opl.planning.motion import VerifiedMotion
+from opl.motion.motion import VerifiedMotion
 from opl.program.actions import Action
 from opl.program.cycle import cycle_time
 from opl.program.lines import with_straight_moves

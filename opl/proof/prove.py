@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
-from opl.job import Job
-from opl.planning.motion import Motion, Stretch
+from opl.job.load import Job
+from opl.motion.motion import Motion, Stretch
 from opl.program.controller import ControllerProfile
 from opl.program.inform.files import program_jobs
 from opl.program.inform.playback import play

@@ -16,8 +16,8 @@ from opl.cell.robot import forward
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, transform
 from opl.geometry.toolpath import CutterPoints
-from opl.job import Job
-from opl.planning.motion import Motion, VerifiedMotion
+from opl.job.load import Job
+from opl.motion.motion import Motion, VerifiedMotion
 from opl.program.inform.files import program_jobs
 from opl.program.inform.playback import Playback, play
 from opl.program.inform.render import FILE_SUFFIX

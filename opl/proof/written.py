@@ -9,9 +9,9 @@ import numpy as np
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.job import Job
-from opl.planning.motion import Motion, Stretch
-from opl.planning.timing import timed
+from opl.job.load import Job
+from opl.motion.motion import Motion, Stretch
+from opl.motion.timing import timed
 from opl.program.inform.playback import Playback
 from opl.program.moves import START_SPEED
 from opl.program.posts import PASS_TIME_TOLERANCE

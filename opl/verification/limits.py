@@ -9,7 +9,7 @@ import numpy as np
 from opl.cell.workcell import WorkCell
 from opl.findings import Finding, Level
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.motion import Motion, Stretch
+from opl.motion.motion import Motion, Stretch
 from opl.verification.place import where
 
 SPEED_TOLERANCE = 1.001  # programmed speeds have four digits

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from opl.planning.motion import Motion, Stretch
+from opl.motion.motion import Motion, Stretch
 
 
 def where(motion: Motion, move: int) -> str:

@@ -17,7 +17,7 @@ from opl.cell.workcell import WorkCell
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.motion import Motion, Stretch
+from opl.motion.motion import Motion, Stretch
 from opl.verification.align import align
 from opl.verification.contact import ALIGNED, Touches, find_touches
 from opl.verification.place import where

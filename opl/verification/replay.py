@@ -20,7 +20,7 @@ from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, transform
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.motion import Motion, Stretch, VerifiedMotion
+from opl.motion.motion import Motion, Stretch, VerifiedMotion
 from opl.verification.limits import limit_findings, missing_points
 from opl.verification.place import where
 from opl.verification.world import World

@@ -1,0 +1,139 @@
+"""Commands around robots: list and show them, their pulses, robots of the user's own."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from opl.cell.robot import Robot, known_robots, load_robot, robot_path
+from opl.cell.robot_file import read_robot_file
+from opl.cell.urdf_import import import_urdf
+from opl.console.robots import show_robot, show_robots
+from opl.errors import InputError
+from opl.program.parameters import read_parameters
+from opl.program.ratios import mismatches, ratio_file
+from opl.report.arm_view import arm_view
+
+FILE = click.Path(dir_okay=False, path_type=Path)
+FOLDER = click.Path(file_okay=False, path_type=Path)
+
+
+@click.group(invoke_without_command=True)
+@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
+@click.pass_context
+def robots(context: click.Context, as_json: bool) -> None:
+    """List the robots that come with opl.
+
+    Example: opl robots
+    """
+    if context.invoked_subcommand is not None:
+        return
+    known = [load_robot(name) for name in known_robots()]
+    if as_json:
+        click.echo(json.dumps([_figures(robot) for robot in known], indent=2))
+    else:
+        show_robots(known)
+
+
+def _figures(robot: Robot) -> dict[str, Any]:
+    return {
+        "name": robot.name,
+        "title": robot.title,
+        "maker": robot.maker,
+        "reach_mm": round(robot.reach * 1e3, 1),
+        "payload_kg": robot.payload,
+        "joint_names": list(robot.joint_names),
+        "unverified_pulse_ratios": list(robot.unverified_pulses),
+        "missing_pulse_ratios": list(robot.missing_pulses),
+    }
+
+
+@robots.command("show")
+@click.argument("name")
+@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
+@click.option("--picture", type=FILE, help="SVG to write: the arm with its dimensions and limits.")
+def show_data(name: str, as_json: bool, picture: Path | None) -> None:
+    """Print what is known of a robot, every number with source and certainty.
+
+    NAME is one of those listed by opl robots, or a folder with a robot.yaml.
+
+    Example: opl robots show gp25 --picture gp25.svg
+    """
+    robot, file = load_robot(name), read_robot_file(robot_path(name))
+    if picture is not None:
+        try:
+            picture.write_text(arm_view(robot), encoding="utf-8", newline="\n")
+        except OSError as error:
+            raise InputError(str(picture), f"cannot be written: {error.strerror}") from error
+    if as_json:
+        told = {**_figures(robot), **file.model_dump(exclude={"name", "title", "maker"})}
+        click.echo(json.dumps(told, indent=2))
+    else:
+        show_robot(robot, file)
+        if picture is not None:
+            click.echo(f"wrote {picture}")
+
+
+@robots.command("import-urdf")
+@click.argument("file", type=FILE)
+@click.option("--name", required=True, help="Name of the robot.")
+@click.option("--out", type=FOLDER, required=True, help="Folder to write; a job names it as robot.")
+@click.option("--maker", default="unknown", show_default=True, help="Who builds it.")
+@click.option(
+    "--base",
+    type=click.Choice(["axis-2", "floor"]),
+    default="axis-2",
+    show_default=True,
+    help="Where on axis 1 the base frame lies: at the height of axis 2, or on the mounting face.",
+)
+def import_description(file: Path, name: str, out: Path, maker: str, base: str) -> None:
+    """Make a robot of your own from a URDF, or a xacro (pip install 'opl[xacro]').
+
+    The arm has a spherical wrist, or three parallel axes in the middle as those of Universal
+    Robots. The closed form of its inverse kinematics is read off the joint axes and checked on
+    random postures. Meshes are copied. A frame base in the URDF is taken for the controller's own.
+
+    Example: opl robots import-urdf my_arm.urdf --name my_arm --out robots/my_arm
+    """
+    made = import_urdf(file, name, out, base_at_floor=base == "floor", maker=maker)
+    click.echo(
+        f"{made.robot.name}: arm with {read_robot_file(made.files[0]).arm.family}, "
+        f"reach {made.robot.reach * 1e3:.0f} mm"
+    )
+    click.echo(f"FK(IK) closes within {made.closure:.1g} on random postures")
+    for line in made.cautions:
+        click.echo(f"caution: {line}", err=True)
+    for path in made.files:
+        click.echo(f"wrote {path}")
+
+
+@robots.command("import-params")
+@click.argument("file", type=FILE)
+@click.option("--robot", required=True, help="Whose controller the file is from.")
+@click.option("--out", type=FILE, help="File to write; default <robot>_pulses.yaml.")
+def import_params(file: Path, robot: str, out: Path | None) -> None:
+    """Read pulse ratios and soft limits from a controller's RC.PRM or ALL.PRM.
+
+    Writes a small file that a job names as program.pulse_ratios.
+
+    Example: opl robots import-params RC.PRM --robot mh24 --out pulses.yaml
+    """
+    owner = load_robot(robot)
+    try:
+        text = file.read_text(encoding="latin-1")
+    except OSError as error:
+        raise InputError(str(file), f"cannot be read: {error.strerror}") from error
+    parameters = read_parameters(text, str(file))
+    path = out or Path(f"{owner.name}_pulses.yaml")
+    try:
+        path.write_text(ratio_file(owner, parameters, file.name), encoding="utf-8")
+    except OSError as error:
+        raise InputError(str(path), f"cannot be written: {error.strerror}") from error
+    for name, ratio in zip(owner.joint_names, parameters.pulses_per_degree, strict=True):
+        click.echo(f"{name} {ratio:.2f} pulses per degree")
+    for line in mismatches(owner, parameters):
+        click.echo(f"caution: {line}", err=True)
+    click.echo(f"wrote {path}; name it in the job as program.pulse_ratios")

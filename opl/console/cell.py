@@ -1,0 +1,158 @@
+"""A cell in words: what stands where, what may be near to what, how the wheels were found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from opl.cell.limits import Limit
+from opl.cell.robot import Robot
+from opl.geometry.frames import Array, roll_pitch_yaw
+from opl.geometry.shapes import Body, Box, Cylinder
+from opl.job.cell import Cell
+from opl.job.pairs import Names
+from opl.job.wheel import PlacedWheel
+
+MM = 1e3
+TOUCHING = 1e-4  # [m] an error of touching that people can think of
+
+
+def cell_lines(cell: Cell) -> Iterator[str]:
+    """Yield what a cell holds, one line each."""
+    robot = cell.robot
+    x, y, z, *turned = pendant_figures(cell.T_cell_base)
+    told = f", turned {_numbers(turned)} deg about x, y, z" if any(turned) else ""
+    yield f"robot {robot.title}, its base frame at {_numbers((x, y, z))} mm in the cell{told}"
+    for wheel in cell.wheels:
+        yield from wheel_lines(robot, wheel)
+    yield f"obstacles: {_bodies(cell.obstacles)}"
+    yield f"gripper: {_bodies(cell.gripper)}"
+    kept = [(pair, distance) for pair, distance in cell.said.said if distance is not None]
+    other = "".join(f", {_pair(pair)} {MM * distance:g} mm" for pair, distance in kept)
+    yield f"clearance {MM * cell.clearance:g} mm{other}"
+    touching = [_pair(pair) for pair, distance in cell.said.said if distance is None]
+    yield f"may touch: {', '.join(touching) or 'nothing'}"
+    yield f"limits beside the robot's own: {', '.join(map(_limit, cell.limits)) or 'none'}"
+    if cell.home is not None:
+        yield f"home {_numbers(np.rad2deg(cell.home))} deg"
+
+
+def wheel_lines(robot: Robot, placed: PlacedWheel) -> Iterator[str]:
+    """Yield where a wheel is, and how well its touched points fit."""
+    wheel = placed.wheel
+    yield (
+        f"{placed.name}: {MM * wheel.width:g} mm wide, radius {MM * wheel.radius:g} mm, "
+        f"contact frame 0 on the pendant: {_pose(seen_by(robot, wheel.T_base_contact0))}"
+    )
+    fit = placed.fit
+    if fit is None:
+        return
+    points = ", ".join(
+        f"{label} {MM * off:.3f}" for label, off in zip(fit.labels, fit.residuals, strict=True)
+    )
+    yield f"  residuals of its touched points in mm: {points}"
+    yield (
+        f"  {fit.spare} equations more than needed; touching within {MM * TOUCHING:g} mm fixes the "
+        f"origin within {MM * TOUCHING * fit.origin_per_error:.2f} mm, the axle within "
+        f"{np.rad2deg(TOUCHING * fit.turn_per_error):.2f} deg"
+    )
+
+
+def cell_figures(cell: Cell) -> dict[str, Any]:
+    """Return what a cell holds, for other programs."""
+    return {
+        "cell": str(cell.path),
+        "robot": cell.robot.name,
+        "T_cell_base_mm": _matrix(cell.T_cell_base),
+        "wheels": [_wheel_figures(cell.robot, placed) for placed in cell.wheels],
+        "obstacles": [body.name for body in cell.obstacles],
+        "gripper": [body.name for body in cell.gripper],
+        "clearance_mm": MM * cell.clearance,
+        "clearances": [
+            {"pair": list(pair), "clearance_mm": MM * distance}
+            for pair, distance in cell.said.said
+            if distance is not None
+        ],
+        "allowed_contacts": [list(pair) for pair, distance in cell.said.said if distance is None],
+        "limits": [
+            {
+                "name": limit.name,
+                "coefficients": limit.coefficients.tolist(),
+                "lower_deg": round(float(np.rad2deg(limit.lower)), 6),
+                "upper_deg": round(float(np.rad2deg(limit.upper)), 6),
+            }
+            for limit in cell.limits
+        ],
+        "home_deg": None if cell.home is None else np.round(np.rad2deg(cell.home), 6).tolist(),
+    }
+
+
+def _wheel_figures(robot: Robot, placed: PlacedWheel) -> dict[str, Any]:
+    wheel, fit = placed.wheel, placed.fit
+    shown = pendant_figures(seen_by(robot, wheel.T_base_contact0))
+    return {
+        "name": placed.name,
+        "width_mm": MM * wheel.width,
+        "radius_mm": MM * wheel.radius,
+        "T_base_contact0_mm": _matrix(wheel.T_base_contact0),
+        "pendant": {"xyz_mm": list(shown[:3]), "rx_ry_rz_deg": list(shown[3:])},
+        "residuals_mm": None
+        if fit is None
+        else {
+            label: round(MM * float(off), 4)
+            for label, off in zip(fit.labels, fit.residuals, strict=True)
+        },
+        "spare_equations": None if fit is None else fit.spare,
+    }
+
+
+def seen_by(robot: Robot, T_base_frame: Array) -> Array:
+    """Return a pose from the frame that the robot's own controller counts from, shape (4, 4)."""
+    seen = T_base_frame.copy()
+    seen[2, 3] += robot.base_height - robot.controller_base_height
+    return seen
+
+
+def pendant_figures(T: Array) -> tuple[float, ...]:
+    """Return X Y Z in mm and Rx Ry Rz in degrees."""
+    figures = np.concatenate([MM * T[:3, 3], np.rad2deg(roll_pitch_yaw(T))])
+    return tuple(float(value) + 0.0 for value in np.round(figures, 4))  # no negative zero
+
+
+def _matrix(T: Array) -> list[list[float]]:
+    told = T.copy()
+    told[:3, 3] *= MM
+    return (np.round(told, 9) + 0.0).tolist()
+
+
+def _pose(T: Array) -> str:
+    names = ("X", "Y", "Z", "Rx", "Ry", "Rz")
+    figures = zip(names, pendant_figures(T), strict=True)
+    return " ".join(f"{name} {value:.3f}" for name, value in figures)
+
+
+def _numbers(values: Any) -> str:
+    return " ".join(f"{value:g}" for value in values)
+
+
+def _bodies(bodies: tuple[Body, ...]) -> str:
+    return ", ".join(f"{body.name} ({_shape(body)})" for body in bodies) or "none"
+
+
+def _shape(body: Body) -> str:
+    if isinstance(body.shape, Box):
+        return "box"
+    if isinstance(body.shape, Cylinder):
+        return "cylinder"
+    size = " x ".join(f"{MM * edge:.0f}" for edge in np.ptp(body.shape.vertices, axis=0))
+    return f"mesh of {len(body.shape.faces)} triangles, {size} mm"
+
+
+def _pair(pair: Names) -> str:
+    return " and ".join(pair)
+
+
+def _limit(limit: Limit) -> str:
+    return f"{limit.name} {np.rad2deg(limit.lower):g} to {np.rad2deg(limit.upper):g} deg"

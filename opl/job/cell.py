@@ -1,0 +1,258 @@
+"""The cell file: what many jobs share. YAML in, values in the robot's base frame out.
+
+Everything that stands in the cell is given in the frame of the cell. ``stands`` says where the
+robot's mounting face is in it, so another arm needs no other line than its name: its base frame
+comes to lie as high above the face as its axis 2. Without ``stands`` the frame of the cell is the
+robot's base frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from opl.cell.limits import Limit
+from opl.cell.robot import Robot, link_names, load_robot
+from opl.cell.workcell import PART, WHEEL, wheel_solid
+from opl.documents import Document, read
+from opl.errors import InputError
+from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, pose
+from opl.geometry.shapes import Body
+from opl.job.bodies import MM, BodySection, NotNegative, Six, Triple, bodies_in_si
+from opl.job.pairs import FIXTURE, ROBOT, PairNames, SaidOfPairs, said_of_pairs
+from opl.job.wheel import CellWheelSection, PlacedWheel
+
+CLEARANCE_MM = 5.0
+_TwoNames = Annotated[list[str], Field(min_length=2, max_length=2)]
+
+
+class _Stands(Document):
+    at_mm: Triple
+    rotation_deg: Triple = Field(default=[0.0, 0.0, 0.0])
+
+
+class _Range(Document):
+    lower_deg: float
+    upper_deg: float
+
+    @model_validator(mode="after")
+    def _in_order(self) -> _Range:
+        if self.lower_deg >= self.upper_deg:
+            raise ValueError(f"lower_deg must be below upper_deg {self.upper_deg:g}")
+        return self
+
+
+class _JointLimit(_Range):
+    joint: str
+
+
+class _CoupledLimit(_Range):
+    name: Annotated[str, Field(min_length=1)] | None = None
+    coefficients: Annotated[dict[str, float], Field(min_length=1)]
+
+
+class _PairClearance(Document):
+    pair: _TwoNames
+    clearance_mm: NotNegative
+
+
+class CellFile(Document):
+    """The keys of a cell file; `opl schema --cell` prints them for editors."""
+
+    robot: str
+    stands: _Stands | None = None
+    wheels: Annotated[list[CellWheelSection], Field(min_length=1)]
+    obstacles: list[BodySection] = Field(default=[])
+    gripper: list[BodySection] = Field(default=[])
+    clearance_mm: NotNegative = CLEARANCE_MM
+    clearances: list[_PairClearance] = Field(default=[])
+    allowed_contacts: list[_TwoNames] = Field(default=[])
+    joint_limits: list[_JointLimit] = Field(default=[])
+    coupled_limits: list[_CoupledLimit] = Field(default=[])
+    home_deg: Six | None = None
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What a cell file says, validated, in SI, in the base frame of its robot.
+
+    Attributes:
+        path: The file.
+        robot: The arm.
+        T_cell_base: Where its base frame is in the frame of the cell, shape (4, 4).
+        wheels: The wheels.
+        obstacles: What stands around, in the base frame.
+        gripper: Bodies fixed to the flange, in the flange frame.
+        clearance: Distance to keep where nothing else is said, in [m].
+        said: What is said of single pairs.
+        limits: Limits of joints and sums of joints beside the robot's own.
+        home: Joint positions in [rad], shape (6,); None if the job says them.
+    """
+
+    path: Path
+    robot: Robot
+    T_cell_base: Array
+    wheels: tuple[PlacedWheel, ...]
+    obstacles: tuple[Body, ...]
+    gripper: tuple[Body, ...]
+    clearance: float
+    said: SaidOfPairs
+    limits: tuple[Limit, ...]
+    home: Array | None
+
+    def pick(self, name: str | None, where: str) -> PlacedWheel:
+        """Return the wheel of a name, the only one without.
+
+        Args:
+            name: The name, None if none is given.
+            where: What is to blame for a wrong one.
+
+        Raises:
+            InputError: If there is none of the name, or several and none is named.
+        """
+        names = [wheel.name for wheel in self.wheels]
+        if name is None:
+            if len(names) > 1:
+                raise InputError(where, f"is missing: {self.path} has wheels {', '.join(names)}")
+            return self.wheels[0]
+        if name not in names:
+            raise InputError(where, f"no wheel {name!r} in {self.path}; has: {', '.join(names)}")
+        return self.wheels[names.index(name)]
+
+    def around(self, picked: PlacedWheel) -> tuple[Body, ...]:
+        """Return the obstacles, the wheels that are not picked among them."""
+        others = (
+            wheel_solid(wheel.wheel, wheel.name) for wheel in self.wheels if wheel is not picked
+        )
+        return (*self.obstacles, *others)
+
+
+def load_cell(path: Path) -> Cell:
+    """Read and validate a cell file and the files it names, relative to its folder.
+
+    Raises:
+        InputError: If anything in it is unusable; names file and key path.
+    """
+    file = read(path, CellFile)
+    robot = robot_of(path, file.robot)
+    T_cell_base = _base(file.stands, robot)
+    T_base_cell = inverse(T_cell_base)
+    _require_names(path, file, robot)
+    obstacles = tuple(
+        Body(body.name, body.shape, T_base_cell @ body.T_parent_body)
+        for body in bodies_in_si(path, "obstacles", file.obstacles)
+    )
+    gripper = bodies_in_si(path, "gripper", file.gripper)
+    wheels = tuple(
+        wheel.in_si(path, f"wheels.{place}", robot, T_cell_base)
+        for place, wheel in enumerate(file.wheels)
+    )
+    names = PairNames(
+        links=link_names(robot),
+        held=tuple(body.name for body in gripper),
+        wheels=tuple(wheel.name for wheel in wheels),
+        obstacles=tuple(body.name for body in obstacles),
+    )
+    said = said_of_pairs(
+        path,
+        names,
+        [tuple(pair) for pair in file.allowed_contacts],
+        [(tuple(one.pair), one.clearance_mm * MM) for one in file.clearances],
+    )
+    return Cell(
+        path=path,
+        robot=robot,
+        T_cell_base=T_cell_base,
+        wheels=wheels,
+        obstacles=obstacles,
+        gripper=gripper,
+        clearance=file.clearance_mm * MM,
+        said=said,
+        limits=_limits(path, file, robot),
+        home=None if file.home_deg is None else np.deg2rad(file.home_deg),
+    )
+
+
+def robot_of(path: Path, name: str) -> Robot:
+    """Load the robot that a file names.
+
+    Raises:
+        InputError: If there is none of the name, or its own file is unusable.
+    """
+    try:
+        return load_robot(name, path.parent)
+    except InputError as error:
+        # what is wrong with a robot's own file is told with that file's name
+        where = f"{path}: robot" if error.where == "robot" else error.where
+        raise InputError(where, error.message) from error
+
+
+def _base(stands: _Stands | None, robot: Robot) -> Array:
+    """Return T_cell_base: the base frame lies straight above the mounting face."""
+    if stands is None:
+        return np.eye(4)
+    T_cell_face = from_roll_pitch_yaw(np.deg2rad(stands.rotation_deg), np.array(stands.at_mm) * MM)
+    return T_cell_face @ pose(np.eye(3), np.array([0.0, 0.0, robot.base_height]))
+
+
+def _require_names(path: Path, file: CellFile, robot: Robot) -> None:
+    """Refuse two things of one name: a pair would not tell which is meant."""
+    taken = {PART: "the part", ROBOT: "all links of the robot", FIXTURE: "the job's fixture"}
+    taken.update(dict.fromkeys(link_names(robot), "a link of the robot"))
+    places = [(f"wheels.{place}.name", wheel.name) for place, wheel in enumerate(file.wheels)]
+    for key, bodies in (("obstacles", file.obstacles), ("gripper", file.gripper)):
+        places += [(f"{key}.{place}.name", body.name) for place, body in enumerate(bodies)]
+    for where, name in places:
+        if name in taken:
+            raise InputError(f"{path}: {where}", f"{name!r} is the name of {taken[name]} already")
+        taken[name] = where
+    if len(file.wheels) > 1 and WHEEL in (wheel.name for wheel in file.wheels):
+        raise InputError(
+            f"{path}: wheels", f"each of several needs a name of its own, other than {WHEEL!r}"
+        )
+
+
+def _limits(path: Path, file: CellFile, robot: Robot) -> tuple[Limit, ...]:
+    limits = []
+    for place, one in enumerate(file.joint_limits):
+        where = f"{path}: joint_limits.{place}"
+        joint = _joint(robot, one.joint, f"{where}.joint")
+        if one.joint in (other.joint for other in file.joint_limits[:place]):
+            raise InputError(f"{where}.joint", f"joint {one.joint} is given twice")
+        lower, upper = np.rad2deg(robot.lower[joint]), np.rad2deg(robot.upper[joint])
+        if one.lower_deg >= upper or one.upper_deg <= lower:
+            raise InputError(where, f"leaves nothing of {lower:g} to {upper:g}, the robot's own")
+        limits.append(_limit(one.joint, np.eye(6)[joint], one))
+    for place, sums in enumerate(file.coupled_limits):
+        where = f"{path}: coupled_limits.{place}.coefficients"
+        coefficients = np.zeros(6)
+        for name, value in sums.coefficients.items():
+            coefficients[_joint(robot, name, where)] = value
+        if not coefficients.any():
+            raise InputError(where, "all are zero")
+        limits.append(_limit(sums.name or _sum(sums.coefficients), coefficients, sums))
+    return tuple(limits)
+
+
+def _joint(robot: Robot, name: str, where: str) -> int:
+    if name not in robot.joint_names:
+        raise InputError(where, f"no such joint {name!r}; have: {', '.join(robot.joint_names)}")
+    return robot.joint_names.index(name)
+
+
+def _limit(name: str, coefficients: Array, limits: _Range) -> Limit:
+    lower, upper = np.deg2rad([limits.lower_deg, limits.upper_deg])
+    return Limit(name, coefficients, float(lower), float(upper))
+
+
+def _sum(coefficients: dict[str, float]) -> str:
+    """Return a sum as people write it, such as ``R+T`` or ``R-0.5T``."""
+    terms = [
+        f"{value:+g}{name}".replace("+1" + name, "+" + name).replace("-1" + name, "-" + name)
+        for name, value in coefficients.items()
+    ]
+    return "".join(terms).removeprefix("+")

@@ -1,0 +1,83 @@
+"""Is a whole motion free of collision, at its postures and between them?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.cell.clearance import PartTree, wheel_clearance
+from opl.cell.collision import CollisionScene
+from opl.cell.robot import forward
+from opl.cell.workcell import PART, WHEEL, WorkCell
+from opl.geometry.frames import Array
+from opl.motion.motion import FREE_MOVES, Motion
+
+RESOLUTION = np.deg2rad(1.0)  # largest joint change between two postures that are asked
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A move that collides.
+
+    Attributes:
+        move: Index of the posture that the move ends at.
+        pair: Names of the two bodies.
+        at_end: Whether the posture itself collides, not only the way to it.
+    """
+
+    move: int
+    pair: tuple[str, str]
+    at_end: bool
+
+
+def densify(q: Array, resolution: float) -> tuple[Array, np.ndarray]:
+    """Put postures on the joint lines between postures.
+
+    Args:
+        q: Joint positions in [rad], shape (n, 6).
+        resolution: Largest change of any joint between two of the result in [rad].
+
+    Returns:
+        Postures, shape (m, 6), ending with the last; and for each the index of the move that it
+        belongs to (the posture that the move ends at), shape (m,).
+    """
+    counts = np.maximum(np.ceil(np.abs(np.diff(q, axis=0)).max(axis=1) / resolution), 1).astype(int)
+    move = np.repeat(np.arange(1, len(q)), counts)
+    ends = np.cumsum(counts)
+    fraction = (np.arange(len(move)) - np.repeat(ends - counts, counts) + 1) / counts[move - 1]
+    dense = q[move - 1] + fraction[:, None] * (q[move] - q[move - 1])
+    return np.concatenate([q[:1], dense]), np.concatenate([[0], move])
+
+
+def find_faults(
+    cell: WorkCell, scene: CollisionScene, part: PartTree, motion: Motion
+) -> list[Fault]:
+    """Return every move of a motion that collides, once each, in order.
+
+    The part may sink into the belt by the contact allowance while it is on the wheel or on its way
+    along the normal; on free moves it keeps the clearance from the wheel as from all else.
+
+    Args:
+        cell: The cell.
+        scene: Its geometry.
+        part: The triangles of the part.
+        motion: The motion.
+    """
+    q, move = densify(motion.q, RESOLUTION)
+    Ts_base_flange = forward(cell.robot, q)
+    free_move = np.array([stretch in FREE_MOVES for stretch in motion.stretch])
+    needed = np.where(free_move[move], cell.part_from_wheel, -cell.planned_allowance)
+    Ts_contact0_workpiece = cell.Ts_contact0_workpiece(Ts_base_flange)
+    cuts = wheel_clearance(part, cell.wheel, Ts_contact0_workpiece, needed) < needed
+    # a move that is refused for the wheel need not be asked about the rest
+    ask = ~np.isin(move, move[cuts])
+    hits = np.zeros(len(q), dtype=bool)
+    hits[ask] = scene.collides(q[ask])
+    faults = []
+    for index in np.unique(move[cuts | hits]):
+        on_move = np.flatnonzero(move == index)
+        first = on_move[(cuts | hits)[on_move]][0]
+        pair = (PART, WHEEL) if cuts[first] else scene.colliding_pairs(q[first])[0]
+        faults.append(Fault(int(index), pair, bool((cuts | hits)[on_move[-1]])))
+    return faults

@@ -1,0 +1,129 @@
+"""Where the ground point is slower than the set feed, why, and where the belt dwells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.errors import NoPathError
+from opl.motion.timing import Cause, Pace, Timing
+
+# The belt dwells where the ground point is slower than this part of the feed.
+HARDLY_MOVES = 0.5
+
+
+@dataclass(frozen=True)
+class Share:
+    """What one cause costs in a slow stretch.
+
+    Attributes:
+        cause: The cause.
+        joint: The joint to blame, None where none is.
+        longer: Time beyond that at the feed in [s].
+    """
+
+    cause: Cause
+    joint: int | None
+    longer: float
+
+
+@dataclass(frozen=True)
+class SlowStretch:
+    """A stretch of a pass on which the ground point is slower than the feed.
+
+    Attributes:
+        pass_index: The pass, counted from 0.
+        start: Cutter point it begins at, fractional between two.
+        end: Cutter point it ends at.
+        slowest: Lowest speed along the surface on any move of it in [m/s].
+        slowest_at: Cutter point where that move ends.
+        shares: What makes it slow, the dearest first.
+        dwell: Time that the part of it on which the ground point hardly moves takes beyond that at
+            the feed, in [s]; of several such parts the longest.
+        dwell_at: Cutter point of the slowest move in that part; NaN where there is none.
+    """
+
+    pass_index: int
+    start: float
+    end: float
+    slowest: float
+    slowest_at: float
+    shares: tuple[Share, ...]
+    dwell: float
+    dwell_at: float
+
+    @property
+    def longer(self) -> float:
+        """Time beyond that at the feed in [s]."""
+        return sum(share.longer for share in self.shares)
+
+
+def slow_stretches(timing: Timing, pace: Pace) -> tuple[SlowStretch, ...]:
+    """Return the stretches of the passes that are slower than the feed by a hundredth or more.
+
+    The ramps at both ends of a pass are not among them: the robot has to rest there.
+
+    Args:
+        timing: A motion with its times.
+        pace: What is asked for.
+    """
+    slow = np.array([cause is not Cause.NONE for cause in timing.cause])
+    index = timing.motion.pass_index
+    return tuple(_stretch(timing, pace, moves) for moves in _runs(slow, index))
+
+
+def dwell_refusal(stretches: tuple[SlowStretch, ...], pace: Pace) -> NoPathError | None:
+    """Return why a path is refused on which the belt would dwell too long, None if it is not."""
+    too_long = [one for one in stretches if one.dwell > pace.max_dwell]
+    if not too_long:
+        return None
+    return NoPathError(
+        f"the belt would dwell on one spot for more than {pace.max_dwell:g} s beyond the time at "
+        "the feed (process.max_dwell_s); raise process.contact_speed or lower process.feed_mm_s, "
+        "or let the contact move less (search.weights.contact)",
+        [
+            f"pass {one.pass_index + 1}, cutter point {one.dwell_at:.2f}: {one.dwell:.2f} s"
+            for one in too_long
+        ],
+    )
+
+
+def _runs(wanted: np.ndarray, index: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield each run of neighbouring moves that are wanted and of one pass."""
+    moves = np.flatnonzero(wanted)
+    breaks = (np.diff(moves) > 1) | (np.diff(index[moves]) != 0)
+    yield from (run for run in np.split(moves, np.flatnonzero(breaks) + 1) if len(run))
+
+
+def _stretch(timing: Timing, pace: Pace, moves: np.ndarray) -> SlowStretch:
+    motion = timing.motion
+    speed = timing.way / np.maximum(motion.duration, 1e-12)
+    longer = motion.duration - timing.way / pace.feed
+    shares: dict[tuple[Cause, int], float] = {}
+    for move in moves:
+        key = (timing.cause[move], int(timing.joint[move]))
+        shares[key] = shares.get(key, 0.0) + float(longer[move])
+    slowest = int(moves[speed[moves].argmin()])
+    hardly = np.zeros(len(motion), dtype=bool)
+    hardly[moves] = speed[moves] < HARDLY_MOVES * pace.feed
+    dwells = list(_runs(hardly, motion.pass_index))
+    longest = max(dwells, key=lambda run: longer[run].sum(), default=None)
+    return SlowStretch(
+        pass_index=int(motion.pass_index[slowest]),
+        start=float(motion.cutter_point[moves[0] - 1]),
+        end=float(motion.cutter_point[moves[-1]]),
+        slowest=float(speed[slowest]),
+        slowest_at=float(motion.cutter_point[slowest]),
+        shares=tuple(
+            Share(cause, joint if joint >= 0 else None, time)
+            for (cause, joint), time in sorted(shares.items(), key=lambda item: -item[1])
+        ),
+        dwell=0.0 if longest is None else float(longer[longest].sum()),
+        dwell_at=(
+            float("nan")
+            if longest is None
+            else float(motion.cutter_point[longest[speed[longest].argmin()]])
+        ),
+    )

@@ -1,0 +1,148 @@
+"""Free moves through the air, found around what is in the way: from home, between passes, home.
+
+The straight joint move is taken where it is free. Where it is not, a way of several straight moves
+is sought by sampling. A search that ends without one proves nothing, but costs seconds; so its ends
+are remembered. Whatever is joined to an end by a free straight move cannot do better than that end,
+and a posture that could not be joined with several others is taken to be shut in.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import cached_property
+
+import numpy as np
+
+from opl.cell.clearance import PartTree
+from opl.cell.collision import CollisionScene
+from opl.cell.workcell import WorkCell
+from opl.geometry.frames import Array
+from opl.motion.free_moves import FreeMoves
+from opl.motion.sampling import fewest, sample_way
+
+MOST_ASKED = 60_000  # postures, of one search
+MOST_IN_VAIN = 4  # searches from one posture before it is taken to be shut in
+MOST_NAMED = 100  # refused moves that are asked what is in their way
+# [rad] that a way may lead beyond both of its ends; less than half a turn of a wrist axis never was
+# seen to be too little, and the whole of its limits is much to search
+BEYOND = np.pi
+
+Blocker = tuple[str, ...]
+
+
+class NoLinkError(Exception):
+    """No free way between two postures was found.
+
+    Args:
+        pair: The two bodies that are in the way, most often where there are several; or what else
+            is.
+        end: 0 or 1 if that is so at the start or at the goal itself, else None.
+    """
+
+    def __init__(self, pair: Blocker, end: int | None = None) -> None:
+        super().__init__(" and ".join(pair))
+        self.pair = pair
+        self.end = end
+
+
+class Links:
+    """Ways through the air of one cell, and what is known of those that were not found."""
+
+    def __init__(self, cell: WorkCell, scene: CollisionScene, part: PartTree) -> None:
+        self.cell, self.scene, self.part = cell, scene, part
+        self._found: dict[tuple[bytes, bytes], Array] = {}
+        # ways that had to be sought, ends included; and ends between which that was in vain, with
+        # what was in the way
+        self._ways: list[Array] = []
+        self._in_vain: list[tuple[Array, Array, Blocker]] = []
+
+    @cached_property
+    def _moves(self) -> FreeMoves:
+        return FreeMoves(self.cell, self.scene, self.part)
+
+    def find(self, start: Array, goal: Array) -> Array:
+        """Return the postures to visit between two postures, shape (n, 6); none if it is free.
+
+        Args:
+            start: A posture in [rad], shape (6,).
+            goal: Another.
+
+        Raises:
+            NoLinkError: If no way is found, or an end is too near to something.
+        """
+        key = start.tobytes(), goal.tobytes()
+        if key not in self._found:
+            self._found[key] = self._find(start, goal)
+        return self._found[key]
+
+    def joined(self, first: Array, second: Array) -> bool:
+        """Return whether the straight move between two postures is free."""
+        return self._moves.free(first, second)
+
+    def _find(self, start: Array, goal: Array) -> Array:
+        if self._moves.free(start, goal):
+            return np.empty((0, len(start)))
+        for end, q in enumerate((start, goal)):
+            near = self._moves.pair_at(q)
+            if near is not None:
+                raise NoLinkError(near, end)
+        way = self._like_a_known_one(start, goal)
+        if way is None:
+            pair = self._shut_in(start) or self._shut_in(goal) or self._hopeless(start, goal)
+            if pair is not None:
+                raise NoLinkError(pair)
+            way = self._sample(start, goal)
+            self._ways.append(way)
+        return way[1:-1]
+
+    def _like_a_known_one(self, start: Array, goal: Array) -> Array | None:
+        """Return a way that shares one end with a known one and is joined to its other end."""
+        for known in self._ways:
+            for way in (known, known[::-1]):
+                if np.array_equal(way[0], start) and self._moves.free(way[-1], goal):
+                    return fewest(np.concatenate([way, goal[None]]), self._moves.free)
+                if np.array_equal(way[-1], goal) and self._moves.free(start, way[0]):
+                    return fewest(np.concatenate([start[None], way]), self._moves.free)
+        return None
+
+    def _hopeless(self, start: Array, goal: Array) -> Blocker | None:
+        """Return what is in the way, if an end is joined to one that was sought in vain."""
+        for one, other, pair in self._in_vain:
+            for near, far in ((one, other), (other, one)):
+                if np.array_equal(start, near) and self._moves.free(goal, far):
+                    return pair
+                if np.array_equal(goal, near) and self._moves.free(start, far):
+                    return pair
+        return None
+
+    def _shut_in(self, q: Array) -> Blocker | None:
+        """Return what shuts a posture in, if enough searches from it were in vain."""
+        pairs = [
+            pair for one, other, pair in self._in_vain if (q == one).all() or (q == other).all()
+        ]
+        return Counter(pairs).most_common(1)[0][0] if len(pairs) >= MOST_IN_VAIN else None
+
+    def _sample(self, start: Array, goal: Array) -> Array:
+        """Seek a way in coordinates in which a metre is the farthest that a point can move."""
+        robot, moves = self.cell.robot, self._moves
+        low = np.maximum(robot.lower, np.minimum(start, goal) - BEYOND)
+        high = np.minimum(robot.upper, np.maximum(start, goal) + BEYOND)
+        scale = moves.levers
+        end = moves.asked + MOST_ASKED
+        found = sample_way(
+            start * scale,
+            goal * scale,
+            low * scale,
+            high * scale,
+            lambda a, b: moves.free(a / scale, b / scale),
+            lambda: moves.asked >= end,
+        )
+        if found.way is not None:
+            return np.concatenate([start[None], found.way[1:-1] / scale, goal[None]])
+        refused = found.refused[:MOST_NAMED] / scale
+        pairs = [moves.first_pair(a, b) for a, b in refused]
+        met = Counter(pair for pair in pairs if pair is not None)
+        limits = " ".join(self.cell.broken_limits(refused[:, 1]))
+        pair: Blocker = met.most_common(1)[0][0] if met else (f"limits of {limits}",)
+        self._in_vain.append((start, goal, pair))
+        raise NoLinkError(pair)

@@ -1,0 +1,285 @@
+"""The fastest way along a line of postures that its wanted times and the joints allow.
+
+The law is TOPP-RA's (Pham and Pham, 2018, by toppra): the path speed is as high as its own limit
+(the wanted times) and the speed and acceleration of each joint permit. Between two places of its
+grid the line's slopes and the law's squared path speed are linear, so joint accelerations are
+largest at the ends of such a piece, and limits that are kept there are kept everywhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+from toppra.algorithm import TOPPRA
+from toppra.constraint import LinearConstraint
+from toppra.interpolator import AbstractGeometricPath
+
+from opl.errors import UnsafeError
+from opl.geometry.frames import Array
+from opl.motion.rounded import SAME_PLACE, RoundedLine
+
+# What a sampled joint speed or acceleration may be beyond its limit, as a fraction: round-off.
+TOLERANCE = 1e-3
+SAMPLE = 1e-3  # [s] between the samples at which a law is looked at again
+# Where on a straight piece the path speed may begin to change otherwise, from either end on.
+_GRADED = np.array([1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4])
+GRADES = np.concatenate([_GRADED, [1 / 2], 1.0 - _GRADED[::-1]])
+AROUND = 24  # places first taken on either side of what is too fast to be gone over evenly
+SHORT = 1e-3  # [s]: a straight piece not longer than this is halved only
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimits:
+    """What the joints can do.
+
+    Attributes:
+        speed: Largest speeds in [rad/s], shape (6,).
+        acceleration: Largest accelerations in [rad/s^2], shape (6,).
+    """
+
+    speed: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True, eq=False)
+class TimeLaw:
+    """When the robot is where on a line.
+
+    Attributes:
+        line: The line.
+        place: Places on it in [s], ascending, shape (g,).
+        pace: Change of the place with time there, 1 where the wanted times are kept, shape (g,).
+        speed_load: Largest part of its speed limit that each joint uses up on the piece that ends
+            at each place but the first, shape (g - 1, 6).
+        acceleration_load: The same of its acceleration limit.
+    """
+
+    line: RoundedLine
+    place: Array
+    pace: Array
+    speed_load: Array
+    acceleration_load: Array
+
+    @property
+    def time(self) -> Array:
+        """When it gets to each place in [s], from 0, shape (g,)."""
+        steps = 2.0 * np.diff(self.place) / (self.pace[:-1] + self.pace[1:])
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    @property
+    def node_index(self) -> np.ndarray:
+        """Which place is that of each posture of the line, shape (n,)."""
+        return np.searchsorted(self.place, self.line.nodes - 1e-12)
+
+    @property
+    def node_times(self) -> Array:
+        """When it gets to each posture of the line in [s], shape (n,)."""
+        return self.time[self.node_index]
+
+    def postures(self, time: Array) -> Array:
+        """Return the joint positions at times in [rad], shape (k, 6)."""
+        at = self.time
+        piece = np.clip(np.searchsorted(at, time, side="right") - 1, 0, len(at) - 2)
+        spent = time - at[piece]
+        change = np.diff(self.pace) / np.diff(at)
+        return self.line.postures(
+            self.place[piece] + (self.pace[piece] + change[piece] * spent / 2.0) * spent
+        )
+
+
+def fastest_law(line: RoundedLine, limits: JointLimits, at_rest: bool) -> TimeLaw:
+    """Return the fastest law along a line.
+
+    Args:
+        line: The line.
+        limits: What the joints can do.
+        at_rest: Whether the robot rests at both ends. If not, it comes and goes on straight on, as
+            fast as the line lets it.
+
+    Raises:
+        UnsafeError: If no law is found, or what is found does not keep the limits.
+    """
+    if at_rest:
+        whole = line
+    else:
+        whole = line.extended(*(_run_up(slope, limits) for slope in line.slope[[0, -1]]))
+    place = _grid(whole, limits)
+    slope = whole.slopes(place)
+    bend = np.diff(slope, axis=0) / np.diff(place)[:, None]
+    pace = _pace(place, slope, bend, limits, at_rest)
+    inside = slice(
+        int(np.searchsorted(place, line.knots[0] - 1e-12)),
+        int(np.searchsorted(place, line.knots[-1] - 1e-12)) + 1,
+    )
+    loads = _loads(slope, bend, place, pace, limits)
+    pieces = slice(inside.start, inside.stop - 1)
+    law = TimeLaw(line, place[inside], pace[inside], loads[0][pieces], loads[1][pieces])
+    require_limits(law, limits)
+    return law
+
+
+def _run_up(slope: Array, limits: JointLimits) -> float:
+    """Return the wanted time in which the whole pace is reached from rest, straight on, in [s]."""
+    return float(0.51 * np.max(np.abs(slope) / limits.acceleration)) + 1e-3
+
+
+def _grid(line: RoundedLine, limits: JointLimits) -> Array:
+    """Return the places at which a law may change, shape (g,)."""
+    knots = line.knots
+    length = np.diff(knots)
+    straight = np.abs(np.diff(line.slope, axis=0)).max(axis=1) < 1e-12
+    graded = straight & (length > SHORT)
+    places = [knots, knots[:-1][~graded] + length[~graded] / 2.0]
+    places.append((knots[:-1, None] + length[:, None] * GRADES)[graded].ravel())
+    # from rest to the whole pace on a straight piece, and back
+    for end, inwards in ((0, 1.0), (-1, -1.0)):
+        ramp = 0.5 * np.max(np.abs(line.slope[end]) / limits.acceleration)
+        if straight[end] and 0.0 < ramp < length[end]:
+            places.append(knots[[end]] + inwards * ramp)
+    found = np.unique(np.concatenate(places))
+    close = np.diff(found) < SAME_PLACE / 2.0
+    # of two places that are as good as one, the knot stays
+    gone = np.flatnonzero(close)
+    gone = np.where(np.isin(found[gone], knots), gone + 1, gone)
+    return np.delete(found, gone)
+
+
+def _loads(
+    slope: Array, bend: Array, place: Array, pace: Array, limits: JointLimits
+) -> tuple[Array, Array]:
+    """Return what a law uses up of speed and acceleration on each piece, shape (g - 1, 6) each."""
+    speed = np.abs(slope) * pace[:, None] / limits.speed
+    squared = pace[:, None] ** 2
+    gain = np.diff(squared, axis=0) / (2.0 * np.diff(place)[:, None])
+    at_start = slope[:-1] * gain + bend * squared[:-1]
+    at_end = slope[1:] * gain + bend * squared[1:]
+    acceleration = np.maximum(np.abs(at_start), np.abs(at_end)) / limits.acceleration
+    return np.maximum(speed[:-1], speed[1:]), acceleration
+
+
+def _pace(place: Array, slope: Array, bend: Array, limits: JointLimits, at_rest: bool) -> Array:
+    """Return the highest pace at each place, shape (g,).
+
+    The whole pace is kept but around the pieces that do not allow it. They are solved one by one,
+    with as much before and after as it takes to come down to their pace and up again.
+    """
+    steady = np.ones(len(place))
+    hot = np.maximum(*_loads(slope, bend, place, steady, limits)).max(axis=1) > 1.0
+    hot[[0, -1]] |= at_rest
+    last, around = len(place) - 1, AROUND
+    while True:
+        near = maximum_filter1d(hot.astype(int), 2 * around + 1, mode="constant")
+        edges = np.flatnonzero(np.diff(near, prepend=0, append=0))
+        pace = steady.copy()
+        for start, end in edges.reshape(-1, 2):
+            part = slice(start, end + 1)
+            found = _fastest_pace(
+                place[part], slope[part], bend[start:end], limits, start > 0, end < last
+            )
+            if found is None:
+                break
+            pace[part] = found
+        else:
+            return pace
+        if around >= last:
+            raise UnsafeError(
+                "no time law keeps the joints' speeds and accelerations; raise "
+                "process.max_acceleration_deg_s2 if the robot can do more"
+            )
+        around = min(4 * around, last)
+
+
+def _fastest_pace(
+    place: Array, slope: Array, bend: Array, limits: JointLimits, enters: bool, leaves: bool
+) -> Array | None:
+    """Return the highest pace over some pieces, None if toppra finds none.
+
+    Args:
+        place: Where the pieces end, shape (g,).
+        slope: There, shape (g, 6).
+        bend: Of each piece, shape (g - 1, 6).
+        limits: What the joints can do.
+        enters: Whether it comes at the whole pace, not from rest.
+        leaves: Whether it goes on at the whole pace, not at rest.
+    """
+    constraint = _Limits(place, slope, bend, limits)
+    search = TOPPRA([constraint], _Place(place), gridpoints=place, solver_wrapper="seidel")
+    search.compute_parameterization(float(enters), float(leaves))
+    pace = search.problem_data.sd_vec
+    if pace is None or np.isnan(pace).any() or (np.maximum(pace[:-1], pace[1:]) <= 0.0).any():
+        return None
+    return np.asarray(pace)
+
+
+def require_limits(law: TimeLaw, limits: JointLimits) -> None:
+    """Refuse a law whose postures, sampled, show more than the limits.
+
+    Nothing but positions is looked at: differences of samples never exceed what lies between.
+    """
+    duration = float(law.time[-1])
+    step = min(SAMPLE, duration / 100.0)
+    q = law.postures(np.arange(0.0, duration, step))
+    # what is left of round-off in positions of some radians
+    slack = 1e-14 / step ** np.arange(1, 3)
+    for order, limit, what in (
+        (1, limits.speed, "speed"),
+        (2, limits.acceleration, "acceleration"),
+    ):
+        found = np.abs(np.diff(q, order, axis=0)).max(axis=0) / step**order
+        over = (found - slack[order - 1]) / limit
+        if over.max() > 1.0 + TOLERANCE:
+            raise UnsafeError(
+                f"the time law asks for {100.0 * over.max():.2f} % of the {what} of joint "
+                f"{int(over.argmax()) + 1}"
+            )
+
+
+class _Place(AbstractGeometricPath):
+    """All that toppra asks of a path whose constraint brings its own derivatives."""
+
+    def __init__(self, place: Array) -> None:
+        self._ends = place[[0, -1]]
+
+    @property
+    def dof(self) -> int:
+        return 1
+
+    @property
+    def path_interval(self) -> Array:
+        return self._ends
+
+
+class _Limits(LinearConstraint):
+    """Speed and acceleration of all joints, at both ends of each piece of the grid.
+
+    toppra's own constraint takes second derivatives at the grid alone; where they jump, it would
+    take those of the wrong side.
+    """
+
+    def __init__(self, place: Array, slope: Array, bend: Array, limits: JointLimits) -> None:
+        super().__init__()
+        self.identical = True
+        length = np.diff(place)[:, None]
+        # u: half the change of the squared pace with the place, x: the squared pace at the start
+        at_start, at_end = slope[:-1], slope[1:] + 2.0 * length * bend
+        scale = np.tile(limits.acceleration, 2)
+        self._of_u = np.hstack([at_start, at_end]) / scale
+        self._of_x = np.hstack([bend, bend]) / scale
+        steepest = np.maximum(np.abs(slope[:-1]), np.abs(slope[1:])) / limits.speed
+        # Corners are passed no faster than they can be passed evenly. Without this the search
+        # takes some so fast that it has to all but stop within them, where a joint turns back.
+        sharpest = (np.abs(bend) / limits.acceleration).max(axis=1)
+        cap = 1.0 / np.maximum(np.maximum(steepest.max(axis=1) ** 2, sharpest), 1.0)
+        self._most = np.minimum(np.append(cap, cap[-1]), np.insert(cap, 0, cap[0]))
+
+    def compute_constraint_params(
+        self, path: AbstractGeometricPath, gridpoints: Array, *args: Any, **kwargs: Any
+    ) -> tuple[Any, ...]:
+        n, m = self._of_u.shape
+        of_u, of_x = (np.vstack([rows, rows[-1:]]) for rows in (self._of_u, self._of_x))
+        both = np.vstack([np.eye(m), -np.eye(m)])
+        bounds = np.column_stack([np.zeros(n + 1), self._most])
+        return of_u, of_x, np.zeros((n + 1, m)), both, np.ones(2 * m), None, bounds

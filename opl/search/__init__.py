@@ -1,0 +1,1 @@
+"""The searches: on arrays, they know no robot."""
