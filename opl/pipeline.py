@@ -10,7 +10,7 @@ from opl.cell.clearance import PartTree, part_tree, wheel_clearance
 from opl.cell.collision import CollisionScene
 from opl.cell.enclosure import enclosing_bodies
 from opl.cell.robot import forward
-from opl.cell.workcell import PART, WHEEL
+from opl.cell.workcell import PART, SECOND_OPINION_OF_A_LINK, WHEEL
 from opl.errors import InputError, NoPathError, NoWayError
 from opl.export import draw, job_date, write_program
 from opl.field.layer import wheel_layer
@@ -124,7 +124,7 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
     with clock("clearance"):
         part = part_tree(job.cell.part)
         layer = wheel_layer(job.cell, part, points, contact_positions)
-        scene = CollisionScene(job.cell)
+        scene = CollisionScene(job.cell).for_second_opinion()
     problem = GrindingProblem(
         job.cell, scene, part, points, field, layer, job.search.interpolation, job.pace
     )
@@ -146,6 +146,7 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
         needed = f"{1e3 * job.cell.clearance:g} mm (clearance_mm)"
         needed += " or their own clearance" if job.cell.pairs.clearances else ""
         told = f"at home these are nearer to each other than {needed} or collide: {pairs}"
+        told += f"; links are planned {1e3 * SECOND_OPINION_OF_A_LINK:g} mm farther away"
         raise InputError(job.around.home_key, told)
     return problem
 

@@ -144,7 +144,7 @@ def _changed(job: Job, cell: WorkCell, points: CutterPoints) -> GrindingProblem:
     part = part_tree(cell.part)
     return GrindingProblem(
         cell,
-        CollisionScene(cell),
+        CollisionScene(cell).for_second_opinion(),
         part,
         points,
         build_nodes(cell, points, positions),

@@ -66,7 +66,7 @@ def problem_of(job, points_of=None):
     part = part_tree(job.cell.part)
     return GrindingProblem(
         job.cell,
-        CollisionScene(job.cell),
+        CollisionScene(job.cell).for_second_opinion(),
         part,
         points,
         build_nodes(job.cell, points, positions),
@@ -133,7 +133,7 @@ def replay_tiny(motion=None, cell=None):
 
 def with_problem_cell(problem, cell):
     """Return a problem in another cell; nodes and wheel layer stay."""
-    return replace(problem, cell=cell, scene=CollisionScene(cell))
+    return replace(problem, cell=cell, scene=CollisionScene(cell).for_second_opinion())
 
 
 def with_obstacle(cell, p_base, size=(0.03, 0.03, 0.03), name="post"):

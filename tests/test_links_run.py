@@ -33,6 +33,8 @@ BACK_UNDER_IT = {
     "search.max_contact_error_mm": 1.5,
     "passes.bow_height_mm": 1.0,
     "passes.largest_step_mm": 60,
+    # so near the wheel that ways in the air graze the plate
+    "process.approach_mm": 10,
 }
 SIDEWAYS = [-60, -45, -50, 0, 50, -180]  # a home far from the wheel
 

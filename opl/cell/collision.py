@@ -13,7 +13,13 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.workcell import PART, WHEEL, WorkCell
+from opl.cell.workcell import (
+    PART,
+    SECOND_OPINION,
+    SECOND_OPINION_OF_A_LINK,
+    WHEEL,
+    WorkCell,
+)
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Body, Box, Cylinder
@@ -68,6 +74,21 @@ class CollisionScene:
         self._manager = pin.BroadPhaseManager_NaiveCollisionManager(
             self._model, self._geometry, self._geometry_data
         )
+
+    def for_second_opinion(self) -> CollisionScene:
+        """Return the scene with as much more clearance as a second opinion may take away.
+
+        What this scene calls free, the replay of the verification calls free too.
+        """
+        scene = copy(self)
+        links = [
+            (pair.first < self._n_links) + (pair.second < self._n_links)
+            for pair in self._geometry.collisionPairs
+        ]
+        reserves = np.maximum(np.array(links) * SECOND_OPINION_OF_A_LINK, SECOND_OPINION)
+        scene._margins = self._margins + reserves
+        scene._prepare(scene._margins, range(0))
+        return scene
 
     def against_surroundings(self, reserve: float) -> CollisionScene:
         """Return the scene with more clearance, asked only about what does not move.

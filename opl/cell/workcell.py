@@ -16,7 +16,10 @@ from opl.geometry.wheel import ContactWheel
 
 WHEEL = "wheel"
 PART = "part"
-SECOND_OPINION = 1e-4  # [m]; PyBullet was seen to differ by 0.08 mm at the rim of the wheel
+# [m] how much nearer the second opinion may see two bodies than they are: PyBullet was seen to
+# differ by 0.08 mm at the rim of the wheel, and it is held to rounding the edges of a link
+SECOND_OPINION = 1e-4
+SECOND_OPINION_OF_A_LINK = 1e-3
 
 
 @dataclass(frozen=True)
