@@ -22,7 +22,7 @@ from opl.verification.replay import replay
 from opl.verification.ways import Ways
 
 RULE = Rule(
-    1e-4, small_job().search.interpolation.max_contact_step, small_job().pace.approach_length
+    1e-4, small_job().search.interpolation.max_contact_step, small_job().pace.approach_length, 0.0
 )
 
 

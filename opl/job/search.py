@@ -130,6 +130,7 @@ class ProcessSection(Document):
     feed_mm_s: Positive
     home_deg: Six | None = None  # else the cell file says it
     approach_mm: Positive = 50.0
+    approach_turn_deg: Annotated[float, Field(ge=0.0, le=90.0)] = 0.0  # 0: straight
     approach_mm_s: Positive = 50.0
     air_speed_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 10.0
     contact_speed: Positive = 40.0
@@ -148,6 +149,7 @@ class ProcessSection(Document):
         return Pace(
             feed=self.feed_mm_s * MM,
             approach_length=self.approach_mm * MM,
+            approach_turn=float(np.deg2rad(self.approach_turn_deg)),
             approach_speed=self.approach_mm_s * MM,
             air_speed=self.air_speed_percent / 100.0,
             contact_speed=self.contact_speed,

@@ -1,7 +1,7 @@
 """From the path on the wheel to a whole motion: home, approach, passes, retract, links, home.
 
-The part comes to the wheel and leaves it along the contact normal; between passes, and from and to
-home, all joints move together on a straight line in joint space, or on several around what is in
+The part comes to the wheel and leaves it as `opl.motion.leads` says; between passes, and from and
+to home, all joints move together on a straight line in joint space, or on several around what is in
 the way.
 """
 
@@ -14,13 +14,14 @@ from opl.cell.workcell import WorkCell
 from opl.field.path import GrindingPath
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
+from opl.motion.leads import lead_offsets
 from opl.motion.links import Links, NoLinkError
 from opl.motion.motion import FREE_MOVES, Motion, Stretch
-from opl.motion.timing import Pace, lead_count
+from opl.motion.timing import Pace
 
 
 class UnreachableApproachError(Exception):
-    """The postures that lead to or from the wheel along the contact normal do not exist.
+    """The postures that lead to or from the wheel do not exist.
 
     Args:
         column: The cutter point.
@@ -68,12 +69,13 @@ def whole_motion(cell: WorkCell, points: CutterPoints, path: GrindingPath, pace:
                 cell,
                 points,
                 pace,
+                stretch,
                 path.branch,
                 int(path.cutter_point[k]),
                 path.contact_position[k],
                 path.q[k],
             )
-            for k in (first, last)
+            for k, stretch in ((first, Stretch.APPROACH), (last, Stretch.RETRACT))
         )
         air = Stretch.HOME if index == 0 else Stretch.LINK
         legs.append(_Leg(lead_in[-1:], air, index))
@@ -165,17 +167,19 @@ def lead(
     cell: WorkCell,
     points: CutterPoints,
     pace: Pace,
+    stretch: Stretch,
     branch: int,
     column: int,
     contact_position: float,
     q_contact: Array,
 ) -> Array:
-    """Return postures from just off the wheel to the end of the retract, shape (k, 6).
+    """Return postures from just off the wheel to the far end of a lead, shape (k, 6).
 
     Args:
         cell: The cell.
         points: The cutter points.
-        pace: How long it is.
+        pace: How long it is, and how far it turns.
+        stretch: Whether it is the approach or the retract.
         branch: Slot of the inverse kinematics.
         column: The cutter point that is ground.
         contact_position: Where on the wheel.
@@ -184,10 +188,9 @@ def lead(
     Raises:
         UnreachableApproachError: If it leaves reach or limits.
     """
-    count = lead_count(pace)
-    T_contact_away = np.tile(np.eye(4), (count, 1, 1))
-    # z of the contact frame points into the wheel
-    T_contact_away[:, 2, 3] = -pace.approach_length * np.arange(1, count + 1) / count
+    offsets = lead_offsets(pace.approach_length, pace.approach_turn, stretch)
+    T_contact_away = np.tile(np.eye(4), (len(offsets), 1, 1))
+    T_contact_away[:, :3, 3] = offsets
     T_base_contact = cell.wheel.T_base_contact(contact_position)
     T_base_flange = cell.Ts_base_flange(contact_position, points.Ts_workpiece_cutter[column])
     T_contact_flange = np.linalg.solve(T_base_contact, T_base_flange)

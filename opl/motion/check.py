@@ -56,7 +56,7 @@ def find_faults(
     """Return every move of a motion that collides, once each, in order.
 
     The part may sink into the belt by the contact allowance while it is on the wheel or on its way
-    along the normal; on free moves it keeps the clearance from the wheel as from all else.
+    to and from it; on free moves it keeps the clearance from the wheel as from all else.
 
     Args:
         cell: The cell.

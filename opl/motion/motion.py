@@ -14,10 +14,10 @@ class Stretch(str, Enum):
 
     HOME = "home"  # free move from or to the home posture
     LINK = "link"  # free move between two passes
-    APPROACH = "approach"  # straight along the contact normal, towards the wheel
+    APPROACH = "approach"  # along the contact normal or an arc, towards the wheel
     GRIND = "grind"  # on the wheel, at a cutter point
     BETWEEN = "between"  # on the wheel, at an intermediate node between two cutter points
-    RETRACT = "retract"  # straight along the contact normal, away from the wheel
+    RETRACT = "retract"  # along the contact normal or an arc, away from the wheel
 
 
 FREE_MOVES = (Stretch.HOME, Stretch.LINK)

@@ -1,6 +1,6 @@
 """How long each move of a motion takes: at the set feed, and no faster than the joints can follow.
 
-On the wheel and along the contact normal the time law of `opl.motion.time_law` is asked what the
+On the wheel and on the way to and from it the time law of `opl.motion.time_law` is asked what the
 joints can follow; a free move turns at its share of top speed. The ramps with which a robot leaves
 and comes to rest are no part of these times, nor are they of the speeds of a program: the
 controller adds them. `opl.program.cycle` counts them.
@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from opl.cell.robot import Robot
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
+from opl.motion.leads import lead_count
 from opl.motion.motion import Motion, Stretch
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, TimeLaw, fastest_law
 
-LEAD_SPACING = 0.005  # [m] between postures along the normal: joint lines stay near it
 # Wanted time of a move in [s] below which its end is no posture of its own for the time law.
 SHORTEST = 1e-6
 FOLLOWED = 1.01  # a move that takes no longer than this times what is wanted keeps it
@@ -44,8 +44,10 @@ class Pace:
 
     Attributes:
         feed: Speed of the ground point along the surface in [m/s].
-        approach_length: Length of approach and retract along the contact normal in [m].
-        approach_speed: Speed along the contact normal in [m/s].
+        approach_length: Length of approach and retract in [m].
+        approach_turn: What their direction turns by in [rad]; 0 for straight along the contact
+            normal.
+        approach_speed: Speed of both in [m/s].
         contact_speed: Largest speed of the contact position on the wheel in belt units per second:
             pivoting takes time even where the ground point hardly moves.
         max_dwell: Longest that the belt may stay on one spot beyond the time at the feed in [s].
@@ -55,6 +57,7 @@ class Pace:
 
     feed: float
     approach_length: float
+    approach_turn: float
     approach_speed: float
     contact_speed: float
     max_dwell: float
@@ -78,11 +81,6 @@ class Timing:
     way: Array
     cause: tuple[Cause, ...]
     joint: NDArray[np.int64]
-
-
-def lead_count(pace: Pace) -> int:
-    """Return into how many moves an approach or retract is cut."""
-    return max(int(np.ceil(pace.approach_length / LEAD_SPACING)), 1)
 
 
 def timed(motion: Motion, points: CutterPoints, pace: Pace, robot: Robot) -> Motion:
@@ -114,7 +112,8 @@ def time_motion(motion: Motion, points: CutterPoints, pace: Pace, robot: Robot) 
     on_wheel = np.array([kind == _WHEEL for kind, _ in kinds])
     way = np.where(on_wheel, np.abs(np.diff(arc, prepend=np.nan)), np.nan)
     over_wheel = np.abs(np.diff(motion.contact_position, prepend=np.nan)) / pace.contact_speed
-    lead = pace.approach_length / lead_count(pace) / pace.approach_speed
+    count = lead_count(pace.approach_length, pace.approach_turn)
+    lead = pace.approach_length / count / pace.approach_speed
     air = np.array([kind == _AIR for kind, _ in kinds])
     wanted = np.where(air, fastest / pace.air_speed, lead)
     wanted[on_wheel] = np.maximum(way / pace.feed, over_wheel)[on_wheel]

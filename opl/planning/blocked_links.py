@@ -47,23 +47,31 @@ def block_link(
     elif between and error.end == 1:
         branch.block_node(after, int(rows[after]), f"approach: {cause}")
     elif between:
-        from_rows = _joined(problem, branch, before, int(rows[before]), motion.q[move - 1])
-        to_rows = _joined(problem, branch, after, int(rows[after]), motion.q[move])
+        start, goal = motion.q[move - 1], motion.q[move]
+        from_rows = _joined(problem, branch, Stretch.RETRACT, before, int(rows[before]), start)
+        to_rows = _joined(problem, branch, Stretch.APPROACH, after, int(rows[after]), goal)
         branch.block_steps(before, from_rows, to_rows, f"link: {cause}")
     else:
+        lead_there = Stretch.RETRACT if index < 0 else Stretch.APPROACH
         end, posture = (before, move - 1) if index < 0 else (after, move)
-        for row in _joined(problem, branch, end, int(rows[end]), motion.q[posture]):
+        for row in _joined(problem, branch, lead_there, end, int(rows[end]), motion.q[posture]):
             branch.block_node(end, row, cause)
 
 
 def _joined(
-    problem: GrindingProblem, branch: Branch, column: int, row: int, q_away: Array
+    problem: GrindingProblem,
+    branch: Branch,
+    stretch: Stretch,
+    column: int,
+    row: int,
+    q_away: Array,
 ) -> list[int]:
     """Return the rows whose postures off the wheel are joined to one of them by free moves.
 
     Args:
         problem: What is to be planned.
         branch: The branch.
+        stretch: Whether they are off the wheel before it, approach, or after it, retract.
         column: The cutter point.
         row: A row, which is among those returned.
         q_away: Its posture at the end of approach or retract in [rad], shape (6,).
@@ -75,20 +83,23 @@ def _joined(
     for side in (free[t[free] > t[row]], free[t[free] < t[row]], free[t[free] == t[row]]):
         last = q_away
         for other in side[np.argsort(np.abs(t[side] - t[row]), kind="stable")].tolist():
-            q = _away(problem, branch, column, other)
+            q = _away(problem, branch, stretch, column, other)
             if other != row and q is not None and problem.links.joined(last, q):
                 found.append(other)
                 last = q
     return found
 
 
-def _away(problem: GrindingProblem, branch: Branch, column: int, row: int) -> Array | None:
-    """Return where approach and retract of a node end, None if they cannot be made."""
+def _away(
+    problem: GrindingProblem, branch: Branch, stretch: Stretch, column: int, row: int
+) -> Array | None:
+    """Return where approach or retract of a node is farthest off, None if it cannot be made."""
     try:
         return lead(
             problem.cell,
             problem.points,
             problem.pace,
+            stretch,
             branch.nodes.branch,
             column,
             branch.nodes.contact_position[row],

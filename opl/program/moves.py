@@ -37,7 +37,7 @@ class Kind(str, Enum):
     """What a move is for."""
 
     WHEEL = "on_wheel"  # grinding
-    LEAD = "lead"  # along the contact normal, to or from the wheel
+    LEAD = "lead"  # approach or retract, to or from the wheel
     AIR = "air"  # from and to home, and between passes
 
 

@@ -78,7 +78,10 @@ def prove(
         return Proof(tuple(files), foreign, 0, None, None, (*refused, *doubtful))
     search = job.search
     rule = Rule(
-        search.max_contact_error, search.interpolation.max_contact_step, job.pace.approach_length
+        search.max_contact_error,
+        search.interpolation.max_contact_step,
+        job.pace.approach_length,
+        job.pace.approach_turn,
     )
     found = recognise(job.cell, points, playback.q, playback.duration, playback.stations, rule)
     replayed = replay(job.cell, points, found.motion, search.max_contact_error, progress)

@@ -27,7 +27,7 @@ from opl.verification.world import World
 # [m] that a posture may be off the contact model at the cutter point it grinds: what the digits of
 # a position leave. Farther off it passes by; that is for the way between cutter points.
 AT_POINT = 5e-5
-ASIDE = 2e-4  # [m] that a posture of an approach may be beside the contact normal
+ASIDE = 2e-4  # [m] that a posture of an approach may be beside the contact normal or the arc
 FARTHER = 1e-3  # [m] than the approach is long that still is approach
 
 
@@ -39,12 +39,15 @@ class Rule:
         max_contact_error: Farthest that a ground point may be from where the contact model has it,
             in [m].
         max_contact_step: Largest change of t between neighbouring postures on the wheel.
-        approach_length: Of approach and retract along the contact normal in [m].
+        approach_length: Of approach and retract in [m].
+        approach_turn: What they turn by in [rad]: 0 if they run along the contact normal, else they
+            are arcs that begin and end along the belt, y of the contact frame.
     """
 
     max_contact_error: float
     max_contact_step: float
     approach_length: float
+    approach_turn: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,24 +197,37 @@ class _Labels:
         return firsts, lasts
 
     def _leading(self, k: int, point: int, t: float, step: int) -> list[int]:
-        """Return the postures off the wheel along the normal next to posture k, nearest first."""
+        """Return the postures off the wheel along the lead next to posture k, nearest first."""
         T_cutter = self._points.Ts_workpiece_cutter[point]
         to_contact = inverse(self._wheel.T_contact0_contact(t))
-        height, found = 0.0, []
+        farthest, found = 0.0, []
         j = int(k) + step
         while 0 <= j < len(self._Ts) and self._stretch[j] is Stretch.HOME:
             T_contact_cutter = to_contact @ self._Ts[j] @ T_cutter
-            aside = np.hypot(*T_contact_cutter[:2, 3])
-            above = -float(T_contact_cutter[2, 3])  # z of the contact frame points into the wheel
+            along, aside = self._along_lead(T_contact_cutter[:3, 3], step)
             turned = np.linalg.norm(T_contact_cutter[:3, :3] - np.eye(3)) / np.sqrt(2.0)
-            if aside > ASIDE or turned > ALIGNED or not above > height:
+            if aside > ASIDE or turned > ALIGNED or not along > farthest:
                 break
-            if above > self._rule.approach_length + FARTHER:
+            if along > self._rule.approach_length + FARTHER:
                 break
-            height = above
+            farthest = along
             found.append(j)
             j += step
         return found
+
+    def _along_lead(self, p_contact: Array, side: int) -> tuple[float, float]:
+        """Return how far along approach or retract a point is and how far beside it, in [m].
+
+        Args:
+            p_contact: The ground point in the contact frame, whose z points into the wheel, (3,).
+            side: -1 for the approach, which comes from -y, 1 for the retract.
+        """
+        x, y, z = (float(v) for v in p_contact)
+        if self._rule.approach_turn == 0.0:
+            return -z, float(np.hypot(x, y))
+        radius = self._rule.approach_length / self._rule.approach_turn
+        y, z = side * y, z + radius  # seen from the centre of the arc
+        return radius * float(np.arctan2(y, z)), float(np.hypot(x, np.hypot(y, z) - radius))
 
     def _name_the_air(self, firsts: list[int], lasts: list[int]) -> None:
         """Tell the ways from and to home from the links between passes."""

@@ -36,7 +36,7 @@ GAP_ACCURACY = 1e-4  # [m]
 FARTHEST_GAP = 0.005  # [m] between part and wheel that is measured while grinding
 
 ON_WHEEL = (Stretch.GRIND, Stretch.BETWEEN)
-ALONG_NORMAL = (Stretch.APPROACH, Stretch.RETRACT)
+ALONG_LEAD = (Stretch.APPROACH, Stretch.RETRACT)
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ class _Run:
         motion, cell = self._motion, self._cell
         grinding = motion.stretch[move] in ON_WHEEL
         touching_down = grinding and motion.stretch[move - 1] is Stretch.APPROACH
-        free = not grinding and motion.stretch[move] not in ALONG_NORMAL
+        free = not grinding and motion.stretch[move] not in ALONG_LEAD
         off_wheel = cell.pairs.clearances.get(frozenset((PART, WHEEL)), cell.clearance)
         needed = off_wheel if free else -cell.contact_allowance
         farthest = self._allowed_error + GAP_ACCURACY if grinding and not touching_down else np.inf
