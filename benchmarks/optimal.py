@@ -110,8 +110,9 @@ def search(part: str, rows: int) -> None:
     assert refinement is not None and plan.gap is not None
     print(
         f"{part}, {rows} rows, {len(points)} points: {clock.told('clearance', 'search')}; sum "
-        f"{refinement.joint_range_sum:.5f} rad, bound {plan.lower_bound:.5f}, "
-        f"gap {100 * plan.gap:.3f} %, refined {path.joint_range_sum:.5f}; "
+        f"{path.joint_range_sum:.5f} rad, bound {plan.lower_bound:.5f} at "
+        f"{refinement.bound_positions} positions, gap {100 * plan.gap:.3f} %; in the field "
+        f"{refinement.joint_range_sum:.5f}, bound {refinement.lower_bound:.5f}; "
         f"joint travel {path.joint_travel:.2f} (recursive {other.joint_travel:.2f}), "
         f"travel of t {path.contact_travel:.1f} (recursive {other.contact_travel:.1f})"
     )

@@ -136,13 +136,16 @@ def _weighted(weighted: WeightedValue | None) -> dict[str, Any] | None:
 
 
 def _refinement(refinement: Refinement | None) -> dict[str, Any] | None:
-    """Return what the bound and the gap speak of, and what was gained on it."""
+    """Return what there was at the contact positions of the job, and what was gained on it."""
     if refinement is None:
         return None
+    bound = refinement.lower_bound
     return {
         "field_joint_range_sum_rad": _rounded(refinement.joint_range_sum),
+        "field_lower_bound_rad": None if bound is None else _rounded(bound),
         "gain_rad": _rounded(refinement.gain),
         "rounds": refinement.rounds,
+        "bound_contact_positions": refinement.bound_positions,
     }
 
 

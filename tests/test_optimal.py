@@ -24,6 +24,7 @@ from opl.motion.figures import figures_of_path
 from opl.motion.timing import timed
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import roughness
+from opl.planning.finer_bound import finer_bound
 from opl.planning.objective import ObjectiveWeights
 from opl.planning.optimal import plan_optimal
 from opl.planning.plan import plan_recursive
@@ -101,8 +102,9 @@ def test_the_motion_attains_the_value_and_the_bound_lies_below_that_of_the_field
     value = np.ptp(on_wheel(plan.motion), axis=0).sum()
     assert plan.path.joint_range_sum == pytest.approx(value, abs=1e-12)
     assert value <= recursive(make).path.joint_range_sum
-    assert 0.0 < plan.lower_bound <= plan.refinement.joint_range_sum
-    assert plan.gap == pytest.approx(1.0 - plan.lower_bound / plan.refinement.joint_range_sum)
+    assert 0.0 < plan.lower_bound <= plan.path.joint_range_sum
+    assert plan.refinement.lower_bound <= plan.refinement.joint_range_sum
+    assert plan.gap == pytest.approx(1.0 - plan.lower_bound / plan.path.joint_range_sum)
 
 
 @CELLS
@@ -170,8 +172,24 @@ def test_the_bound_of_a_tiny_field_is_the_least_sum_of_all_its_tracks(first):
     problem = problem_of(with_positions(small_job(), 7), slice(first, first + 4))
     plan = plan_optimal(problem, SETTINGS, plan_recursive(problem))
     least = min(np.ptp(q, axis=0).sum() for q, _ in free_tracks(problem))
-    assert plan.lower_bound == pytest.approx(least, rel=1e-5)
-    assert plan.lower_bound <= least + 1e-12
+    bound = plan.refinement.lower_bound
+    assert bound == pytest.approx(least, rel=1e-5)
+    assert bound <= least + 1e-12
+
+
+@pytest.mark.parametrize("first", [22, 36])
+def test_the_bound_of_a_finer_field_is_the_least_sum_of_all_its_tracks(first):
+    coarse, fine = (
+        problem_of(with_positions(small_job(), count), slice(first, first + 4)) for count in (7, 13)
+    )
+    least = min(np.ptp(q, axis=0).sum() for q, _ in free_tracks(fine))
+    positions = halved(coarse.field.contact_positions)
+    np.testing.assert_allclose(positions, fine.field.contact_positions, atol=1e-9)
+    bound = finer_bound(coarse, positions, SETTINGS, 1.1 * least, np.inf)
+    assert least * (1.0 - 2.0 * SETTINGS.widen) <= bound <= least + 1e-9
+    # nothing is smaller than the least, up to the fraction to which boxes are solved
+    below = finer_bound(coarse, positions, SETTINGS, 0.9 * least, np.inf)
+    assert below == pytest.approx(0.9 * least, rel=2e-6)
 
 
 def test_what_collides_is_avoided_and_the_bound_still_holds():
@@ -181,8 +199,9 @@ def test_what_collides_is_avoided_and_the_bound_still_holds():
     haunted = replace(problem, scene=ghosts)
     plan = plan_optimal(haunted, SETTINGS, plan_recursive(haunted))
     assert not ghosts.collides(densify(plan.motion.q, RESOLUTION)[0]).any()
-    assert plan.lower_bound <= plan.refinement.joint_range_sum
-    assert plan.lower_bound >= free.lower_bound - 1e-9  # what is out can only raise it
+    bound = plan.refinement.lower_bound
+    assert bound <= plan.refinement.joint_range_sum
+    assert bound >= free.refinement.lower_bound - 1e-9  # what is out can only raise it
 
 
 def test_an_interrupted_search_returns_what_there_was_and_a_bound_that_holds():

@@ -168,16 +168,17 @@ def _certified(plan: Plan, n_positions: int) -> Iterator[str]:
     if plan.lower_bound <= 0.0:
         yield "the time was up before anything was proven of the least joint range sum there is"
         return
+    if plan.refinement is not None and plan.refinement.rounds:
+        yield (
+            f"contact positions between the {n_positions} bring the joint range sum from "
+            f"{plan.refinement.joint_range_sum:.4f} to {plan.path.joint_range_sum:.4f} rad"
+        )
+        n_positions = plan.refinement.bound_positions
     yield (
         f"no path through these points at {n_positions} contact positions has a joint range sum "
         f"below {plan.lower_bound:.4f} rad: the one found is within {100.0 * plan.gap:.3f} % of "
         "the least there is"
     )
-    if plan.refinement is not None and plan.refinement.rounds:
-        yield (
-            f"contact positions between them bring it from {plan.refinement.joint_range_sum:.4f} "
-            f"to {plan.path.joint_range_sum:.4f} rad"
-        )
 
 
 def show_proof(job: Job, points: CutterPoints, proof: Proof, as_written: bool | None) -> None:

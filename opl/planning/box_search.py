@@ -114,6 +114,11 @@ class BoxSearch:
             _, best = self._certify(self._branches, REFINED_GAP)
         return None
 
+    def prove(self, found: float) -> float:
+        """Return the lower bound without a search, as `lower_bound` does after one."""
+        self._bound, _ = self._certify(self._original, PROOF_GAP)
+        return self.lower_bound(found)
+
     def lower_bound(self, found: float) -> float:
         """Return the least joint range sum of any track through the cutter points, in [rad].
 

@@ -2,7 +2,7 @@
 
 First over the field: at its contact positions the least box is known, and how far the path that was
 found is from it. Then contact positions between these are taken in around the path, which may lead
-to less than is possible without them.
+to less than is possible without them; if so, the bound is proven anew for all that were taken.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from opl.geometry.frames import Array
 from opl.planning.box_search import PROOF_GAP, REFINED_GAP, BoxSearch, OptimalSettings
+from opl.planning.finer_bound import finer_bound
 from opl.planning.plan import Plan, Refinement
 from opl.planning.problem import GrindingProblem
 from opl.planning.refine import RefinedProblem
@@ -32,7 +34,7 @@ def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: 
             not travel further than along it.
 
     Returns:
-        The plan with the lower bound of the field, and what was gained between its positions.
+        The plan with its lower bound, and what was gained between the positions of the field.
     """
     deadline = time.monotonic() + settings.seconds
     most = _travel(fallback)
@@ -42,18 +44,26 @@ def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: 
     if plan is None or plan.path.joint_range_sum > fallback.path.joint_range_sum:
         plan, refined = fallback, whole
     plan = replace(plan, lower_bound=search.lower_bound(plan.path.joint_range_sum))
-    return _between_positions(refined, plan, settings, most, deadline)
+    plan, positions = _between_positions(refined, plan, settings, most, deadline)
+    found, bound = plan.path.joint_range_sum, plan.lower_bound
+    if bound is not None and plan.refinement is not None and found < bound:
+        # less than is possible without the finer positions: with them, a lower bound holds
+        bound = finer_bound(problem, positions, settings, found, deadline)
+        refinement = replace(plan.refinement, bound_positions=len(positions))
+        plan = replace(plan, lower_bound=bound, refinement=refinement)
+    return plan
 
 
 def _between_positions(
     refined: RefinedProblem, plan: Plan, settings: OptimalSettings, most: Travel, deadline: float
-) -> Plan:
-    """Return a plan with its contact positions refined, as long as that is worth it.
+) -> tuple[Plan, Array]:
+    """Return a plan with its contact positions refined as long as that is worth it, and these.
 
     Where joints or contact still move further than wanted, what was gained may be spent on that.
     """
     start = plan
-    finer = refined.problem.field.contact_positions
+    positions = finer = refined.problem.field.contact_positions
+    n_positions = len(positions)
     gain = np.inf
     rounds = 0
     while rounds < MOST_ROUNDS and time.monotonic() < deadline:
@@ -68,6 +78,7 @@ def _between_positions(
             break
         gain = 1.0 - found.path.joint_range_sum / plan.path.joint_range_sum
         plan, refined = replace(found, checks=plan.checks + found.checks), search.refined
+        positions = finer
         rounds += 1
     if rounds and not _travel(plan).within(most):
         room = start.path.joint_range_sum
@@ -76,10 +87,11 @@ def _between_positions(
         search = BoxSearch(around, settings, most, ceiling, deadline, room)
         calm = search.run(REFINED_GAP)
         if calm is not None and calm.path.joint_range_sum <= room and _travel(calm).within(most):
-            plan = replace(calm, checks=plan.checks + calm.checks)
-    value = start.path.joint_range_sum
-    refinement = Refinement(value, value - plan.path.joint_range_sum, rounds)
-    return replace(plan, lower_bound=start.lower_bound, refinement=refinement)
+            plan, positions = replace(calm, checks=plan.checks + calm.checks), finer
+    value, bound = start.path.joint_range_sum, start.lower_bound
+    gain = value - plan.path.joint_range_sum
+    refinement = Refinement(value, bound, gain, rounds, n_positions)
+    return replace(plan, lower_bound=bound, refinement=refinement), positions
 
 
 def _travel(plan: Plan) -> Travel:

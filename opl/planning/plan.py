@@ -36,13 +36,18 @@ class Refinement:
 
     Attributes:
         joint_range_sum: Of the best path found at the field's contact positions in [rad].
+        lower_bound: The bound at these positions in [rad].
         gain: By how much that of the refined path is smaller in [rad].
         rounds: How often the contact positions around the path were halved with a gain.
+        bound_positions: How many contact positions the bound of the plan holds for: those of the
+            field, or more where the refined path is below what is possible at these.
     """
 
     joint_range_sum: float
+    lower_bound: float | None
     gain: float
     rounds: int
+    bound_positions: int
 
 
 @dataclass(frozen=True)
@@ -53,8 +58,8 @@ class Plan:
         path: Postures on the wheel.
         motion: The whole motion, free of collision as far as the planner can tell.
         checks: How many motions were checked, this one included.
-        lower_bound: No path through the cutter points at the field's contact positions has a
-            smaller joint range sum, in [rad]; None if that was not asked.
+        lower_bound: No path through the cutter points, at the contact positions that it holds for,
+            has a smaller joint range sum, in [rad]; None if that was not asked.
         refinement: What contact positions between those of the field have gained; None if they were
             not tried.
         weighted: The weighted sum that was kept small; None if that was not asked.
@@ -69,12 +74,10 @@ class Plan:
 
     @property
     def gap(self) -> float | None:
-        """Fraction by which the best path at the field's contact positions may miss the least."""
+        """Fraction by which the joint range sum may miss the least there is."""
         if self.lower_bound is None:
             return None
-        path, refinement = self.path, self.refinement
-        value = path.joint_range_sum if refinement is None else refinement.joint_range_sum
-        return 1.0 - self.lower_bound / value
+        return 1.0 - self.lower_bound / self.path.joint_range_sum
 
 
 def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
