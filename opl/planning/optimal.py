@@ -22,6 +22,7 @@ from opl.planning.tube import halved, tube
 from opl.search.smooth import Travel
 
 MOST_ROUNDS = 3  # of halving the contact positions: eight times as many
+FINER_PROOF = 10.0  # [s] the bound of a finer field may take; what it is by then is told
 
 
 def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: Plan) -> Plan:
@@ -48,7 +49,8 @@ def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: 
     found, bound = plan.path.joint_range_sum, plan.lower_bound
     if bound is not None and plan.refinement is not None and found < bound:
         # less than is possible without the finer positions: with them, a lower bound holds
-        bound = finer_bound(problem, positions, settings, found, deadline)
+        until = min(deadline, time.monotonic() + FINER_PROOF)
+        bound = finer_bound(problem, positions, settings, found, until)
         refinement = replace(plan.refinement, bound_positions=len(positions))
         plan = replace(plan, lower_bound=bound, refinement=refinement)
     return plan
