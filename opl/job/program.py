@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from opl.cell.robot import Robot
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.documents import Document
 from opl.errors import InputError, OplError
-from opl.geometry.frames import Array, NotARotationError, nearest_pose
+from opl.geometry.frames import Array, nearest_pose
+from opl.job.bodies import Matrix
 from opl.program.actions import Action, Actions, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.posts import Post, find_post, known_posts
 from opl.program.pulses import require_accepted, require_known
@@ -22,18 +23,6 @@ from opl.program.write import try_out
 
 _MAY_COUNT_PULSES = ("Yaskawa", "unknown")  # makers
 
-_Row = Annotated[list[float], Field(min_length=4, max_length=4)]
-
-
-def _proper(rows: list[list[float]]) -> list[list[float]]:
-    try:
-        nearest_pose(np.array(rows))
-    except NotARotationError as error:
-        raise ValueError(f"{error}, at most 0.02 is taken for rounding") from error
-    return rows
-
-
-_Matrix = Annotated[list[_Row], Field(min_length=4, max_length=4), AfterValidator(_proper)]
 _Signal = Annotated[int, Field(ge=0)]
 _Seconds = Annotated[float, Field(gt=0.0)]
 _Level = Annotated[int, Field(ge=0, le=8)]
@@ -93,7 +82,7 @@ class _Percents(Document):
 
 class _UserFrame(Document):
     number: Annotated[int, Field(ge=1)]
-    T_base_user_mm: _Matrix
+    T_base_user_mm: Matrix
 
 
 class ProgramSection(Document):
@@ -101,7 +90,7 @@ class ProgramSection(Document):
 
     controller: str = "DX200"
     tool: Annotated[int, Field(ge=0)] = 0
-    T_flange_tool_mm: _Matrix | None = None
+    T_flange_tool_mm: Matrix | None = None
     motion: Literal["joint", "straight"] = "joint"
     positions: Literal["pulses", "base", "robot", "user"] = "pulses"
     user_frame: _UserFrame | None = None

@@ -95,14 +95,7 @@ class BoxProof:
         self.subproblems = 0
         self._ladder = ladder
         self._q = ladder.q_by_joint
-        self._steps = (
-            ladder.contact_position,
-            ladder.off_wheel,
-            ladder.max_contact_step,
-            ladder.contact_changes,
-            ladder.max_joint_step,
-            np.asarray(blocked, dtype=np.int64),
-        )
+        self._steps = (*ladder.step_rule, np.asarray(blocked, dtype=np.int64))
         self._gap = gap
         n_columns, n_rows = ladder.free.shape
         self._strips = no_strips(n_columns, n_rows)

@@ -47,6 +47,17 @@ class Ladder:
         """Joint positions as the inner loop reads them, shape (n_columns, 6, n_rows)."""
         return np.ascontiguousarray(np.moveaxis(self.q, 1, 2))
 
+    @property
+    def step_rule(self) -> tuple[Array, np.ndarray, float, Array, float]:
+        """What tells small steps from others, in the order in which the inner loops take it."""
+        return (
+            self.contact_position,
+            self.off_wheel,
+            self.max_contact_step,
+            self.contact_changes,
+            self.max_joint_step,
+        )
+
     def step_key(self, column: int, row: int, next_row: int) -> int:
         """Return the number under which a step is remembered as blocked."""
         n_rows = self.q.shape[1]

@@ -53,11 +53,7 @@ def descend(
     outcome, total, reached = _descend(
         ladder.q_by_joint,
         ladder.free,
-        ladder.contact_position,
-        ladder.off_wheel,
-        ladder.max_contact_step,
-        ladder.contact_changes,
-        ladder.max_joint_step,
+        *ladder.step_rule,
         blocked,
         dead,
         start,
@@ -81,11 +77,7 @@ def add_dead_ends(ladder: Ladder, blocked: np.ndarray, dead: np.ndarray) -> None
     _add_dead_ends(
         ladder.q_by_joint,
         ladder.free,
-        ladder.contact_position,
-        ladder.off_wheel,
-        ladder.max_contact_step,
-        ladder.contact_changes,
-        ladder.max_joint_step,
+        *ladder.step_rule,
         blocked,
         dead,
     )

@@ -90,11 +90,7 @@ def smoothest(
     cost = _cheapest(
         ladder.q_by_joint,
         ladder.free & inside,
-        ladder.contact_position,
-        ladder.off_wheel,
-        ladder.max_contact_step,
-        ladder.contact_changes,
-        ladder.max_joint_step,
+        *ladder.step_rule,
         np.asarray(blocked, dtype=np.int64),
         np.array(roughness.joint_weights),
         roughness.contact_weight,
