@@ -168,12 +168,22 @@ def _certified(plan: Plan, n_positions: int) -> Iterator[str]:
     if plan.lower_bound <= 0.0:
         yield "the time was up before anything was proven of the least joint range sum there is"
         return
-    if plan.refinement is not None and plan.refinement.rounds:
+    refined = plan.refinement
+    if refined is not None and refined.rounds:
         yield (
             f"contact positions between the {n_positions} bring the joint range sum from "
-            f"{plan.refinement.joint_range_sum:.4f} to {plan.path.joint_range_sum:.4f} rad"
+            f"{refined.joint_range_sum:.4f} to {plan.path.joint_range_sum:.4f} rad"
         )
-        n_positions = plan.refinement.bound_positions
+        if refined.bound_positions == n_positions and refined.lower_bound is not None:
+            # the bound holds for the job's positions: what it says is of the path at these
+            gap = 1.0 - refined.lower_bound / refined.joint_range_sum
+            yield (
+                f"no path through these points at {n_positions} contact positions has a joint "
+                f"range sum below {refined.lower_bound:.4f} rad: the one found at these is within "
+                f"{100.0 * gap:.3f} % of the least there is"
+            )
+            return
+        n_positions = refined.bound_positions
     yield (
         f"no path through these points at {n_positions} contact positions has a joint range sum "
         f"below {plan.lower_bound:.4f} rad: the one found is within {100.0 * plan.gap:.3f} % of "
