@@ -1,0 +1,253 @@
+"""Links: ways through the air, and that none of them is taken on trust."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from opl.cell.clearance import part_tree
+from opl.cell.collision import CollisionScene
+from opl.cell.robot import forward
+from opl.geometry.frames import pose, transform
+from opl.geometry.shapes import Body, Box
+from opl.motion.check import RESOLUTION, densify
+from opl.motion.free_moves import FreeMoves
+from opl.motion.links import Links, NoLinkError
+from opl.motion.sampling import fewest, sample_way
+from tests.support.bare_cells import bare_cell, block, with_obstacle
+from tests.support.fcl_scene import margin_along
+
+HOME = np.deg2rad([0.0, -20.0, -20.0, 0.0, 30.0, 0.0])
+AWAY = np.deg2rad([80.0, -10.0, -30.0, 40.0, 40.0, 60.0])
+CLEARANCE = 0.005
+
+
+@cache
+def open_cell():
+    """Return an arm with a block in its hand, its wheel where it can reach it."""
+    cell = bare_cell(block((0.08, 0.12, 0.06)), clearance=CLEARANCE)
+    wheel = replace(cell.wheel, T_base_contact0=pose(np.eye(3), np.array([0.9, 0.5, -0.1])))
+    return replace(cell, wheel=wheel)
+
+
+def moves_in(cell):
+    return FreeMoves(cell, CollisionScene(cell), part_tree(cell.part))
+
+
+def links_in(cell):
+    return Links(cell, CollisionScene(cell), part_tree(cell.part))
+
+
+def part_at(cell, q):
+    return (forward(cell.robot, q) @ cell.T_flange_workpiece)[:3, 3]
+
+
+# straight moves
+
+
+def test_nothing_moves_farther_than_the_levers_say():
+    cell = open_cell()
+    levers = moves_in(cell).levers
+    rng = np.random.default_rng(3)
+    reach = np.zeros(6)
+    for q in rng.uniform(cell.robot.lower, cell.robot.upper, (40, 6)):
+        corners = transform(forward(cell.robot, q) @ cell.T_flange_workpiece, cell.part.vertices)
+        for joint in range(6):
+            turned = q + 1e-4 * np.eye(6)[joint]
+            T = forward(cell.robot, turned) @ cell.T_flange_workpiece
+            way = np.linalg.norm(transform(T, cell.part.vertices) - corners, axis=1).max()
+            reach[joint] = max(reach[joint], way / 1e-4)
+    assert (reach <= levers).all()
+    assert (reach > 0.4 * levers).all()
+
+
+@settings(max_examples=6, deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.integers(0, 10**6))
+def test_a_move_is_free_if_and_only_if_an_independent_scene_says_so(seed):
+    rng = np.random.default_rng(seed)
+    start = HOME + rng.normal(0.0, 0.3, 6)
+    end = start + rng.normal(0.0, 0.3, 6)
+    cell = open_cell()
+    middle = part_at(cell, (start + end) / 2.0)
+    cell = with_obstacle(cell, middle + rng.normal(0.0, 0.15, 3), rng.uniform(0.01, 0.2, 3))
+    margin = margin_along(cell, np.stack([start, end]))
+    if abs(margin) > 0.002:  # neither scene is asked everywhere, and ours keeps a little more
+        assert moves_in(cell).free(start, end) == (margin > 0.0)
+
+
+def test_a_plate_thinner_than_the_way_between_two_looks_is_found():
+    cell = open_cell()
+    cell = replace(cell, part=block((0.12, 0.002, 0.06)), clearance=0.0)
+    # the arm sweeps a thin plate over S, far out: by 14 mm from look to look
+    swept = HOME + np.deg2rad([20.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    between = HOME + np.deg2rad([9.5, 0.0, 0.0, 0.0, 0.0, 0.0])
+    needle = with_obstacle(cell, part_at(cell, between), (0.0005, 0.0005, 0.0005))
+    looks, _ = densify(np.stack([HOME, swept]), RESOLUTION)
+    assert not CollisionScene(needle).collides(looks).any()
+    assert moves_in(cell).free(HOME, swept)
+    assert not moves_in(needle).free(HOME, swept)
+
+
+# ways
+
+
+def test_a_free_straight_move_is_taken_as_it_is():
+    assert links_in(open_cell()).find(HOME, AWAY).shape == (0, 6)
+
+
+@cache
+def blocked_cell():
+    cell = open_cell()
+    return with_obstacle(cell, part_at(cell, (HOME + AWAY) / 2.0), (0.15, 0.15, 0.3), "frame")
+
+
+@cache
+def way_around():
+    return links_in(blocked_cell()).find(HOME, AWAY)
+
+
+def test_a_way_leads_around_what_blocks_the_straight_move():
+    cell = blocked_cell()
+    assert not moves_in(cell).free(HOME, AWAY)
+    via = way_around()
+    assert 1 <= len(via) <= 6
+    assert margin_along(cell, np.stack([HOME, *via, AWAY])) > 0.0
+    assert (via >= cell.robot.lower).all() and (via <= cell.robot.upper).all()
+
+
+@settings(max_examples=3, deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.integers(0, 10**6))
+def test_every_way_that_is_found_is_free_in_an_independent_scene(seed):
+    rng = np.random.default_rng(seed)
+    cell = open_cell()
+    for k in range(3):
+        at = part_at(cell, HOME + rng.uniform(0.2, 0.8) * (AWAY - HOME))
+        cell = with_obstacle(cell, at + rng.normal(0.0, 0.1, 3), rng.uniform(0.03, 0.2, 3), f"{k}")
+    try:
+        via = links_in(cell).find(HOME, AWAY)
+    except NoLinkError as error:
+        # only an end that is too near to something rules out these few boxes
+        ends = [margin_along(cell, end[None]) for end in (HOME, AWAY)]
+        assert error.end is not None and ends[error.end] < 0.0005
+        return
+    assert margin_along(cell, np.stack([HOME, *via, AWAY]), 0.8) > 0.0
+
+
+def test_what_was_sought_elsewhere_before_does_not_change_what_a_search_finds():
+    # the random numbers of OMPL are one for the whole process
+    first = way_around()
+    turned = AWAY + np.deg2rad([5.0, 0.0, 0.0, 0.0, 0.0, 90.0])
+    assert len(links_in(blocked_cell()).find(turned, HOME))
+    again = links_in(blocked_cell()).find(HOME, AWAY)
+    np.testing.assert_array_equal(again, first)
+
+
+def test_an_end_that_is_too_near_is_named():
+    cell = with_obstacle(open_cell(), part_at(open_cell(), AWAY), (0.1, 0.1, 0.1), "anvil")
+    with pytest.raises(NoLinkError) as caught:
+        links_in(cell).find(HOME, AWAY)
+    assert caught.value.end == 1
+    assert "anvil" in caught.value.pair
+
+
+def caged(cell, q):
+    """Return a cell with six walls around the part at a posture; one is behind it."""
+    T = forward(cell.robot, q) @ cell.T_flange_workpiece
+    low, high, thick = np.array([-0.06, -0.08, -0.045]), np.array([0.06, 0.08, 0.06]), 0.01
+    walls = []
+    for axis in range(3):
+        for side, edge in (("low", low[axis] - thick / 2.0), ("high", high[axis] + thick / 2.0)):
+            middle, size = (low + high) / 2.0, high - low + 2.0 * thick
+            middle[axis], size[axis] = edge, thick
+            at = pose(T[:3, :3], transform(T, middle))
+            walls.append(Body(f"{'xyz'[axis]} {side} wall", Box(tuple(size)), at))
+    return replace(cell, obstacles=tuple(walls))
+
+
+def test_a_posture_that_is_shut_in_is_told_with_what_shuts_it_in(monkeypatch):
+    monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
+    links = links_in(caged(open_cell(), HOME))
+    for way in ((HOME, AWAY), (AWAY, HOME)):
+        with pytest.raises(NoLinkError) as caught:
+            links.find(*way)
+        assert caught.value.end is None
+        assert caught.value.pair[0] == "part"
+        assert caught.value.pair[1].endswith("wall")
+
+
+def test_what_is_joined_to_an_end_sought_in_vain_is_not_sought_again(monkeypatch):
+    monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
+    links = links_in(caged(open_cell(), HOME))
+    with pytest.raises(NoLinkError) as first:
+        links.find(HOME, AWAY)
+
+    def searched(*arguments):
+        raise AssertionError("searched again")
+
+    monkeypatch.setattr("opl.motion.links.sample_way", searched)
+    near = AWAY + np.deg2rad([2.0, 0.0, 0.0, 0.0, 0.0, 5.0])
+    with pytest.raises(NoLinkError) as second:
+        links.find(near, HOME)
+    assert second.value.pair == first.value.pair
+
+
+# sampling in the plane, where the answer is known
+
+
+def wall_with_gap(low, high):
+    def free(a, b):
+        # the segment crosses x = 0 outside of the gap
+        if (a[0] < 0.0) == (b[0] < 0.0):
+            return True
+        y = a[1] + (b[1] - a[1]) * a[0] / (a[0] - b[0])
+        return bool(low < y < high)
+
+    return free
+
+
+def test_a_gap_in_a_wall_is_found_and_few_places_are_left():
+    start, goal = np.array([-1.0, 0.0]), np.array([1.0, 0.0])
+    free = wall_with_gap(0.7, 0.9)
+    found = sample_way(start, goal, np.full(2, -2.0), np.full(2, 2.0), free, lambda: False)
+    np.testing.assert_array_equal(found.way[[0, -1]], [start, goal])
+    assert all(free(a, b) for a, b in zip(found.way[:-1], found.way[1:], strict=True))
+    assert 3 <= len(found.way) <= 5
+
+
+def test_a_search_ends_after_as_many_moves_as_it_may_ask():
+    asked = []
+
+    def free(a, b):
+        asked.append((a, b))
+        return wall_with_gap(5.0, 6.0)(a, b)
+
+    start, goal = np.array([-1.0, 0.0]), np.array([1.0, 0.0])
+    box = np.full(2, -2.0), np.full(2, 2.0)
+    found = sample_way(start, goal, *box, free, lambda: len(asked) >= 500)
+    assert found.way is None
+    assert 500 <= len(asked) < 520
+
+
+def test_refused_moves_are_those_of_the_end_that_is_shut_in():
+    def free(a, b):  # nothing comes out of a small box around the goal
+        return (np.abs(a - 1.0).max() < 0.1) == (np.abs(b - 1.0).max() < 0.1)
+
+    asked = iter(range(2000))
+    start, goal = np.array([-1.0, -1.0]), np.array([1.0, 1.0])
+    box = np.full(2, -2.0), np.full(2, 2.0)
+    found = sample_way(start, goal, *box, free, lambda: next(asked, None) is None)
+    assert found.way is None
+    assert not found.from_start
+    assert len(found.refused) > 10
+    assert (np.abs(found.refused[:, 0] - 1.0) < 0.1).all()
+
+
+def test_idle_places_are_left_out():
+    way = np.array([[0.0, 0.0], [0.5, 0.3], [1.0, 0.0], [1.0, 1.0]])
+    everything = fewest(way, lambda a, b: True)
+    np.testing.assert_array_equal(everything, way[[0, 3]])
+    nothing = fewest(way, lambda a, b: False)
+    np.testing.assert_array_equal(nothing, way)

@@ -1,0 +1,502 @@
+"""Search and check together: what is in the way, the motion around a path, refusals."""
+
+from collections import Counter
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from opl.cell.robot import forward
+from opl.errors import NoPathError
+from opl.field.path import BrokenStepError, fill_in
+from opl.motion.air import UnreachableApproachError, whole_motion
+from opl.motion.check import RESOLUTION, densify, find_faults
+from opl.motion.motion import Motion, Stretch
+from opl.motion.timing import timed
+from opl.planning.fixed import keep_contact, runs_of
+from opl.planning.plan import plan_recursive
+from opl.planning.reasons import explain, unreachable_points
+from opl.planning.starts import Start
+from opl.planning.states import NodeState, node_states
+from tests.support.bare_cells import Ghosts, with_obstacle
+from tests.support.brute_force import printed_recursion
+from tests.support.fcl_scene import FclScene
+from tests.support.planned import (
+    problem_of,
+    small_job,
+    small_motion,
+    small_plan,
+    small_problem,
+    v_job,
+    v_motion,
+    v_plan,
+    v_problem,
+    with_positions,
+    with_problem_cell,
+)
+
+PAPER_FIXED = [0.4711, 0.3512, 0.2951, 2.8134, 0.8810, 1.5024]  # [rad], table 2, S L U R B T
+PAPER_RECURSIVE = 2.5287  # [rad]
+
+
+def hits_anything(cell, motion, every=1):
+    """Ask an independent scene about the postures of a motion and the ways between them."""
+    scene = FclScene(cell)
+    dense, _ = densify(motion.q, RESOLUTION)
+    return any(min(scene.clearances(q).values(), default=1.0) <= 0.0 for q in dense[::every])
+
+
+# the figures of the paper
+
+
+def test_with_the_contact_kept_the_joint_ranges_are_those_of_the_paper():
+    fixed = keep_contact(v_problem())
+    middle_row = v_problem().points.pass_index == 2  # the paper ground one row
+    ranges = np.ptp(fixed.q[middle_row], axis=0)
+    np.testing.assert_allclose(ranges, PAPER_FIXED, atol=0.015)
+    assert ranges.sum() == pytest.approx(6.31, abs=0.03)
+    assert fixed.feasible
+    np.testing.assert_array_equal(fixed.joint_ranges, np.ptp(fixed.q, axis=0))
+
+
+def test_with_the_contact_kept_every_posture_grinds_at_the_middle():
+    problem, fixed = v_problem(), keep_contact(v_problem())
+    Ts = forward(problem.cell.robot, fixed.q) @ problem.cell.T_flange_workpiece
+    Ts_base_cutter = Ts @ problem.points.Ts_workpiece_cutter
+    middle = problem.cell.wheel.T_base_contact0
+    np.testing.assert_allclose(Ts_base_cutter - middle, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("start", list(Start))
+def test_the_recursive_search_does_no_worse_than_the_paper(start):
+    plan = v_plan() if start is Start.BEST else plan_recursive(v_problem(), start)
+    assert plan.path.joint_range_sum <= PAPER_RECURSIVE
+    q = plan.path.q
+    assert (q >= v_job().cell.robot.lower).all()
+    assert (q <= v_job().cell.robot.upper).all()
+
+
+def test_the_v_motion_is_free_in_an_independent_scene():
+    assert not hits_anything(v_job().cell, v_plan().motion, every=4)
+
+
+def test_the_best_start_is_no_worse_than_the_nearest():
+    nearest = plan_recursive(small_problem(), Start.NEAREST)
+    assert small_plan().path.joint_range_sum <= nearest.path.joint_range_sum + 1e-9
+
+
+def test_the_nearest_start_is_the_node_nearest_to_home():
+    problem = small_problem()
+    path = plan_recursive(problem, Start.NEAREST).path
+    home = problem.pace.home
+    nearest = np.inf
+    for nodes in problem.field.branches:
+        q = nodes.q[0][problem.free_nodes(nodes)[0]]
+        if len(q):
+            nearest = min(nearest, np.linalg.norm(q - home, axis=1).min())
+    assert np.linalg.norm(path.q[0] - home) == pytest.approx(nearest)
+
+
+def test_the_same_problem_gives_the_same_motion():
+    again = plan_recursive(problem_of(small_job()))
+    np.testing.assert_array_equal(again.motion.q, small_plan().motion.q)
+
+
+# things in the way
+
+
+@cache
+def one_row_problem():
+    job = small_job()
+    job = with_positions(replace(job, passes=replace(job.passes, rows=1)), 15)
+    return problem_of(job, points_of=slice(20, 40))
+
+
+def by_printed_recursion(problem):
+    """Return the node postures that Algorithm 1 finds from the nearest start that leads through.
+
+    Every step is filled in and asked about on its own, when the recursion comes to it.
+    """
+    home = problem.pace.home
+    fields = [(nodes, problem.free_nodes(nodes)) for nodes in problem.field.branches]
+    starts = sorted(
+        (np.linalg.norm(nodes.q[0, row] - home), index, row)
+        for index, (nodes, free) in enumerate(fields)
+        for row in np.flatnonzero(free[0])
+    )
+    for _, index, row in starts:
+        nodes, free = fields[index]
+        known = {}
+
+        def leads_on(column, here, there, nodes=nodes, free=free, known=known):
+            key = (column, here, there)
+            if key not in known:
+                known[key] = step_is_free(problem, nodes, *key)
+            return known[key]
+
+        if problem.scene.collides(nodes.q[0, row][None])[0]:
+            continue
+        rows = printed_recursion(nodes.q, free, leads_on, row)
+        if rows is not None:
+            return nodes.q[np.arange(len(rows)), rows]
+    return None
+
+
+def step_is_free(problem, nodes, column, here, there):
+    rows = np.zeros(len(problem.points), dtype=int)
+    pair = slice(column, column + 2)
+    points = type(problem.points)(
+        problem.points.Ts_workpiece_cutter[pair], np.zeros(2, dtype=int), np.array([0.0, 1.0])
+    )
+    cut = replace(nodes, q=nodes.q[pair])
+    rows = np.array([here, there])
+    try:
+        path = fill_in(problem.cell, points, cut, rows, problem.interpolation)
+    except BrokenStepError:
+        return False
+    return not problem.scene.collides(densify(path.q, RESOLUTION)[0]).any()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_collisions_found_late_lead_to_the_track_of_the_printed_recursion(seed):
+    problem = one_row_problem()
+    free = plan_recursive(problem, Start.NEAREST).path
+    # some nodes of the free track and some postures between its nodes collide
+    random = np.random.default_rng(seed)
+    inner = np.flatnonzero((free.cutter_point > 3) & (free.cutter_point < 16))
+    ghosts = Ghosts(free.q[random.choice(inner, 5, replace=False)], radius=0.02)
+    haunted = replace(problem, scene=ghosts)
+    wanted = by_printed_recursion(haunted)
+    plan = plan_recursive(haunted, Start.NEAREST)
+    assert plan.checks > 1
+    at_node = plan.path.cutter_point % 1.0 == 0.0
+    np.testing.assert_array_equal(plan.path.q[at_node], wanted)
+    assert not ghosts.collides(densify(plan.motion.q, RESOLUTION)[0]).any()
+
+
+def test_a_path_goes_round_an_obstacle():
+    problem = small_problem()
+    cell = with_obstacle(problem.cell, (0.58, 0.08, 0.24), (0.04, 0.04, 0.04))
+    assert hits_anything(cell, small_motion(), every=3)
+    plan = plan_recursive(with_problem_cell(problem, cell))
+    assert plan.checks > 1
+    assert not hits_anything(cell, plan.motion, every=3)
+
+
+def test_a_wall_at_the_wheel_is_named_with_the_points_it_shuts():
+    problem = one_row_problem()
+    # just in front of the wheel: wherever the part touches, it is in the wall
+    p = problem.cell.wheel.T_base_contact0[:3, 3] - [0.02, 0.0, 0.0]
+    walled = with_problem_cell(problem, with_obstacle(problem.cell, p, (0.01, 0.4, 0.4), "wall"))
+    with pytest.raises(NoPathError) as caught:
+        plan_recursive(walled)
+    error = caught.value
+    assert error.exit_status == 3
+    assert error.message.startswith("no path")
+    assert "cutter points 0 to 19 (pass 1): nothing is free" in error.reasons[0]
+    assert "part hits wall" in error.reasons[0]
+    assert str(error).splitlines() == [error.message, *error.reasons]
+
+
+def test_a_way_that_only_ends_in_a_collision_is_named():
+    problem = one_row_problem()
+    home = problem.pace.home
+    ghosts = Ghosts(home + np.array([0.0, 0.01, 0.0, 0.0, 0.0, 0.0]), radius=0.02)
+    # home itself is in it, so is every way from and to home
+    with pytest.raises(NoPathError, match=r"R_link and ghost"):
+        plan_recursive(replace(problem, scene=ghosts))
+
+
+def test_what_is_in_the_way_of_a_free_move_is_led_around():
+    problem, plan = small_problem(), small_plan()
+    n = len(plan.motion)
+    links = [k for k in range(n) if plan.motion.stretch[k] is Stretch.LINK]
+    assert len(links) == 1
+    moves = [1, *links, n - 1]
+    middles = np.array([(plan.motion.q[k - 1] + plan.motion.q[k]) / 2.0 for k in moves])
+    ghosts = Ghosts(middles, radius=0.015)
+    faults = find_faults(problem.cell, ghosts, problem.part, plan.motion)
+    assert [fault.move for fault in faults] == moves
+    other = plan_recursive(replace(problem, scene=ghosts))
+    assert other.checks == 1
+    np.testing.assert_array_equal(other.path.q, plan.path.q)
+    assert not ghosts.collides(densify(other.motion.q, RESOLUTION)[0]).any()
+    along = [(s, p) for s, p in zip(other.motion.stretch, other.motion.pass_index, strict=True)]
+    # the postures on the way belong to the stretch that they lead through
+    assert along.count((Stretch.HOME, 0)) >= 2
+    assert along.count((Stretch.LINK, 1)) >= 2
+    assert along.count((Stretch.HOME, -1)) >= 3
+
+
+def test_a_part_that_cannot_touch_without_being_cut_is_told_how_deep():
+    problem = small_problem()
+    layer = problem.wheel_clearance.copy()
+    layer[30:40] = -0.003
+    layer[35, 4] = -0.0012
+    with pytest.raises(NoPathError) as caught:
+        plan_recursive(replace(problem, wheel_clearance=layer))
+    error = caught.value
+    assert error.message == "no path beyond cutter point 29 (30 of 120 reached)"
+    assert len(error.reasons) == 1
+    assert error.reasons[0].startswith("cutter points 30 to 39 (pass 1): nothing is free: ")
+    assert "part cuts into wheel" in error.reasons[0]
+    assert error.reasons[0].endswith("the part cuts 1.20 mm into the wheel at best")
+
+
+def test_points_beyond_the_limits_are_told_with_the_joint():
+    problem = one_row_problem()
+    robot = problem.cell.robot
+    upper = robot.upper.copy()
+    upper[1] = np.radians(-30.0)  # L bends forward at the wheel
+    narrow = replace(problem.cell, robot=replace(robot, upper=upper))
+    branches = tuple(
+        replace(nodes, q=np.where((nodes.q <= upper).all(axis=-1)[..., None], nodes.q, np.nan))
+        for nodes in problem.field.branches
+    )
+    changed = replace(problem, cell=narrow, field=replace(problem.field, branches=branches))
+    with pytest.raises(NoPathError, match="beyond the limits of L"):
+        plan_recursive(changed)
+
+
+def test_many_shut_runs_are_not_all_listed():
+    problem = one_row_problem()
+    layer = problem.wheel_clearance.copy()
+    layer[::2] = -1.0
+    reasons = explain(replace(problem, wheel_clearance=layer), 0, Counter())
+    assert len(reasons) == 9
+    assert reasons[-1] == "and 2 more runs of cutter points"
+
+
+def test_points_out_of_reach_are_found():
+    problem = one_row_problem()
+    q = problem.field.q.copy()
+    q[7] = np.nan
+    q[8, :5] = np.nan  # reached elsewhere
+    found = unreachable_points(replace(problem, field=replace(problem.field, q=q)))
+    assert found.tolist() == [7]
+
+
+def test_a_fixed_contact_that_cuts_is_told():
+    # the part is larger than its surface by 1 mm
+    problem = small_problem()
+    larger = replace(problem.part, triangles=problem.part.triangles * 1.01)
+    larger = replace(larger, spheres=problem.part.spheres * 1.01)
+    fixed = keep_contact(replace(problem, part=larger))
+    assert not fixed.feasible
+    assert fixed.reason.startswith("part cuts into wheel at 120 of 120 cutter points (0-119), ")
+    assert fixed.reason.endswith(" mm deep at most")
+    assert len(fixed.q) == 120
+
+
+@pytest.mark.parametrize(
+    ("numbers", "told"),
+    [([3], "3"), ([3, 4, 5], "3-5"), ([1, 3, 4, 9], "1, 3-4, 9")],
+)
+def test_runs_are_written_short(numbers, told):
+    assert runs_of(np.array(numbers)) == told
+
+
+# what each node is
+
+
+def test_states_say_what_rules_a_node_out():
+    problem = one_row_problem()
+    codes = {state: code for code, state in enumerate(NodeState)}
+    branch = small_plan().path.branch
+    layer = problem.wheel_clearance.copy()
+    layer[5, 3] = -0.1
+    q = problem.field.q.copy()
+    q[6, 4, branch] = np.nan
+    nodes = next(n for n in problem.field.branches if n.branch == branch and n.exists.any())
+    column, row = np.argwhere(nodes.exists)[len(np.argwhere(nodes.exists)) // 2]
+    changed = replace(
+        problem,
+        wheel_clearance=layer,
+        field=replace(problem.field, q=q),
+        scene=Ghosts(nodes.q[column, row], radius=1e-3),
+    )
+    states = node_states(changed, branch)
+    assert states.shape == layer.shape
+    assert states[5, 3] == codes[NodeState.WHEEL]
+    assert states[6, 4] == codes[NodeState.REACH]
+    assert (states == codes[NodeState.FREE]).any()
+
+
+# the motion around the path
+
+
+MOTIONS = pytest.mark.parametrize(
+    ("problem", "motion"),
+    [(small_problem, small_motion), (v_problem, v_motion)],
+    ids=["small", "V"],
+)
+
+
+@MOTIONS
+def test_a_motion_starts_and_ends_at_home(problem, motion):
+    np.testing.assert_array_equal(motion().q[[0, -1]], np.array([problem().pace.home] * 2))
+    assert motion().stretch[0] is motion().stretch[-1] is Stretch.HOME
+
+
+@MOTIONS
+def test_a_pass_is_approached_ground_and_left(problem, motion):
+    order = [motion().stretch[0]]
+    for stretch in motion().stretch[1:]:
+        stretch = Stretch.GRIND if stretch is Stretch.BETWEEN else stretch
+        if stretch is not order[-1]:
+            order.append(stretch)
+    one = [Stretch.APPROACH, Stretch.GRIND, Stretch.RETRACT]
+    n = problem().points.n_passes
+    assert order == [Stretch.HOME, *([*one, Stretch.LINK] * n)[:-1], Stretch.HOME]
+
+
+@MOTIONS
+def test_the_path_is_in_the_motion_as_it_is(problem, motion):
+    plan = small_plan() if problem is small_problem else v_plan()
+    on_wheel = ~np.isnan(motion().cutter_point)
+    np.testing.assert_array_equal(motion().q[on_wheel], plan.path.q)
+    np.testing.assert_array_equal(motion().contact_position[on_wheel], plan.path.contact_position)
+
+
+@MOTIONS
+def test_approach_and_retract_run_along_the_contact_normal(problem, motion):
+    cell, motion = problem().cell, motion()
+    stretch = np.array([s.value for s in motion.stretch])
+    for index in range(problem().points.n_passes):
+        on_pass = motion.pass_index == index
+        on_wheel = np.flatnonzero(on_pass & ~np.isnan(motion.cutter_point))
+        for kind, touch in (("approach", on_wheel[0]), ("retract", on_wheel[-1])):
+            lead = np.flatnonzero(on_pass & (stretch == kind))
+            if kind == "approach":
+                lead = np.concatenate([[lead[0] - 1], lead])  # the air move ends at its start
+            Ts = forward(cell.robot, motion.q[np.append(lead, touch)])
+            into = cell.wheel.T_base_contact(motion.contact_position[touch])[:3, 2]
+            away = Ts[-1, :3, 3] - Ts[:, :3, 3]
+            np.testing.assert_allclose(away - np.outer(away @ into, into), 0.0, atol=1e-9)
+            np.testing.assert_allclose(Ts[:, :3, :3], Ts[[-1] * len(Ts), :3, :3], atol=1e-9)
+            distance = (away @ into)[:-1]
+            assert distance.max() == pytest.approx(problem().pace.approach_length)
+            steps = np.diff(away @ into)
+            assert (steps[:-1] * (-1 if kind == "approach" else 1) > 0.0).all()
+
+
+@MOTIONS
+def test_the_last_move_of_an_approach_touches(problem, motion):
+    motion = motion()
+    for k, stretch in enumerate(motion.stretch):
+        if stretch is Stretch.APPROACH and motion.stretch[k + 1] is not Stretch.APPROACH:
+            assert motion.stretch[k + 1] is Stretch.GRIND
+            assert motion.cutter_point[k + 1] % 1.0 == 0.0
+
+
+@MOTIONS
+def test_no_joint_is_asked_for_more_than_its_speed(problem, motion):
+    motion = motion()
+    speed = np.abs(np.diff(motion.q, axis=0)) / motion.duration[1:, None]
+    assert (speed <= problem().cell.robot.max_speed * (1 + 1e-9)).all()
+    assert motion.duration[0] == 0.0
+    assert (motion.duration[1:] > 0.0).all()
+
+
+@MOTIONS
+def test_the_feed_is_kept_on_the_wheel_unless_a_joint_could_not_follow(problem, motion):
+    pace, points = problem().pace, problem().points
+    # what slow acceleration does to the feed is told in test_timing.py
+    robot = replace(problem().cell.robot, max_acceleration=np.full(6, 1e6))
+    motion = timed(motion(), points, pace, robot)
+    fastest = robot.max_speed
+    arc_length = problem().points.arc_length
+    arc = np.interp(motion.cutter_point, np.arange(len(arc_length)), arc_length)
+    checked = 0
+    for k in range(1, len(motion)):
+        on_wheel = not np.isnan(motion.cutter_point[[k - 1, k]]).any()
+        if on_wheel:
+            needed = abs(arc[k] - arc[k - 1]) / pace.feed
+            least = (np.abs(motion.q[k] - motion.q[k - 1]) / fastest).max()
+            t = motion.contact_position
+            over_wheel = abs(t[k] - t[k - 1]) / pace.contact_speed
+            assert motion.duration[k] == pytest.approx(max(needed, least, over_wheel))
+            checked += 1
+    assert checked > 100
+
+
+@MOTIONS
+def test_free_moves_run_at_their_share_of_the_joint_speeds(problem, motion):
+    motion, pace = motion(), problem().pace
+    for k, stretch in enumerate(motion.stretch):
+        if k and stretch in (Stretch.HOME, Stretch.LINK):
+            speed = np.abs(motion.q[k] - motion.q[k - 1]) / motion.duration[k]
+            share = (speed / problem().cell.robot.max_speed).max()
+            assert share == pytest.approx(pace.air_speed)
+
+
+@MOTIONS
+def test_leads_run_at_the_approach_speed(problem, motion):
+    motion, pace = motion(), problem().pace
+    Ts = forward(problem().cell.robot, motion.q)
+    for k, stretch in enumerate(motion.stretch):
+        if stretch in (Stretch.APPROACH, Stretch.RETRACT):
+            way = np.linalg.norm(Ts[k, :3, 3] - Ts[k - 1, :3, 3])
+            assert way / motion.duration[k] == pytest.approx(pace.approach_speed, rel=1e-6)
+
+
+def test_a_slow_robot_takes_the_time_it_needs():
+    problem, plan = small_problem(), small_plan()
+    robot = replace(problem.cell.robot, max_speed=np.full(6, 0.01))
+    slow = timed(plan.motion, problem.points, problem.pace, robot)
+    speed = np.abs(np.diff(slow.q, axis=0)) / slow.duration[1:, None]
+    assert speed.max() == pytest.approx(0.01)
+
+
+def test_a_retract_beyond_a_limit_is_refused():
+    problem, plan = small_problem(), small_plan()
+    leads = [k for k, s in enumerate(plan.motion.stretch) if s is Stretch.RETRACT]
+    last = plan.motion.q[leads[-1]]
+    robot, joint = problem.cell.robot, 2
+    # only the limits of the leads are looked at here: nodes beyond them were never made
+    lower = robot.lower.copy()
+    lower[joint] = last[joint] + 1e-6
+    cell = replace(problem.cell, robot=replace(robot, lower=lower))
+    with pytest.raises(UnreachableApproachError) as caught:
+        whole_motion(cell, problem.points, plan.path, problem.pace)
+    assert caught.value.cause == "limits of U"
+
+
+def test_an_approach_from_out_of_reach_is_refused():
+    problem, plan = small_problem(), small_plan()
+    pace = replace(problem.pace, approach_length=5.0)
+    with pytest.raises(UnreachableApproachError, match="approach to cutter point 0: reach"):
+        whole_motion(problem.cell, problem.points, plan.path, pace)
+
+
+# motions as values
+
+
+def test_a_motion_is_a_read_only_copy():
+    q = np.zeros((2, 6))
+    motion = Motion(**_two_postures(q))
+    q[0, 0] = 9.0
+    assert motion.q[0, 0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        motion.q[0, 0] = 1.0
+
+
+def test_a_motion_with_a_missing_value_is_refused():
+    values = _two_postures(np.zeros((2, 6)))
+    values["duration"] = np.zeros(3)
+    with pytest.raises(ValueError, match="duration has 3 items for 2 postures"):
+        Motion(**values)
+
+
+def _two_postures(q):
+    n = len(q)
+    return {
+        "q": q,
+        "duration": np.zeros(n),
+        "stretch": (Stretch.HOME,) * n,
+        "contact_position": np.full(n, np.nan),
+        "cutter_point": np.full(n, np.nan),
+        "pass_index": np.full(n, -1),
+        "clearance": np.full(n, np.nan),
+    }

@@ -1,0 +1,325 @@
+"""Faults put into a written program, or into the cell it is proven against, on the V and S parts.
+
+Each must be refused, with its place and its cause named. The programs are short: the middle of two
+rows, from a home near the wheel.
+"""
+
+import json
+import re
+import shutil
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+from scipy.spatial import KDTree
+
+from opl import pipeline
+from opl.cell.collision import CollisionScene
+from opl.cell.inverse import inverse
+from opl.cell.robot import forward
+from opl.geometry.frames import transform
+from opl.geometry.mesh import TriangleMesh
+from opl.geometry.toolpath import CutterPoints
+from opl.job.load import Job, load
+from opl.pipeline import cutter_points
+from opl.program.inform.files import program_jobs
+from opl.program.inform.playback import play
+from opl.program.pulses import PulseScale
+from opl.proof.prove import profile_of, prove
+from opl.resources import folder
+from tests.support.bare_cells import with_obstacle
+from tests.support.jobs import opl
+
+# what is left out at both ends of a row, and a home near the wheel
+PARTS = {
+    "v_shape": {"end_margin_mm": 75, "home_deg": [20, -30, -55, -5, 48, 120]},
+    "s_shape": {"end_margin_mm": 40, "home_deg": [25, -20, -66, 84, -85, -69]},
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """A program as opl run wrote it.
+
+    Attributes:
+        job: Its job.
+        points: The cutter points of the job.
+        file: The program, with result.json beside it.
+        moves: Of each cutter point the number of the posture that grinds it.
+        last: Number of the last posture.
+    """
+
+    job: Job
+    points: CutterPoints
+    file: object
+    moves: list
+    last: int
+
+    @property
+    def middle(self):
+        """Return a cutter point in the middle of the first pass."""
+        return int(self.points.pass_index.searchsorted(1)) // 2
+
+
+@pytest.fixture(scope="module", params=PARTS)
+def written(request, tmp_path_factory):
+    """Plan and write the short program of a part."""
+    home = tmp_path_factory.mktemp("faults") / request.param
+    shutil.copytree(folder("workpieces") / request.param, home)
+    content = yaml.safe_load((home / "job.yaml").read_text())
+    own = PARTS[request.param]
+    content["passes"].update(
+        rows=2, largest_step_mm=12, bow_height_mm=0.09, end_margin_mm=own["end_margin_mm"]
+    )
+    content["search"].update(method="recursive", contact_positions=45)
+    content["process"].update(approach_mm=20, home_deg=own["home_deg"])
+    (home / "job.yaml").write_text(yaml.safe_dump(content))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pipeline, "draw", lambda outcome, problem: None)
+        ended = opl("run", home / "job.yaml", "--out", home / "out")
+    assert ended.status == 0, ended.err
+    job = load(home / "job.yaml")
+    points = cutter_points(job)
+    lines = (home / "out" / f"{job.name}.csv").read_text().splitlines()
+    labels = [line.split(",")[1] for line in lines[1:]]
+    moves = [labels.index(f"{point:.4f}") for point in range(len(points))]
+    return Written(job, points, home / "out" / f"{job.name}.JBI", moves, len(labels) - 1)
+
+
+class Text:
+    """A program that is tampered with; postures are told by their numbers."""
+
+    def __init__(self, written):
+        self.text = written.file.read_bytes().decode("ascii")
+        self.scale = PulseScale.of(written.job.cell.robot)
+
+    def pulses(self, number):
+        return [int(v) for v in re.search(rf"C{number:05d}=(.*)\r", self.text)[1].split(",")]
+
+    def angles(self, number):
+        return self.scale.to_angles(np.array(self.pulses(number)))
+
+    def put(self, number, pulses):
+        told = ",".join(str(int(v)) for v in pulses)
+        return self.replace(rf"C{number:05d}=.*\r", f"C{number:05d}={told}\r")
+
+    def replace(self, pattern, by):
+        self.text, n = re.subn(pattern, by, self.text)
+        assert n == 1, f"{n} times {pattern}"
+        return self
+
+    def place(self, number):
+        """Return where a message says that the move to a posture is."""
+        before = self.text[: self.text.index(f"C{number:05d} ")]
+        return f"line {before.count(chr(10)) + 1}"
+
+    def reorder(self, numbers):
+        """Leave these postures and their moves, in this order, numbered anew."""
+        postures = dict(re.findall(r"C(\d{5})=(.*)\r\n", self.text))
+        moves = dict(re.findall(r"MOV[JL] C(\d{5}) (.*)\r\n", self.text))
+        head, foot = self.text.split("C00000=")[0], self.text.split("MOVJ C00000 ")[0]
+        between = foot[foot.rindex(postures[max(postures)]) :].split("\r\n", 1)[1]
+        told = [f"{number:05d}" for number in numbers]
+        self.text = (
+            re.sub(r"NPOS \d+,", f"NPOS {len(told)},", head)
+            + "".join(f"C{k:05d}={postures[number]}\r\n" for k, number in enumerate(told))
+            + between
+            + "".join(f"MOVJ C{k:05d} {moves[number]}\r\n" for k, number in enumerate(told))
+            + "END\r\n"
+        )
+        return self
+
+
+def proof_of(written, text=None, job=None):
+    content = written.file.read_bytes() if text is None else text.text.encode("ascii")
+    return prove(job or written.job, written.points, {written.file.name: content})
+
+
+def in_cell(written, **changes):
+    """Return the job of a program with its cell changed."""
+    return replace(written.job, cell=replace(written.job.cell, **changes))
+
+
+def refuses(proof, *words):
+    """Assert that a program is not proven for a reason that holds these words."""
+    assert not proof.proven
+    told = [str(finding) for finding in proof.findings]
+    assert any(all(word in line for word in words) for line in told), told
+    return True
+
+
+def test_the_unharmed_program_is_proven(written):
+    ended = opl("verify", written.job.path, written.file, "--json")
+    assert ended.status == 0, ended.err
+    told = json.loads(ended.out)
+    assert told["proven"] is True and told["as_written"] is True
+    # nor does it harm to write it anew as the faults below do
+    proof = proof_of(written, Text(written).reorder(range(written.last + 1)))
+    assert proof.proven and proof.findings == ()
+    assert proof.ground == len(written.points) > 12
+    assert np.ptp(written.points.pass_index) == 1
+
+
+def test_one_pulse_more_is_found_beside_the_result_of_the_run(written, tmp_path):
+    for file in (written.file, written.file.parent / "result.json"):
+        shutil.copy(file, tmp_path)
+    number = written.moves[written.middle]
+    text = Text(written)
+    pulses = text.pulses(number)
+    pulses[4] += 1
+    (tmp_path / written.file.name).write_bytes(text.put(number, pulses).text.encode("ascii"))
+    ended = opl("verify", written.job.path, tmp_path / written.file.name)
+    assert ended.status == 4
+    assert "file at" in ended.err and written.file.name in ended.err
+    assert "not the bytes that opl run proved" in ended.err
+
+
+def test_a_few_hundred_pulses_more_are_found(written):
+    text, point = Text(written), written.middle
+    pulses = text.pulses(written.moves[point])
+    pulses[4] += 200
+    proof = proof_of(written, text.put(written.moves[point], pulses))
+    assert refuses(proof, f"order at cutter point {point}:")
+    assert refuses(proof, "contact at pass 1, cutter point")
+
+
+def test_a_swapped_wrist_in_the_middle_is_found(written):
+    text, point = Text(written), written.middle
+    number, robot = written.moves[point], written.job.cell.robot
+    q = text.angles(number)
+    slots = inverse(robot.arm, forward(robot, q), q)
+    here = int(np.abs(np.remainder(slots - q + np.pi, 2 * np.pi) - np.pi).max(axis=1).argmin())
+    other = slots[(here + 4) % 8]  # the same pose, the wrist flipped
+    proof = proof_of(written, text.put(number, text.scale.to_pulses(other)))
+    assert refuses(proof, f"contact at pass 1, cutter point {point}", "wheel's surface")
+
+
+def test_two_points_exchanged_are_found(written):
+    text, point = Text(written), written.middle
+    one, other = written.moves[point : point + 2]
+    first, second = text.pulses(one), text.pulses(other)
+    proof = proof_of(written, text.put(one, second).put(other, first))
+    # either of the two may count as the one in its order
+    missing = {finding.where for finding in proof.findings if finding.kind == "order"}
+    assert missing and missing <= {f"cutter point {point}", f"cutter point {point + 1}"}
+    assert refuses(proof, "contact at pass 1, cutter point", "ground point", "wheel's surface")
+
+
+def test_a_point_in_the_place_of_the_next_is_found(written):
+    text, point = Text(written), written.middle
+    one, other = written.moves[point : point + 2]
+    proof = proof_of(written, text.put(other, text.pulses(one)))
+    assert refuses(proof, f"order at cutter point {point + 1}:")
+
+
+def test_a_point_ground_twice_is_found(written):
+    one, other = written.moves[written.middle : written.middle + 2]
+    twice = [*range(other + 1), *range(other, one - 1, -1), *range(one, written.last + 1)]
+    proof = proof_of(written, Text(written).reorder(twice))
+    assert refuses(proof, "pass 1", f"cutter point {written.middle}")
+
+
+def test_a_missing_point_is_found(written):
+    point = written.middle
+    rest = [k for k in range(written.last + 1) if k != written.moves[point]]
+    proof = proof_of(written, Text(written).reorder(rest))
+    assert refuses(proof, f"order at cutter point {point}:")
+
+
+def test_a_dropped_pass_is_found(written):
+    first = int(written.points.pass_index.searchsorted(1))
+    last_of_one, last_of_two = written.moves[first - 1], written.moves[-1]
+    # away from the end of the first pass as from the end of the second: the ends of both retracts
+    retract = range(last_of_one + 1, last_of_one + 1 + written.last - 1 - last_of_two)
+    left = [*range(last_of_one + 1), *retract, written.last]
+    proof = proof_of(written, Text(written).reorder(left))
+    assert proof.ground == first
+    assert refuses(proof, f"order at cutter point {first}:")
+
+
+def test_full_speed_to_the_wheel_and_on_it_is_found(written):
+    text, point = Text(written), written.middle
+    to_it, on_it = written.moves[0] - 2, written.moves[point]
+    for number in (to_it, on_it):
+        text.replace(rf"(C{number:05d}) VJ=[0-9.]+", r"\1 VJ=100.00")
+    proof = proof_of(written, text)
+    assert refuses(proof, "speed at approach of pass 1", text.place(to_it), "times the speed")
+    place = f"speed at pass 1, cutter point {point}"
+    assert refuses(proof, place, text.place(on_it), "times the feed")
+
+
+def test_a_wheel_shifted_by_a_millimetre_is_found(written):
+    wheel = written.job.cell.wheel
+    T = wheel.T_base_contact0.copy()
+    T[:3, 3] -= 1e-3 * T[:3, 2]  # towards the part
+    proof = proof_of(written, job=in_cell(written, wheel=replace(wheel, T_base_contact0=T)))
+    assert proof.ground == 0
+    assert refuses(proof, "order at cutter point 0:")
+    assert refuses(proof, "collision at", "part and wheel", "into each other")
+
+
+def test_a_part_two_millimetres_too_big_is_found(written):
+    part = written.job.cell.part
+    mesh = trimesh.Trimesh(part.vertices, part.faces, process=False)
+    larger = TriangleMesh(part.vertices + 2e-3 * np.asarray(mesh.vertex_normals), part.faces)
+    proof = proof_of(written, job=in_cell(written, part=larger))
+    for place in ("pass 1, cutter point", "pass 2, cutter point"):
+        assert refuses(proof, f"collision at {place}", "part and wheel", "into each other")
+
+
+def test_a_limit_that_cuts_the_farthest_posture_is_found(written):
+    text, robot = Text(written), written.job.cell.robot
+    q = np.array([text.angles(number) for number in written.moves])
+    point, upper = int(q[:, 0].argmax()), robot.upper.copy()
+    upper[0] = q[point, 0] - np.deg2rad(0.02)
+    job = in_cell(written, robot=replace(robot, upper=upper))
+    proof = proof_of(written, job=job)
+    assert refuses(proof, "limit at", "joint S", "beyond its limit")
+    assert refuses(proof, f"cutter point {point}", "joint S", "0.020 deg beyond its limit")
+
+
+@pytest.mark.parametrize("written", ["s_shape"], indirect=True)  # the V has one in test_verify.py
+def test_a_limit_crossed_between_two_postures_is_found(written):
+    """On a straight move a joint can go beyond what both ends have; on a joint move none can."""
+    text = Text(written).replace(r"MOVJ (C00001) VJ=\S+", r"MOVL \1 V=50.0")
+    robot = written.job.cell.robot
+    jobs, _ = program_jobs({"a": text.text.encode("ascii")}, profile_of(written.job))
+    playback, _ = play(jobs, robot, written.job.program)
+    end = int(playback.stations[1])
+    rest = np.concatenate([playback.q[:1], playback.q[end:]])
+    above = playback.q[:end].max(axis=0) - rest.max(axis=0)
+    below = rest.min(axis=0) - playback.q[:end].min(axis=0)
+    lower, upper = robot.lower.copy(), robot.upper.copy()
+    joint = int(np.maximum(above, below).argmax())
+    assert max(above[joint], below[joint]) > np.deg2rad(0.02)
+    if above[joint] > below[joint]:
+        upper[joint] = rest.max(axis=0)[joint] + above[joint] / 2.0
+    else:
+        lower[joint] = rest.min(axis=0)[joint] - below[joint] / 2.0
+    narrow = in_cell(written, robot=replace(robot, lower=lower, upper=upper))
+    # as it was written, joint moves between the same postures, it stays within
+    q = np.array([Text(written).angles(number) for number in range(written.last + 1)])
+    assert (q > lower).all() and (q < upper).all()
+    proof = proof_of(written, text, narrow)
+    name = robot.joint_names[joint]
+    assert refuses(proof, "limit at way from home", f"joint {name}", "beyond its limit")
+
+
+def test_a_collision_only_between_two_postures_is_found(written):
+    text, cell = Text(written), written.job.cell
+    q = np.array([text.angles(number) for number in range(written.last + 1)])
+
+    def corners(postures):
+        Ts = forward(cell.robot, postures) @ cell.T_flange_workpiece
+        return transform(Ts[:, None], cell.part.vertices)
+
+    # the corner that, half-way, is farthest from all corners at the written postures
+    half_way = corners(q[:2].mean(axis=0)[None])[0]
+    distance, _ = KDTree(corners(q).reshape(-1, 3)).query(half_way)
+    narrow = with_obstacle(cell, half_way[distance.argmax()], (2e-3, 2e-3, 2e-3), "pin")
+    assert not CollisionScene(narrow).collides(q).any()
+    proof = proof_of(written, job=replace(written.job, cell=narrow))
+    assert refuses(proof, "collision at way from home", "part and pin", "into each other")
+    assert {finding.where for finding in proof.findings} <= {"way from home", "way home"}

@@ -1,0 +1,58 @@
+"""Why not, and what would help: changes that open an impossible job are planned again."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from opl.job.load import load
+from opl.pipeline import cutter_points
+from opl.remedies import _fed_the_other_way, _other_side, find_remedies
+from tests.support.jobs import POST, opl, write_job, write_trough
+from tests.support.planned import v_job
+
+
+def test_a_narrower_wheel_opens_a_trough_and_is_told(tmp_path):
+    # 30 mm wide, 15 mm deep: the flat of 50 mm cannot get in, a narrower one can
+    job = write_trough(tmp_path / "t", width_mm=44.0, depth_mm=1.5)
+    ended = opl("run", job, "--out", tmp_path / "out")
+    assert ended.status == 3
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert result["status"] == "no_path"
+    assert result["remedies"], result["reasons"]
+    for remedy in result["remedies"]:
+        assert remedy.startswith("would be possible with ")
+        assert remedy in ended.err
+
+
+def test_a_post_before_the_wheel_is_avoided_on_another_side_of_it(tmp_path):
+    path = write_job(tmp_path, {"obstacles": [POST]})
+    job = load(path)
+    told = find_remedies(job, cutter_points(job))
+    (remedy,) = [line for line in told if "on another side of the wheel" in line]
+    # tried from outside: the frame that the remedy names, written into the job
+    degrees = float(remedy.split(" degrees round")[0].rsplit(" ", 1)[1])
+    T = np.array(v_job().cell.wheel.T_base_contact0)
+    axle = T[:3, 3] + 150e-3 * T[:3, 2]
+    about = Rotation.from_rotvec(np.deg2rad(degrees) * T[:3, 0]).as_matrix()
+    turned = np.eye(4)
+    turned[:3, :3] = about @ T[:3, :3]
+    turned[:3, 3] = axle - 150e-3 * turned[:3, 2]
+    turned[:3, 3] *= 1e3
+    frame = {"wheel.T_base_contact0_mm": turned.tolist()}
+    changed = write_job(tmp_path / "turned", {"obstacles": [POST], **frame})
+    assert opl("run", changed, "--out", tmp_path / "out").status == 0
+
+
+@pytest.mark.parametrize("kind", [_other_side, _fed_the_other_way])
+def test_another_side_moves_the_contact_and_leaves_the_wheel_where_it_is(kind):
+    cell = v_job().cell
+    now = cell.wheel.T_base_contact0
+    axle = now[:3, 3] + cell.wheel.radius * now[:3, 2]
+    for _, changed in kind(cell):
+        T = changed.wheel.T_base_contact0
+        np.testing.assert_allclose(T[:3, 3] + cell.wheel.radius * T[:3, 2], axle, atol=1e-12)
+        assert abs(T[:3, 0] @ now[:3, 0]) == pytest.approx(1.0)
+        assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0)
+        assert not np.allclose(T, now)

@@ -1,0 +1,196 @@
+"""Part against wheel: exact distances of triangles against dense samples of them."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from opl.cell.clearance import TOLERANCE, part_tree, wheel_clearance
+from opl.geometry.frames import pose
+from opl.geometry.mesh import TriangleMesh
+from opl.geometry.wheel import ContactWheel
+from tests.support.planned import small_problem
+
+EXACT = np.inf  # whatever is needed is not kept: everything is measured to the end
+
+
+def wheel_of(width, radius):
+    return ContactWheel(width, radius, np.radians(45.0), np.eye(4))
+
+
+def by_brute_force(points, wheel, Ts):
+    """Return the least distance of any sample to the cylinder, written out here."""
+    least = []
+    for T in Ts:
+        x, y, z = (points @ T[:3, :3].T + T[:3, 3]).T
+        beside, beyond = np.abs(x) - wheel.width / 2, np.hypot(y, z - wheel.radius) - wheel.radius
+        outside = np.hypot(np.clip(beside, 0, None), np.clip(beyond, 0, None))
+        least.append(
+            np.where((beside < 0) & (beyond < 0), np.maximum(beside, beyond), outside).min()
+        )
+    return np.array(least)
+
+
+def random_poses(random, n, reach):
+    R = Rotation.from_quat(random.normal(size=(n, 4))).as_matrix()
+    return pose(R, random.uniform(-reach, reach, (n, 3)))
+
+
+def mesh_of(triangles):
+    return TriangleMesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3))
+
+
+def random_mesh(random, n, scale):
+    """Return n triangles, some of them long and thin."""
+    triangles = random.normal(scale=scale, size=(n, 1, 3)) + random.normal(
+        scale=scale * random.choice([0.02, 0.3, 1.0], size=(n, 1, 1)), size=(n, 3, 3)
+    )
+    triangles[::4, 1] = triangles[::4, 0] + 0.01 * (triangles[::4, 1] - triangles[::4, 0])
+    return mesh_of(triangles)
+
+
+def samples_of(mesh, n):
+    """Return points on every triangle, and how far any point of one is from the nearest, in [m]."""
+    i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
+    u, v = (grid[i + j <= n] / n for grid in (i, j))
+    weights = np.stack([1.0 - u - v, u, v], axis=-1)
+    points = np.einsum("sk,tkx->tsx", weights, mesh.triangles).reshape(-1, 3)
+    edges = np.linalg.norm(mesh.triangles - np.roll(mesh.triangles, 1, axis=1), axis=2)
+    return points, float(edges.max()) / n
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.integers(1, 60),
+    st.integers(0, 2**32 - 1),
+    st.floats(0.005, 0.3),
+    st.floats(0.02, 0.4),
+    st.floats(0.01, 0.3),
+)
+def test_the_distance_is_that_of_the_nearest_point_of_any_triangle(n, seed, width, radius, scale):
+    random = np.random.default_rng(seed)
+    mesh = random_mesh(random, n, scale)
+    wheel = wheel_of(width, radius)
+    Ts = random_poses(random, 8, reach=0.4)
+    found = wheel_clearance(part_tree(mesh), wheel, Ts, EXACT)
+    points, spacing = samples_of(mesh, 24)
+    sampled = by_brute_force(points, wheel, Ts)
+    assert (found <= sampled + TOLERANCE + 1e-12).all()
+    assert (found >= sampled - spacing - 1e-12).all()
+
+
+def test_dense_samples_come_as_near_as_the_exact_distance():
+    random = np.random.default_rng(3)
+    mesh, wheel = random_mesh(random, 6, 0.05), wheel_of(0.05, 0.15)
+    Ts = random_poses(random, 6, reach=0.2)
+    points, _ = samples_of(mesh, 700)
+    found = wheel_clearance(part_tree(mesh), wheel, Ts, EXACT)
+    np.testing.assert_allclose(found, by_brute_force(points, wheel, Ts), atol=2e-4)
+    assert (found <= by_brute_force(points, wheel, Ts) + TOLERANCE).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(-0.05, 0.2))
+def test_it_is_less_than_needed_exactly_where_the_part_is_too_near(seed, needed):
+    random = np.random.default_rng(seed)
+    part, wheel = part_tree(random_mesh(random, 20, 0.1)), wheel_of(0.05, 0.15)
+    Ts = random_poses(random, 20, reach=0.4)
+    exact = wheel_clearance(part, wheel, Ts, EXACT)
+    found = wheel_clearance(part, wheel, Ts, needed)
+    sure = np.abs(exact - needed) > 2 * TOLERANCE
+    np.testing.assert_array_equal((found < needed)[sure], (exact < needed)[sure])
+    near = sure & (exact < needed)
+    np.testing.assert_allclose(found[near], exact[near], atol=2 * TOLERANCE)
+    assert (found >= exact - TOLERANCE).all()
+
+
+def test_an_edge_of_the_wheel_that_sinks_into_a_flat_face_is_seen():
+    # corners and middle of the face are far from where the rim cuts
+    face = mesh_of(np.array([[[-1.03, -1.0, 0.0], [1.0, -1.01, 0.0], [0.02, 1.5, 0.0]]]))
+    wheel = wheel_of(0.05, 0.15)
+    tilted = pose(Rotation.from_euler("y", -30.0, degrees=True).as_matrix(), np.zeros(3))
+    corner = np.array([0.025, 0.0, 0.0])  # on the rim, nearest to the robot
+    depth = 0.0004
+    normal = tilted[:3, 2]
+    tilted[:3, 3] = corner + depth * normal
+    found = wheel_clearance(part_tree(face), wheel, tilted, EXACT)
+    points, _ = samples_of(face, 60)
+    assert by_brute_force(points, wheel, tilted[None])[0] > 0.0  # samples miss it
+    # the deepest point of the face is as far from the wheel's side as from its rim
+    sink = depth / (np.cos(np.radians(30.0)) + np.sin(np.radians(30.0)))
+    assert found == pytest.approx(-sink, abs=2 * TOLERANCE)
+
+
+def test_a_part_that_encloses_the_wheel_is_far_from_its_surface_but_not_inside():
+    box = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    faces = [
+        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+        [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+    ]  # fmt: skip
+    part = part_tree(TriangleMesh(box, np.array(faces)))
+    found = wheel_clearance(part, wheel_of(0.05, 0.15), np.eye(4), EXACT)
+    assert found == pytest.approx(1.0 - 0.3, abs=2 * TOLERANCE)  # the face at z = 1 m
+
+
+def test_the_part_of_the_job_at_every_cutter_point():
+    problem = small_problem()
+    positions = problem.field.contact_positions[::7]
+    frames = problem.points.Ts_workpiece_cutter[::9]
+    Ts = np.array(
+        [
+            [problem.cell.wheel.T_contact0_contact(t) @ np.linalg.inv(frame) for t in positions]
+            for frame in frames
+        ]
+    )
+    points, _ = samples_of(problem.cell.part, 12)
+    sampled = by_brute_force(points, problem.cell.wheel, Ts.reshape(-1, 4, 4))
+    found = problem.wheel_clearance[::9, ::7].ravel()
+    cuts = found < -problem.cell.contact_allowance
+    assert (found[cuts] <= sampled[cuts] + TOLERANCE).all()
+    assert (sampled[~cuts] >= -problem.cell.contact_allowance - TOLERANCE).all()
+
+
+def test_stacks_keep_their_shape():
+    part = part_tree(random_mesh(np.random.default_rng(0), 50, 0.3))
+    wheel = wheel_of(0.05, 0.15)
+    Ts = random_poses(np.random.default_rng(1), 24, 0.3).reshape(2, 3, 4, 4, 4)
+    found = wheel_clearance(part, wheel, Ts, EXACT)
+    assert found.shape == (2, 3, 4)
+    assert wheel_clearance(part, wheel, Ts[0, 0, 0], EXACT) == found[0, 0, 0]
+    assert wheel_clearance(part, wheel, Ts[:0], EXACT).shape == (0, 3, 4)
+    needs = np.where(np.arange(4) % 2, EXACT, 0.01)  # one for each pose
+    mixed = wheel_clearance(part, wheel, Ts, np.broadcast_to(needs, (2, 3, 4)))
+    np.testing.assert_array_equal(mixed[..., 1::2], found[..., 1::2])
+
+
+def test_poses_need_not_be_contiguous():
+    part = part_tree(random_mesh(np.random.default_rng(0), 50, 0.3))
+    wheel = wheel_of(0.05, 0.15)
+    Ts = random_poses(np.random.default_rng(1), 24, 0.3)
+    expected = wheel_clearance(part, wheel, Ts, EXACT)
+    fortran = np.asfortranarray(Ts)
+    np.testing.assert_array_equal(wheel_clearance(part, wheel, fortran, EXACT), expected)
+    np.testing.assert_array_equal(wheel_clearance(part, wheel, Ts[::2], EXACT), expected[::2])
+
+
+def test_every_sphere_holds_its_triangles_and_every_triangle_is_there():
+    mesh = random_mesh(np.random.default_rng(0), 333, 0.3)
+    tree = part_tree(mesh)
+    for (x, y, z, radius), first, end in zip(tree.spheres, tree.first, tree.end, strict=True):
+        away = np.linalg.norm(tree.triangles[first:end] - [x, y, z], axis=2)
+        assert away.max() <= radius * (1 + 1e-12)
+    wanted = sorted(map(tuple, mesh.triangles.reshape(-1, 9)))
+    assert sorted(map(tuple, tree.triangles.reshape(-1, 9))) == wanted
+    leaves = tree.child == 0
+    assert (tree.end - tree.first)[leaves].sum() == 333
+
+
+def test_the_wheels_own_pose_does_not_matter():
+    part = part_tree(random_mesh(np.random.default_rng(0), 50, 0.1))
+    Ts = random_poses(np.random.default_rng(1), 5, 0.3)
+    elsewhere = ContactWheel(0.05, 0.15, 1.0, random_poses(np.random.default_rng(2), 1, 5.0)[0])
+    np.testing.assert_array_equal(
+        wheel_clearance(part, elsewhere, Ts, EXACT),
+        wheel_clearance(part, wheel_of(0.05, 0.15), Ts, EXACT),
+    )

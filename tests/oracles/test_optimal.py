@@ -1,0 +1,403 @@
+"""The certified method on real cells: value, bound and motion, against searches of other kinds."""
+
+from dataclasses import replace
+from functools import cache
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from opl.cell.robot import forward
+from opl.motion.check import RESOLUTION, densify
+from opl.motion.figures import figures_of_path
+from opl.motion.timing import timed
+from opl.planning.cheapest import plan_cheapest
+from opl.planning.costs import roughness
+from opl.planning.finer_bound import finer_bound
+from opl.planning.objective import ObjectiveWeights
+from opl.planning.optimal import plan_optimal
+from opl.planning.plan import plan_recursive
+from opl.planning.refine import RefinedProblem
+from opl.planning.tube import REACH, halved, tube
+from opl.planning.weighted import plan_weighted
+from opl.search.calm import calm_box
+from opl.search.certificate import least_box
+from opl.search.smooth import Travel, smoothest, travel_of
+from opl.verification.replay import replay
+from tests.support.bare_cells import Ghosts
+from tests.support.fcl_scene import FclScene
+from tests.support.jobs import opl, write_job
+from tests.support.planned import problem_of, small_job, v_job, with_positions
+
+SETTINGS = v_job().search.optimal
+ONLY_TRAVEL = replace(
+    SETTINGS.costs, contact_weight=0.0, limit_weight=0.0, singularity_weight=0.0, push_weight=0.0
+)
+ONLY_TIME = replace(ONLY_TRAVEL, joint_weights=np.zeros(6), time_weight=1.0)
+
+
+def one_row_job():
+    return replace(small_job(), passes=replace(small_job().passes, rows=1))
+
+
+@cache
+def one_row():
+    """Return one pass over the tip of the V part, 20 cutter points at 40 contact positions."""
+    return problem_of(with_positions(one_row_job(), 40), slice(20, 40))
+
+
+@cache
+def v_row():
+    """Return the middle row of the V part as it is: 60 cutter points at 140 contact positions."""
+    return problem_of(replace(v_job(), passes=replace(v_job().passes, rows=1)))
+
+
+@cache
+def two_rows():
+    """Return the end of one pass and the beginning of the next."""
+    return problem_of(with_positions(small_job(), 40), slice(50, 70))
+
+
+@cache
+def recursive(make):
+    return plan_recursive(make())
+
+
+@cache
+def optimal(make):
+    return plan_optimal(make(), SETTINGS, recursive(make))
+
+
+def on_wheel(motion):
+    return motion.q[~np.isnan(motion.cutter_point)]
+
+
+def free_tracks(problem):
+    """Yield (posture at each cutter point, t at each) of every continuous track of a tiny field."""
+    rule = problem.interpolation
+    for nodes in problem.field.branches:
+        free = problem.free_nodes(nodes)
+        for rows in product(*(np.flatnonzero(column) for column in free)):
+            q = nodes.q[np.arange(len(rows)), list(rows)]
+            t = nodes.contact_position[list(rows)]
+            moves = np.maximum(np.ceil(np.abs(np.diff(t)) / rule.max_contact_step - 1e-9), 1.0)
+            turned = np.abs(np.diff(q, axis=0)).max(axis=1)
+            if (turned <= rule.max_joint_step * moves).all():
+                yield q, t
+
+
+CELLS = pytest.mark.parametrize("make", [v_row, two_rows], ids=["V row", "two rows"])
+
+
+@CELLS
+def test_the_motion_attains_the_value_and_the_bound_lies_below_that_of_the_field(make):
+    plan = optimal(make)
+    value = np.ptp(on_wheel(plan.motion), axis=0).sum()
+    assert plan.path.joint_range_sum == pytest.approx(value, abs=1e-12)
+    assert value <= recursive(make).path.joint_range_sum
+    assert 0.0 < plan.lower_bound <= plan.path.joint_range_sum
+    assert plan.refinement.lower_bound <= plan.refinement.joint_range_sum
+    assert plan.gap == pytest.approx(1.0 - plan.lower_bound / plan.path.joint_range_sum)
+
+
+@CELLS
+def test_refinement_never_makes_it_worse_and_tells_its_gain(make):
+    plan = optimal(make)
+    refined = plan.refinement
+    assert refined.gain >= 0.0
+    assert refined.gain == pytest.approx(refined.joint_range_sum - plan.path.joint_range_sum)
+    _, t = at_cutter_points(plan.path)
+    away = np.abs(t[:, None] - make().field.contact_positions).min(axis=1)
+    assert (away.max() > 0.1) == (refined.rounds > 0)  # between the contact positions of the field
+
+
+def test_refinement_ends_where_the_gain_is_below_the_tolerance():
+    # that joints and contact travel too far is to be no reason to go on
+    other = recursive(one_row)
+    q, t = other.path.q, other.path.contact_position
+    far = replace(other, path=replace(other.path, q=1.5 * q, contact_position=10.0 * t))
+    plans = [
+        plan_optimal(one_row(), replace(SETTINGS, tolerance=tolerance), far)
+        for tolerance in (1.0, 1e-9)
+    ]
+    assert plans[0].refinement.rounds == 1
+    assert plans[1].refinement.rounds > 1
+    assert plans[1].path.joint_range_sum < plans[0].path.joint_range_sum
+    assert plans[1].refinement.joint_range_sum == plans[0].refinement.joint_range_sum
+
+
+@CELLS
+def test_every_cutter_point_is_ground_where_the_path_says(make):
+    problem, plan = make(), optimal(make)
+    whole = plan.path.cutter_point % 1.0 == 0.0
+    np.testing.assert_array_equal(plan.path.cutter_point[whole], np.arange(len(problem.points)))
+    np.testing.assert_array_equal(plan.path.pass_index[whole], problem.points.pass_index)
+
+
+def test_a_row_of_the_v_part_is_within_a_thousandth_of_the_least_there_is():
+    found, other = optimal(v_row).path, recursive(v_row).path
+    assert found.joint_range_sum <= 1.895
+    assert optimal(v_row).gap <= 1e-3
+    assert found.joint_travel <= other.joint_travel
+    assert found.contact_travel <= other.contact_travel + 1e-9
+
+
+def test_the_motion_is_free_in_two_other_scenes():
+    problem, plan = two_rows(), optimal(two_rows)
+    scene = FclScene(problem.cell)
+    dense, _ = densify(plan.motion.q, RESOLUTION)
+    assert all(min(scene.clearances(q).values(), default=1.0) > 0.0 for q in dense[::4])
+    motion = timed(plan.motion, problem.points, problem.pace, problem.cell.robot)
+    allowed = small_job().search.max_contact_error
+    verification = replay(problem.cell, problem.points, motion, allowed)
+    assert verification.verified is not None, verification.findings
+
+
+def test_the_same_problem_gives_the_same_bytes():
+    problem = problem_of(with_positions(one_row_job(), 40), slice(20, 40))
+    again = plan_optimal(problem, SETTINGS, plan_recursive(problem))
+    assert again.motion.q.tobytes() == optimal(one_row).motion.q.tobytes()
+    assert again.lower_bound == optimal(one_row).lower_bound
+
+
+@pytest.mark.parametrize("first", [22, 36, 57])
+def test_the_bound_of_a_tiny_field_is_the_least_sum_of_all_its_tracks(first):
+    problem = problem_of(with_positions(small_job(), 7), slice(first, first + 4))
+    plan = plan_optimal(problem, SETTINGS, plan_recursive(problem))
+    least = min(np.ptp(q, axis=0).sum() for q, _ in free_tracks(problem))
+    bound = plan.refinement.lower_bound
+    assert bound == pytest.approx(least, rel=1e-5)
+    assert bound <= least + 1e-12
+
+
+@pytest.mark.parametrize("first", [22, 36])
+def test_the_bound_of_a_finer_field_is_the_least_sum_of_all_its_tracks(first):
+    coarse, fine = (
+        problem_of(with_positions(small_job(), count), slice(first, first + 4)) for count in (7, 13)
+    )
+    least = min(np.ptp(q, axis=0).sum() for q, _ in free_tracks(fine))
+    positions = halved(coarse.field.contact_positions)
+    np.testing.assert_allclose(positions, fine.field.contact_positions, atol=1e-9)
+    bound = finer_bound(coarse, positions, SETTINGS, 1.1 * least, np.inf)
+    assert least * (1.0 - 2.0 * SETTINGS.widen) <= bound <= least + 1e-9
+    # nothing is smaller than the least, up to the fraction to which boxes are solved
+    below = finer_bound(coarse, positions, SETTINGS, 0.9 * least, np.inf)
+    assert below == pytest.approx(0.9 * least, rel=2e-6)
+
+
+def test_what_collides_is_avoided_and_the_bound_still_holds():
+    problem, free = one_row(), optimal(one_row)
+    inner = free.path.q[(free.path.cutter_point > 5) & (free.path.cutter_point < 15)]
+    ghosts = Ghosts(inner[:: len(inner) // 4], radius=0.02)
+    haunted = replace(problem, scene=ghosts)
+    plan = plan_optimal(haunted, SETTINGS, plan_recursive(haunted))
+    assert not ghosts.collides(densify(plan.motion.q, RESOLUTION)[0]).any()
+    bound = plan.refinement.lower_bound
+    assert bound <= plan.refinement.joint_range_sum
+    assert bound >= free.refinement.lower_bound - 1e-9  # what is out can only raise it
+
+
+def test_an_interrupted_search_returns_what_there_was_and_a_bound_that_holds():
+    problem = one_row()
+    plan = plan_optimal(problem, replace(SETTINGS, seconds=1e-9), recursive(one_row))
+    assert plan.motion is recursive(one_row).motion
+    assert 0.0 <= plan.lower_bound <= optimal(one_row).lower_bound + 1e-12
+
+
+def test_an_interrupted_proof_still_leaves_a_verified_program(tmp_path):
+    job = write_job(tmp_path / "job", {"search.seconds": 1e-9})
+    ended = opl("run", job, "--out", tmp_path / "out")
+    assert ended.status == 0, ended.err
+    assert "0 collisions" in ended.out
+    assert "the time was up before anything was proven of the least joint range sum" in ended.out
+    assert (tmp_path / "out" / "V_SHAPE.JBI").is_file()
+
+
+# least travel, least time
+
+
+def shortest(problem, price):
+    """Return the least price of all tracks of a field, by scipy, every step an edge.
+
+    Args:
+        problem: The problem.
+        price: price(q_here, q_there, t_here, t_there, column) of a step on the wheel.
+    """
+    rule = problem.interpolation
+    best = np.inf
+    for nodes in problem.field.branches:
+        free, (n, m) = problem.free_nodes(nodes), nodes.q.shape[:2]
+        tails, heads, prices = [], [], []
+        for column in range(n - 1):
+            here, there = np.flatnonzero(free[column]), np.flatnonzero(free[column + 1])
+            a, b = (grid.ravel() for grid in np.meshgrid(here, there, indexing="ij"))
+            q_a, q_b = nodes.q[column, a], nodes.q[column + 1, b]
+            t_a, t_b = nodes.contact_position[a], nodes.contact_position[b]
+            moves = np.maximum(np.ceil(np.abs(t_b - t_a) / rule.max_contact_step - 1e-9), 1.0)
+            small = np.abs(q_b - q_a).max(axis=1) <= rule.max_joint_step * moves
+            tails.append((column * m + a)[small])
+            heads.append(((column + 1) * m + b)[small])
+            prices.append(1.0 + price(q_a, q_b, t_a, t_b, column)[small])
+        starts, ends = np.flatnonzero(free[0]), np.flatnonzero(free[-1])
+        tails += [np.full(len(starts), n * m), (n - 1) * m + ends]
+        heads += [starts, np.full(len(ends), n * m + 1)]
+        prices += [np.ones(len(starts)), np.ones(len(ends))]
+        edges = (np.concatenate(tails), np.concatenate(heads))
+        graph = csr_array((np.concatenate(prices), edges), shape=(n * m + 2, n * m + 2))
+        best = min(best, dijkstra(graph, indices=n * m)[n * m + 1] - (n + 1))
+    return best
+
+
+def at_cutter_points(path):
+    whole = path.cutter_point % 1.0 == 0.0
+    return path.q[whole], path.contact_position[whole]
+
+
+def test_the_least_travel_is_a_shortest_path_of_scipy():
+    problem = one_row()
+    plan = plan_cheapest(problem, ONLY_TRAVEL, SETTINGS.max_contact_change)
+    q, _ = at_cutter_points(plan.path)
+    least = shortest(problem, lambda a, b, *_: np.abs(b - a).sum(axis=1))
+    assert plan.checks == 1  # nothing was in the way, so the field is scipy's
+    assert np.abs(np.diff(q, axis=0)).sum() == pytest.approx(least, abs=1e-9)
+    assert plan.path.joint_travel >= least - 1e-9
+
+
+def test_the_least_time_is_a_shortest_path_of_scipy():
+    problem = one_row()
+    slow = replace(problem.cell.robot, max_speed=problem.cell.robot.max_speed / 40.0)
+    problem = replace(problem, cell=replace(problem.cell, robot=slow))
+    arc = np.abs(np.diff(problem.points.arc_length)) / problem.pace.feed
+
+    def seconds(q_a, q_b, t_a, t_b, column):
+        turning = (np.abs(q_b - q_a) / slow.max_speed).max(axis=1)
+        sliding = np.abs(t_b - t_a) / problem.pace.contact_speed
+        return np.maximum(np.maximum(turning, sliding), arc[column])
+
+    plan = plan_cheapest(problem, ONLY_TIME, SETTINGS.max_contact_change)
+    q, t = at_cutter_points(plan.path)
+    steps = range(len(q) - 1)
+    spent = sum(float(seconds(q[[k]], q[[k + 1]], t[[k]], t[[k + 1]], k)[0]) for k in steps)
+    assert plan.checks == 1
+    assert spent == pytest.approx(shortest(problem, seconds), abs=1e-9)
+    assert spent > arc.sum() * 1.05  # the feed alone does not decide here
+
+
+# a weighted sum
+
+WEIGHTS = ObjectiveWeights(joint_range=1.0, travel=0.5, time=0.05)
+
+
+def weighted(problem, weights, fallback):
+    return plan_weighted(problem, weights, SETTINGS.max_contact_change, 60.0, fallback)
+
+
+def sum_of(problem, plan, weights):
+    robot = problem.cell.robot
+    figures = figures_of_path(plan.path, plan.motion, problem.points, problem.pace, robot)
+    return (
+        weights.joint_range * np.ptp(on_wheel(plan.motion), axis=0).sum()
+        + weights.travel * figures.joint_travel
+        + weights.time * figures.seconds
+    )
+
+
+def test_a_weighted_sum_is_what_the_motion_has_and_no_more_than_other_methods_have():
+    problem = one_row()
+    plan = weighted(problem, WEIGHTS, recursive(one_row))
+    assert plan.weighted.value == pytest.approx(sum_of(problem, plan, WEIGHTS), abs=1e-12)
+    assert 0.0 < plan.weighted.lower_bound <= plan.weighted.value
+    travel = plan_cheapest(problem, ONLY_TRAVEL, SETTINGS.max_contact_change)
+    for other in (recursive(one_row), travel):
+        assert plan.weighted.value <= sum_of(problem, other, WEIGHTS) + 1e-12
+    again = weighted(problem, WEIGHTS, recursive(one_row))
+    assert again.motion.q.tobytes() == plan.motion.q.tobytes()
+
+
+@pytest.mark.parametrize("first", [22, 36, 57])
+def test_no_track_of_a_tiny_field_has_less_than_the_bound_of_the_weighted_sum(first):
+    problem = problem_of(with_positions(small_job(), 7), slice(first, first + 4))
+    plan = weighted(problem, WEIGHTS, plan_recursive(problem))
+    robot, pace, points = problem.cell.robot, problem.pace, problem.points
+    arc = np.abs(np.diff(points.arc_length)) / pace.feed
+    on = np.diff(points.pass_index) == 0
+    least = np.inf
+    for q, t in free_tracks(problem):
+        turned = np.abs(np.diff(q, axis=0))
+        sliding = np.abs(np.diff(t)) / pace.contact_speed
+        seconds = np.maximum(np.maximum(arc, sliding), (turned / robot.max_speed).max(axis=1))
+        total = np.ptp(q, axis=0).sum() + 0.5 * turned[on].sum() + 0.05 * seconds[on].sum()
+        least = min(least, total)
+    assert plan.weighted.lower_bound <= least + 1e-9
+    assert plan.weighted.value >= least - 1e-9
+
+
+def test_one_part_alone_has_the_bound_of_that_part():
+    problem = one_row()
+    only_range = weighted(problem, ObjectiveWeights(1.0, 0.0, 0.0), recursive(one_row))
+    ladders = [problem.ladder(nodes, problem.free_nodes(nodes)) for nodes in problem.field.branches]
+    nothing = np.empty(0, dtype=np.int64)
+    least = min(least_box(ladder, nothing).lower_bound for ladder in ladders)
+    assert only_range.weighted.lower_bound == pytest.approx(least, rel=2e-4)
+    only_travel = weighted(problem, ObjectiveWeights(0.0, 1.0, 0.0), recursive(one_row))
+    bound = shortest(problem, lambda a, b, *_: np.abs(b - a).sum(axis=1))
+    assert only_travel.weighted.lower_bound == pytest.approx(bound, abs=1e-9)
+
+
+# the tube around a path, and the calm box in it
+
+
+def test_a_tube_holds_the_path_and_only_postures_that_grind_near_it():
+    problem, path = one_row(), recursive(one_row).path
+    whole = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
+    finer = halved(problem.field.contact_positions)
+    around = tube(whole, path, finer).problem
+    (nodes,) = around.field.branches
+    free = around.free_nodes(nodes)
+    q_path, t_path = at_cutter_points(path)
+    for column, (q, t) in enumerate(zip(q_path, t_path, strict=True)):
+        row = int(np.abs(nodes.contact_position - t).argmin())
+        np.testing.assert_array_equal(nodes.q[column, row], q)
+        assert free[column, row]
+        near = nodes.contact_position[free[column]]
+        assert np.abs(near - t).max() <= REACH * np.diff(finer).max() + 1e-9
+        assert len(near) > 1
+    columns, rows = np.nonzero(free)
+    Ts = forward(problem.cell.robot, nodes.q[free]) @ problem.cell.T_flange_workpiece
+    Ts_base_cutter = Ts @ problem.points.Ts_workpiece_cutter[columns]
+    on_wheel = problem.cell.wheel.T_base_contact(nodes.contact_position[rows])
+    np.testing.assert_allclose(Ts_base_cutter - on_wheel, 0.0, atol=1e-9)
+
+
+def test_halved_contact_positions_keep_the_old_ones_to_the_bit():
+    t = np.linspace(-70.0, 70.0, 140)
+    finer = halved(halved(t))
+    assert np.isin(t, finer).all()
+    np.testing.assert_allclose(np.diff(finer), 140.0 / 139.0 / 4.0)
+
+
+def test_a_calm_box_holds_a_calm_track_and_is_widened_no_more_than_allowed():
+    problem = one_row()
+    found = 0
+    for nodes in problem.field.branches:
+        free = problem.free_nodes(nodes)
+        ladder, nothing = problem.ladder(nodes, free), np.empty(0, dtype=np.int64)
+        costs = roughness(problem, nodes, ONLY_TRAVEL, np.zeros_like(free))
+        box = least_box(ladder, nothing).box
+        if box is None:
+            continue
+        q = np.nan_to_num(nodes.q, nan=np.inf)
+        dear = replace(costs, contact_weight=1.0)
+        before = travel_of(ladder, smoothest(ladder, nothing, box.holds(q), dear).rows)
+        most = Travel(np.inf, before.contact - 4.0)  # one step of t less than the box permits
+        calm = calm_box(ladder, nothing, costs, box, 2.0 * box.size, most)
+        assert calm_box(ladder, nothing, costs, box, box.size, most) is None
+        if calm is not None:
+            found += 1
+            assert box.size < calm.size <= 2.0 * box.size
+            assert (calm.lower <= box.lower).all() and (calm.upper >= box.upper).all()
+            track = smoothest(ladder, nothing, calm.holds(q), dear)
+            assert travel_of(ladder, track.rows).within(most)
+    assert found

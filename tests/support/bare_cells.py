@@ -1,0 +1,109 @@
+"""Cells with nothing in them but what a test puts there."""
+
+from dataclasses import replace
+
+import numpy as np
+import trimesh
+
+from opl.cell.robot import load_robot
+from opl.cell.workcell import WorkCell
+from opl.geometry.frames import pose
+from opl.geometry.mesh import TriangleMesh
+from opl.geometry.shapes import Body, Box
+from opl.geometry.toolpath import CutterPoints
+from opl.geometry.wheel import ContactWheel
+from opl.motion.motion import Motion, Stretch
+
+NO_POINTS = CutterPoints(np.empty((0, 4, 4)), np.empty(0, dtype=int), np.empty(0))
+
+
+def with_obstacle(cell, p_base, size=(0.03, 0.03, 0.03), name="post"):
+    """Return a cell with one box more."""
+    body = Body(name, Box(tuple(size)), pose(np.eye(3), np.asarray(p_base, dtype=float)))
+    return replace(cell, obstacles=(*cell.obstacles, body))
+
+
+def block(size):
+    """Return a closed box as a mesh, centred at the origin."""
+    box = trimesh.creation.box(size)
+    return TriangleMesh(np.asarray(box.vertices), np.asarray(box.faces))
+
+
+def c_shape(width=0.2, wall=0.03, depth=0.1):
+    """Return a C extruded along z, open towards +x: a square frame with one side missing."""
+    a, b = width / 2.0, width / 2.0 - wall
+    profile = [(a, -a), (a, -b), (-b, -b), (-b, b), (a, b), (a, a), (-a, a), (-a, -a)]
+    low = np.array([(x, y, -depth / 2.0) for x, y in profile])
+    vertices = np.concatenate([low, low + np.array([0.0, 0.0, depth])])
+    quads = [(0, 1, 2, 7), (7, 2, 3, 6), (6, 3, 4, 5)]  # of the profile, clockwise from above
+    faces = []
+    for p, q, r, s in quads:
+        faces += [(p, q, r), (p, r, s), (r + 8, q + 8, p + 8), (s + 8, r + 8, p + 8)]
+    for k in range(8):
+        following = (k + 1) % 8
+        faces += [(k, k + 8, following), (following, k + 8, following + 8)]
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    return TriangleMesh(vertices, np.array(faces) if mesh.volume > 0 else np.array(faces)[:, ::-1])
+
+
+def convex_hull(mesh):
+    hull = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).convex_hull
+    return TriangleMesh(np.asarray(hull.vertices), np.asarray(hull.faces))
+
+
+def bare_cell(part, obstacles=(), clearance=0.005):
+    """Return an MH24 holding a part 0.1 m off its flange, its wheel out of everything's way."""
+    far_away = pose(np.eye(3), np.array([0.0, 0.0, 10.0]))
+    return WorkCell(
+        robot=load_robot("mh24"),
+        wheel=ContactWheel(0.05, 0.15, np.radians(45.0), far_away),
+        obstacles=tuple(obstacles),
+        part=part,
+        fixture=(),
+        T_flange_workpiece=pose(np.eye(3), np.array([0.0, 0.0, 0.1])),
+        contact_allowance=0.0005,
+        clearance=clearance,
+    )
+
+
+def free_move(q, seconds=10.0):
+    """Return a motion that visits postures and touches nothing."""
+    n, nothing = len(q), np.full(len(q), np.nan)
+    duration = np.full(n, seconds)
+    duration[0] = 0.0
+    return Motion(
+        np.asarray(q, dtype=float),
+        duration,
+        (Stretch.HOME,) * n,
+        nothing,
+        nothing,
+        np.full(n, -1),
+        nothing,
+    )
+
+
+def random_postures(robot, n, seed=0):
+    return np.random.default_rng(seed).uniform(robot.lower, robot.upper, (n, 6))
+
+
+class Ghosts:
+    """A scene in which postures near some others collide; stands in for a `CollisionScene`."""
+
+    def __init__(self, q, radius):
+        self._q = np.atleast_2d(q)
+        self._radius = radius
+
+    def collides(self, q):
+        away = np.linalg.norm(np.asarray(q)[:, None] - self._q, axis=-1)
+        return (away < self._radius).any(axis=1)
+
+    def colliding_pairs(self, q):
+        return [("R_link", "ghost")] if self.collides(q[None])[0] else []
+
+    def against_surroundings(self, reserve):
+        return Ghosts(self._q, self._radius + reserve)
+
+    def levers(self):
+        return np.ones(6)  # distances are those of joint space

@@ -1,0 +1,121 @@
+"""The V job planned, whole and small. Everything slow is made once."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from opl.cell.clearance import part_tree
+from opl.cell.collision import CollisionScene
+from opl.field.layer import wheel_layer
+from opl.field.nodes import build_nodes
+from opl.geometry.toolpath import CutterPoints
+from opl.job.load import load
+from opl.motion.timing import timed
+from opl.pipeline import cutter_points
+from opl.planning.plan import plan_recursive
+from opl.planning.problem import GrindingProblem
+from opl.resources import folder
+from opl.verification.replay import replay
+
+V_JOB = folder("workpieces") / "v_shape" / "job.yaml"
+
+
+@cache
+def v_job():
+    return load(V_JOB)
+
+
+def with_positions(job, count):
+    """Return a job with another number of contact positions."""
+    return replace(job, search=replace(job.search, n_contact_positions=count))
+
+
+@cache
+def small_job():
+    """Return the V job with two of its rows and fewer contact positions."""
+    job = v_job()
+    return with_positions(replace(job, passes=replace(job.passes, rows=2)), 60)
+
+
+def problem_of(job, points_of=None):
+    """Return the problem of a job, or of a slice of its cutter points."""
+    points = cutter_points(job)
+    if points_of is not None:
+        points = CutterPoints(
+            points.Ts_workpiece_cutter[points_of],
+            points.pass_index[points_of],
+            points.arc_length[points_of],
+        )
+    positions = job.cell.wheel.positions(job.search.n_contact_positions)
+    part = part_tree(job.cell.part)
+    return GrindingProblem(
+        job.cell,
+        CollisionScene(job.cell).for_second_opinion(),
+        part,
+        points,
+        build_nodes(job.cell, points, positions),
+        wheel_layer(job.cell, part, points, positions),
+        job.search.interpolation,
+        job.pace,
+    )
+
+
+@cache
+def v_problem():
+    return problem_of(v_job())
+
+
+@cache
+def v_plan():
+    return plan_recursive(v_problem())
+
+
+@cache
+def small_problem():
+    return problem_of(small_job())
+
+
+@cache
+def small_plan():
+    return plan_recursive(small_problem())
+
+
+@cache
+def small_motion():
+    """Return a free and timed motion over the two rows."""
+    problem = small_problem()
+    return timed(small_plan().motion, problem.points, problem.pace, problem.cell.robot)
+
+
+@cache
+def v_motion():
+    problem = v_problem()
+    return timed(v_plan().motion, problem.points, problem.pace, problem.cell.robot)
+
+
+@cache
+def tiny_problem():
+    """Return the end of one pass and the beginning of the next, and a home not far away."""
+    problem = problem_of(with_positions(small_job(), 30), points_of=slice(50, 70))
+    on_the_way = plan_recursive(problem).motion.q[1]  # where the first approach begins
+    home = on_the_way + np.array([0.3, -0.2, 0.0, 0.2, 0.1, 0.2])
+    return replace(problem, pace=replace(problem.pace, home=home))
+
+
+@cache
+def tiny_motion():
+    problem = tiny_problem()
+    motion = plan_recursive(problem).motion
+    return timed(motion, problem.points, problem.pace, problem.cell.robot)
+
+
+def replay_tiny(motion=None, cell=None):
+    """Replay the tiny motion, or another one, or in another cell."""
+    problem, allowed = tiny_problem(), small_job().search.max_contact_error
+    return replay(cell or problem.cell, problem.points, motion or tiny_motion(), allowed)
+
+
+def with_problem_cell(problem, cell):
+    """Return a problem in another cell; nodes and wheel layer stay."""
+    return replace(problem, cell=cell, scene=CollisionScene(cell).for_second_opinion())

@@ -1,0 +1,339 @@
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from opl.cell.robot import forward
+from opl.cli.commands import main
+from opl.errors import InputError, OplError
+from opl.motion.motion import VerifiedMotion
+from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
+from opl.program.inform import find_faults, parse
+from opl.program.inform.layout import VARIABLES, JobLayout, Step
+from opl.program.moves import Program, plan_moves
+from opl.program.posts import GROUP, find_post, known_posts
+from opl.program.profiles import PROFILES
+from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
+from opl.program.write import StraightLimit, write_program
+from tests.support.program_samples import DATE, MAX_SPEED, ROBOT, UNVERIFIED, verified_motion
+
+YASKAWA = ("NX100", "DX100", "DX200", "YRC1000")
+OTHERS = ("RAPID", "KRL", "FANUC", "URSCRIPT")
+ACTIONS = Actions(
+    at_start=(Remark("BELT 1 MUST RUN"), WaitInput(7, True)),
+    before_pass=(SetOutput(3, True), WaitInput(4, True, timeout=5.0)),
+    after_pass=(SetOutput(3, False), Dwell(0.5)),
+    at_end=(Call("PARK"),),
+)
+CORNERS = np.array(np.meshgrid(*([-0.1, 0.1],) * 3)).reshape(3, -1).T
+
+
+def write(controller, *, robot=ROBOT, name="SAMPLE", n_passes=2, **changes):
+    settings = ProgramSettings(controller=controller, actions=ACTIONS, title="MADE BY THE TESTS")
+    limit = StraightLimit(CORNERS, 1e-3)
+    motion = verified_motion(n_passes=n_passes, n_points=6)
+    settings = replace(settings, **changes)
+    if (controller, settings.motion) == ("KRL", MotionForm.JOINT):
+        motion = at_feed(motion, 0.2)  # else too slow for whole percents
+    return write_program(motion, name, robot, settings, limit, DATE, ["CELL 7"])
+
+
+def at_feed(verified, factor):
+    """The motion with its passes ground in a part of their time, or in more."""
+    motion = verified.motion
+    on_wheel = ~np.isnan(motion.contact_position)
+    duration = np.where(on_wheel, motion.duration * factor, motion.duration)
+    return VerifiedMotion(replace(motion, duration=duration))
+
+
+def programs(controller, **changes):
+    _, files = write(controller, **changes)
+    return {name: text for name, text in files.items() if not name.endswith(".csv")}
+
+
+@pytest.mark.parametrize("controller", YASKAWA + OTHERS)
+def test_whole_programs_are_the_golden_ones(controller, assert_golden):
+    for name, text in programs(controller).items():
+        assert_golden(f"{controller}/joint/{name}", text)
+    for name, text in programs(controller, motion=MotionForm.STRAIGHT).items():
+        assert_golden(f"{controller}/straight/{name}", text)
+
+
+@pytest.mark.parametrize("controller", YASKAWA)
+def test_cartesian_programs_are_the_golden_ones(controller, assert_golden):
+    frame = UserFrame(2, np.eye(4))
+    ramps = {"acceleration": ByKind(on_wheel=50, air=80), "deceleration": ByKind(on_wheel=40)}
+    texts = programs(
+        controller, positions=PositionForm.USER, user_frame=frame, motion=MotionForm.STRAIGHT,
+        levels=ByKind(2, 1, 4), **ramps,
+    )  # fmt: skip
+    for name, text in texts.items():
+        assert_golden(f"{controller}/user/{name}", text)
+
+
+@pytest.mark.parametrize("controller", YASKAWA)
+def test_jobs_keep_every_limit_of_their_controller(controller):
+    profile = PROFILES[controller]
+    long = {"name": "LONGER_THAN_NX100_TAKES", "n_passes": 85}
+    for changes in ({"motion": MotionForm.STRAIGHT}, long):
+        for name, text in programs(controller, **changes).items():
+            assert find_faults(text, profile) == ()
+            job = parse(text)
+            assert name == f"{job.name}.JBI" and len(job.name) <= profile.name_length
+            assert text.isascii() and "\n" not in text.replace("\r\n", "")
+            assert job.npos[0] == len(job.positions) == len(job.moves) <= profile.step_limit
+            for move in job.moves:
+                assert (move.tag("VJ") is None) == (move.word == "MOVL")
+
+
+@pytest.mark.parametrize("controller", ["NX100"])
+def test_five_thousand_points_split_off_the_belt_and_the_master_calls_every_part(controller):
+    motion = verified_motion(n_passes=50, n_points=100)
+    settings = ProgramSettings(controller=controller, actions=ACTIONS)
+    program, files = write_program(
+        motion, "GRIND_LONG", ROBOT, settings, StraightLimit(CORNERS, 0.0), DATE
+    )
+    jobs = {name: parse(text) for name, text in files.items() if name.endswith(".JBI")}
+    master, *parts = jobs.values()
+    assert list(master.calls) == [part.name for part in parts]
+    assert len(set(master.calls)) == len(parts) > 2
+    assert sum(len(part.moves) for part in parts) == len(program.moves) + len(parts) - 1
+    assert len(program.moves) > 5000
+    off_wheel = {tuple(m.q) for m in program.moves if not m.on_wheel and m.exact_stop}
+    pulses = {tuple(np.rint(np.array(q) * ROBOT.pulses_per_radian)) for q in off_wheel}
+    for part in parts:
+        assert part.positions[0].values in pulses and part.positions[-1].values in pulses
+        assert part.moves[-1].tag("PL") == "0"
+    # each is done once, however many parts there are
+    texts = "".join(files[f"{part.name}.JBI"] for part in parts)
+    assert texts.count("DOUT OT#(3) ON") == texts.count("DOUT OT#(3) OFF") == 50
+    assert texts.count("CALL JOB:PARK") == 1
+
+
+def test_actions_stand_in_front_of_the_wheel_with_the_robot_at_rest():
+    (text,) = programs("DX200").values()
+    lines = text.split("\r\n")
+    on, off = lines.index("DOUT OT#(3) ON"), lines.index("DOUT OT#(3) OFF")
+    assert lines[on - 1].endswith("PL=0") and lines[off - 1].endswith("PL=0")
+    assert lines[on + 1 : on + 5] == [
+        "*WAIT1",
+        "WAIT IN#(4)=ON T=5.00",
+        "PAUSE IF IN#(4)=OFF",
+        "JUMP *WAIT1 IF IN#(4)=OFF",
+    ]
+    assert lines[off + 1] == "TIMER T=0.50"
+    assert lines[-3:] == ["CALL JOB:PARK", "END", ""]
+    at_home = lines.index("'BELT 1 MUST RUN")
+    assert lines[at_home - 1].startswith("MOVJ C00000") and lines[at_home + 1] == "WAIT IN#(7)=ON"
+    program, _ = write("DX200")
+    for move in program.moves:
+        assert not move.actions or (move.exact_stop and not move.on_wheel)
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        (SetOutput(0, True), "input or output: must be 1 to 4096, got 0"),
+        (WaitInput(4097, True), "input or output: must be 1 to 4096, got 4097"),
+        (Dwell(1000.0), "time: must be 0.01 to 655.35 s, got 1000"),
+        (WaitInput(1, True, 0.001), "time: must be 0.01"),
+        (Call("park"), "call: must be of A-Z"),
+        (Call("SAMPLE"), "call: SAMPLE is the name of the program itself"),
+        (Remark("Gr\u00f6\u00dfe"), "comment: must be printable ASCII"),
+        (Remark(33 * "X"), "comment: has 33 characters"),
+    ],
+)
+def test_action_the_controller_does_not_take_is_refused(action, message):
+    with pytest.raises(InputError, match=f"program: {message}"):
+        programs("DX200", actions=Actions(before_pass=(action,)))
+
+
+@pytest.mark.parametrize("number", [19, 101])
+def test_ramps_out_of_range_are_refused(number):
+    with pytest.raises(InputError, match=f"ACC must be 20 to 100, got {number}"):
+        programs("DX200", acceleration=ByKind(on_wheel=number))
+
+
+@pytest.mark.parametrize("controller", YASKAWA)
+def test_pulses_nobody_confirmed_are_refused_until_accepted_by_name(controller):
+    with pytest.raises(InputError, match=r"R, B, T are not verified.*\[R, B, T\]"):
+        programs(controller, robot=UNVERIFIED)
+    texts = programs(controller, robot=UNVERIFIED, accepted_pulses=("R", "B", "T"))
+    assert all("'PULSE RATIO NOT VERIFIED: R B T" in text for text in texts.values())
+    # positions in a frame do not depend on them
+    assert programs(controller, robot=UNVERIFIED, positions=PositionForm.BASE)
+
+
+# other makers
+
+
+def moves_read(controller, text):
+    """Joint angles [deg] and time [s] of each move, as far as the text says them."""
+    if controller == "RAPID":
+        rows = re.findall(r"MoveAbsJ \[\[(.*?)\],.*?NoEOffs, v\d+(?:\\T:=([0-9.]+))?,", text)
+        return [(eval(f"[{a}]"), float(t or "nan")) for a, t in rows]
+    if controller == "FANUC":
+        axes = np.array(re.findall(r"J[1-6]= ([-0-9.]+) deg", text), dtype=float).reshape(-1, 6)
+        axes[:, 2] += axes[:, 1]
+        times = re.findall(r"[JL] P\[\d+\] (?:(\d+)msec|5%)", text)
+        return [(list(a), float(t or "nan") / 1e3) for a, t in zip(axes, times, strict=True)]
+    rows = re.findall(r"movej\(\[(.*?)\], (?:t=([0-9.]+))?", text)
+    return [(list(np.rad2deg(eval(f"[{a}]"))), float(t or "nan")) for a, t in rows]
+
+
+@pytest.mark.parametrize("controller", ["RAPID", "FANUC", "URSCRIPT"])
+def test_other_makers_go_to_the_same_postures_in_the_same_time(controller):
+    program, files = write(controller)
+    (text,) = [text for name, text in files.items() if not name.endswith(".csv")]
+    for move, (angles, time) in zip(program.moves, moves_read(controller, text), strict=True):
+        np.testing.assert_allclose(angles, np.rad2deg(move.q), atol=1.1e-3)
+        if move.duration is not None:
+            assert time == pytest.approx(move.duration, abs=6e-4)
+
+
+def test_krl_goes_to_the_same_postures_in_whole_percents():
+    program, files = write("KRL")
+    text = files["SAMPLE.src"]
+    rows = re.findall(r"BAS\(#VEL_PTP, (\d+)\)\r\nPTP \{(.*?)\}( C_PTP)?\r\n", text)
+    for move, (percent, axes, blended) in zip(program.moves, rows, strict=True):
+        angles = [float(axis.split()[1]) for axis in axes.split(",")]
+        np.testing.assert_allclose(angles, np.rad2deg(move.q), atol=1e-4)
+        assert 1 <= int(percent) <= 100 and bool(blended) != move.exact_stop
+
+
+@pytest.mark.parametrize("controller", OTHERS)
+def test_other_makers_keep_the_time_of_each_pass(controller):
+    for motion in MotionForm:
+        program, _ = write(controller, motion=motion)
+        assert len(program.pass_times) == 2
+        assert all(abs(one.error) < 0.02 for one in program.pass_times)
+
+
+def test_straight_moves_of_rapid_and_krl_lead_to_the_pose_of_the_tool():
+    T_flange_tool = np.eye(4)
+    T_flange_tool[:3, 3] = 0.01, 0.02, 0.2
+    changes = {"motion": MotionForm.STRAIGHT, "T_flange_tool": T_flange_tool, "tool": 2}
+    program, files = write("RAPID", **changes)
+    q = [move.q for move in program.moves if move.straight]
+    wanted = (forward(ROBOT, np.array(q)) @ T_flange_tool)[:, :3, 3] * 1e3
+    rapid = re.findall(r"MoveL \[\[([^]]*)\]", files["SAMPLE.mod"])
+    krl = re.findall(r"LIN \{X (\S+),Y (\S+),Z (\S+),A", write("KRL", **changes)[1]["SAMPLE.src"])
+    np.testing.assert_allclose([eval(f"[{p}]") for p in rapid], wanted, atol=1e-3)
+    np.testing.assert_allclose(np.array(krl, dtype=float), wanted, atol=1e-3)
+    assert ", tool2;" in files["SAMPLE.mod"]
+
+
+@pytest.mark.parametrize("controller", OTHERS)
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"name": "A-B"}, "program name: .* a letter and up to"),
+        ({"title": "gr\u00f6sse"}, "program comment: .* printable ASCII"),
+        ({"actions": Actions(at_end=(Call("A B"),))}, "program name"),
+        ({"actions": Actions(at_end=(Remark(81 * "X"),))}, "program comment"),
+    ],
+)
+def test_other_makers_refuse_what_their_language_does_not_take(controller, changes, message):
+    with pytest.raises(InputError, match=message):
+        programs(controller, **changes)
+
+
+DAMAGE = [
+    ("{{ name }}", "{{ nam }}", "'nam' is undefined", OTHERS),
+    ("{{ name }}", "\u00e4", "not ASCII", OTHERS),
+    ("in steps %}", "in steps[1:] %}", "loses or moves", ("RAPID", "KRL", "URSCRIPT")),
+    ("in step.actions %}", "in step.actions[1:] %}", "loses or moves", ("RAPID", "URSCRIPT")),
+    ("{{ step.move }}", "{{ step.move }}\n{{ step.move }}", "moves instead of", ("RAPID", "KRL")),
+    ("{{ step.speed }}\n", "", "loses or moves", ("KRL",)),
+    ("in lines %}", "in lines[1:-1] %}", "loses or moves", ("FANUC",)),
+    ("in positions %}", "in positions[1:] %}", "loses or changes a position", ("FANUC",)),
+]
+
+
+@pytest.mark.parametrize(
+    ("controller", "old", "new", "message"),
+    [(name, *damage) for *damage, names in DAMAGE for name in names],
+)
+def test_other_makers_read_back_what_a_template_gives(tmp_path, controller, old, new, message):
+    text = find_post(controller).template.read_text()
+    assert old in text
+    own = tmp_path / "own.j2"
+    own.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        programs(controller, template=own)
+
+
+def test_pass_too_slow_for_whole_percents_is_refused():
+    program = plan_moves(at_feed(verified_motion(), 2.0), "SAMPLE", MAX_SPEED)
+    with pytest.raises(OplError, match="pass 1 would take"):
+        find_post("KRL").write(program, ROBOT, ProgramSettings(), DATE)
+
+
+# the registry
+
+
+def test_every_post_comes_from_an_entry_point_and_tells_its_variables():
+    assert set(known_posts()) >= {*YASKAWA, *OTHERS}
+    told = CliRunner().invoke(main, ["templates", "vars"]).output
+    for name in known_posts():
+        post = find_post(name)
+        assert post.template.is_file() and f"{name}: {post.title}" in told
+        template = post.template.read_text()
+        for variable, meaning in post.variables.items():
+            assert meaning in told
+            assert variable.split(".")[-1] in template or name in OTHERS
+
+
+def test_documented_variables_of_jobs_are_the_ones_given():
+    layout = JobLayout("A", "0", None, "PULSE", "PULSE", "", None, "", None, (), (), ())
+    own = {name for name in VARIABLES if "." not in name}
+    steps = {name.partition(".")[2] for name in VARIABLES if "." in name}
+    assert own == set(layout.values())
+    assert steps == set(Step.__dataclass_fields__)
+
+
+def test_unknown_controller_is_refused_with_the_known_ones():
+    with pytest.raises(InputError, match=r"unknown controller 'DX300'; known: .*DX200, FANUC, KRL"):
+        find_post("DX300")
+    shown = CliRunner().invoke(main, ["templates", "vars", "DX300"])
+    assert shown.exit_code == 2 and "unknown controller" in shown.output
+
+
+def install(folder, entries):
+    """Make what a package manager would: the entry points of an installed package."""
+    info = folder / "our_cell_post-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: our-cell-post\nVersion: 1.0\n")
+    rows = [f"{name} = {value}" for name, value in entries.items()]
+    (info / "entry_points.txt").write_text("\n".join([f"[{GROUP}]", *rows, ""]))
+
+
+def test_a_site_adds_its_own_post_without_touching_opl(tmp_path, monkeypatch):
+    package = Path(__file__).parents[1] / "example_post"
+    declared = (package / "pyproject.toml").read_text()
+    ((name, value),) = re.findall(r'^(OUR_CELL) = "(.*)"$', declared, re.MULTILINE)
+    assert f'[project.entry-points."{GROUP}"]' in declared
+    install(tmp_path, {name: value})
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.syspath_prepend(package)
+    text = programs("OUR_CELL")["SAMPLE.txt"]
+    assert text.startswith("PROGRAM SAMPLE 2024-03-05\nGO 0.000 -20.000 10.000 0.000 -60.000")
+    assert "OUR_CELL: our own cell" in CliRunner().invoke(main, ["templates", "vars"]).output
+
+
+@pytest.mark.parametrize(
+    ("value", "message"), [("nowhere:POST", "cannot be loaded"), ("math:pi", "is no .*Post")]
+)
+def test_broken_post_of_a_site_is_told(tmp_path, monkeypatch, value, message):
+    install(tmp_path, {"BROKEN": value})
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(InputError, match=message):
+        find_post("BROKEN")
+
+
+def test_program_without_moves_is_written_too():
+    for controller in YASKAWA + OTHERS:
+        assert find_post(controller).write(Program("EMPTY"), ROBOT, ProgramSettings(), DATE).files
