@@ -1,0 +1,191 @@
+"""How fast the inverse solutions turn: enclosures of their derivatives along a motion of the flange.
+
+The closed forms of `spherical_wrist` and `parallel_axes` are square roots and quotients up to the
+last step, the arc tangent. So their derivatives can be enclosed over a whole piece of a motion,
+without a sample and without an estimate. Where a piece touches a singularity or the end of the
+reach, nothing is known there of the joints that it concerns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.cell.inverse import N_BRANCHES, Arm
+from opl.cell.parallel_axes import ParallelAxesArm
+from opl.cell.spherical_wrist import SphericalWristArm
+from opl.geometry.frames import Array
+from opl.geometry.jets import Jet, Turning, turning
+
+SURELY = 1e-6  # of cosines and square metres: more than what the closed form takes for round-off
+Axes = tuple[Jet, Jet, Jet]  # coordinates of a vector in the base frame
+Slot = tuple[tuple[Turning, ...], np.ndarray]  # theta1 to theta6, and where there is none of it
+
+
+@dataclass(frozen=True)
+class FlangeJets:
+    """A motion of the flange over cells of its variable.
+
+    Attributes:
+        x: Axis of the flange in the base frame.
+        y: As x.
+        z: As x.
+        p: Its origin in [m].
+    """
+
+    x: Axes
+    y: Axes
+    z: Axes
+    p: Axes
+
+
+@dataclass(frozen=True)
+class JointDerivatives:
+    """Enclosures over n cells, not finite where nothing is known.
+
+    Attributes:
+        first: Largest size of the first derivative in [rad] per unit, shape (8, 6, n).
+        second_low: Least second derivative, shape (8, 6, n).
+        second_high: Greatest second derivative, shape (8, 6, n).
+        none: Where there is certainly no posture in the whole cell, shape (8, n).
+    """
+
+    first: Array
+    second_low: Array
+    second_high: Array
+    none: np.ndarray
+
+
+def joint_derivatives(arm: Arm, flange: FlangeJets) -> JointDerivatives:
+    """Enclose the derivatives of every inverse solution, slots as in `opl.cell.inverse`."""
+    if isinstance(arm, SphericalWristArm):
+        slots = _spherical_wrist(arm, flange)
+    else:
+        slots = _parallel_axes(arm, flange)
+    shape = (N_BRANCHES, 6, *np.shape(flange.p[0].value.middle))
+    first, low, high = np.empty(shape), np.empty(shape), np.empty(shape)
+    none = np.empty((N_BRANCHES, *shape[2:]), dtype=bool)
+    for slot, (joints, out_of_reach) in enumerate(slots):
+        none[slot] = out_of_reach
+        for joint, (angle, sign) in enumerate(zip(joints, arm.signs, strict=True)):
+            second = angle.second.times(float(sign))
+            first[slot, joint] = np.abs(angle.first.middle) + angle.first.radius
+            low[slot, joint], high[slot, joint] = second.low, second.high
+    return JointDerivatives(first, low, high, none)
+
+
+def _spherical_wrist(arm: SphericalWristArm, flange: FlangeJets) -> list[Slot]:
+    forearm, tilt_zero = float(np.hypot(arm.a2, arm.c3)), float(np.arctan2(arm.a2, arm.c3))
+    wrist = _moved(flange.p, flange.z, -arm.c4)
+    up = wrist[2].plus(-arm.c1)
+    slots: dict[int, Slot] = {}
+    for back in (0, 1):
+        cos1, sin1, ahead, theta1, beside = _heading(wrist, arm.b, back)
+        forward = ahead.plus(-arm.a1)
+        z_ahead, z_left = _turned(flange.z, cos1, sin1)
+        x_ahead, _ = _turned(flange.x, cos1, sin1)
+        y_ahead, _ = _turned(flange.y, cos1, sin1)
+        for elbow in (0, 1):
+            theta2, theta3, (cos_link, sin_link), beyond = _triangle(
+                forward, up, arm.c2, forearm, elbow
+            )
+            none = beside | beyond
+            # the forearm axis stands off the line to the wrist by the angle of its offset
+            c, s = float(np.cos(tilt_zero)), float(np.sin(tilt_zero))
+            cos_tilt = cos_link.times(c) + sin_link.times(s)
+            sin_tilt = sin_link.times(c) - cos_link.times(s)
+            z1 = cos_tilt * z_ahead - sin_tilt * flange.z[2]
+            z3 = sin_tilt * z_ahead + cos_tilt * flange.z[2]
+            x3 = sin_tilt * x_ahead + cos_tilt * flange.x[2]
+            y3 = sin_tilt * y_ahead + cos_tilt * flange.y[2]
+            theta4 = turning(z_left, z1)
+            theta5 = turning((z1 * z1 + z_left * z_left).root(), z3)
+            theta6 = turning(y3, -x3)
+            slot = 2 * back + elbow
+            slots[slot] = (theta1, theta2, theta3, theta4, theta5, theta6), none
+            flipped = (theta1, theta2, theta3, theta4, _negative(theta5), theta6)
+            slots[slot + 4] = flipped, none
+    return [slots[slot] for slot in range(N_BRANCHES)]
+
+
+def _parallel_axes(arm: ParallelAxesArm, flange: FlangeJets) -> list[Slot]:
+    w = _moved(flange.p, flange.z, -arm.c5)
+    slots: dict[int, Slot] = {}
+    for back in (0, 1):
+        cos1, sin1, ahead, theta1, beside = _heading(w, arm.b, back)
+        z_ahead, z_left = _turned(flange.z, cos1, sin1)
+        x_ahead, _ = _turned(flange.x, cos1, sin1)
+        y_ahead, _ = _turned(flange.y, cos1, sin1)
+        sin5 = (z_ahead * z_ahead + flange.z[2] * flange.z[2]).root()
+        theta5 = turning(sin5, z_left)
+        for flip in (0, 1):
+            sign = -1.0 if flip else 1.0
+            cos_tilt = (z_ahead / sin5).times(-sign)
+            sin_tilt = (flange.z[2] / sin5).times(sign)
+            theta6 = turning(
+                -(sin_tilt * x_ahead + cos_tilt * flange.x[2]),
+                -(sin_tilt * y_ahead + cos_tilt * flange.y[2]),
+            )
+            forward = ahead.plus(-arm.a1) - sin_tilt.times(arm.c4)
+            up = w[2].plus(-arm.c1) - cos_tilt.times(arm.c4)
+            tilt = turning(sin_tilt, cos_tilt)
+            for elbow in (0, 1):
+                theta2, theta3, _, beyond = _triangle(forward, up, arm.c2, arm.c3, elbow)
+                theta4 = tilt - theta2 - theta3
+                flipped = _negative(theta5) if flip else theta5
+                joints = (theta1, theta2, theta3, theta4, flipped, theta6)
+                slots[4 * flip + 2 * back + elbow] = joints, beside | beyond
+    return [slots[slot] for slot in range(N_BRANCHES)]
+
+
+def _moved(p: Axes, along: Axes, length: float) -> Axes:
+    a, b, c = (origin + axis.times(length) for origin, axis in zip(p, along, strict=True))
+    return a, b, c
+
+
+def _turned(v: Axes, cos1: Jet, sin1: Jet) -> tuple[Jet, Jet]:
+    """Return how far a vector points ahead and to the left of the plane of the arm."""
+    return cos1 * v[0] + sin1 * v[1], cos1 * v[1] - sin1 * v[0]
+
+
+def _heading(
+    p: Axes, lateral: float, back: int
+) -> tuple[Jet, Jet, Jet, Turning, np.ndarray]:
+    """Return cosine and sine of theta1, how far ahead of axis 1 the point lies, and theta1.
+
+    And where it is nearer to axis 1 than the plane of the arm passes by.
+    """
+    away = p[0] * p[0] + p[1] * p[1]
+    ahead = away.plus(-lateral * lateral).root()
+    ahead = -ahead if back else ahead
+    cos1 = (p[0] * ahead + p[1].times(lateral)) / away
+    sin1 = (p[1] * ahead - p[0].times(lateral)) / away
+    beside = away.value.high < lateral * lateral - SURELY
+    return cos1, sin1, ahead, turning(sin1, cos1), np.asarray(beside)
+
+
+def _triangle(
+    forward: Jet, up: Jet, upper_arm: float, forearm: float, elbow: int
+) -> tuple[Turning, Turning, tuple[Jet, Jet], np.ndarray]:
+    """Return theta2, the bend at axis 3, cosine and sine of the tilt of the forearm.
+
+    And where the far end is out of reach.
+    """
+    away = forward * forward + up * up
+    double = 2.0 * upper_arm * forearm
+    cos_bend = away.plus(-(upper_arm**2) - forearm**2).times(1.0 / double)
+    beyond = (cos_bend.value.low > 1.0 + SURELY) | (cos_bend.value.high < -1.0 - SURELY)
+    sin_bend = (-(cos_bend * cos_bend)).plus(1.0).root()
+    sin_bend = -sin_bend if elbow else sin_bend
+    bend = turning(sin_bend, cos_bend)
+    # seen from axis 2: along the upper arm, and across it
+    along, across = cos_bend.times(forearm).plus(upper_arm), sin_bend.times(forearm)
+    cos2 = (up * along + forward * across) / away
+    sin2 = (forward * along - up * across) / away
+    cos_link, sin_link = cos2 * cos_bend - sin2 * sin_bend, sin2 * cos_bend + cos2 * sin_bend
+    return turning(sin2, cos2), bend, (cos_link, sin_link), np.asarray(beyond)
+
+
+def _negative(angle: Turning) -> Turning:
+    return Turning(-angle.first, -angle.second)

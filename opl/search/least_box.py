@@ -1,0 +1,331 @@
+"""The least box that holds a point of every wall, by branch and bound over intervals of few walls.
+
+A subproblem allows each wall some spans, runs of cells of a piece. What every box below the
+threshold must hold anyway, the core, cuts spans off; a linear program over the walls with one span
+left bounds the size of the box. What the bound loses to the bend of a span is told by the prices of
+the linear program: there the subproblem is split. Walls are added while the proof goes on.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from opl.geometry.frames import Array
+from opl.search.relaxation import Relaxation, least_box_of
+from opl.search.walls import Image, Piece, Wall, relaxed
+
+SETTLED = 0.1  # of the gap wanted: what the bend of the spans may lose where no wall is split further
+MOST_ROUNDS = 12  # of cutting spans off; more would cut little
+
+
+@dataclass(frozen=True)
+class Span:
+    """A run of cells of one image of a piece.
+
+    Attributes:
+        piece: Index of the piece of its wall.
+        image: Index of the image of its family.
+        first: First cell.
+        end: After the last cell.
+    """
+
+    piece: int
+    image: int
+    first: int
+    end: int
+
+
+@dataclass(order=True)
+class Subproblem:
+    """Boxes of which it is known through which spans they lead.
+
+    Attributes:
+        bound: None of them is smaller, in [rad].
+        number: To order those with equal bounds.
+        spans: The spans of each wall.
+        low: The lower faces are not above these, in [rad], shape (6,).
+        high: The upper faces are not below these.
+    """
+
+    bound: float
+    number: int
+    spans: list[list[Span]] = field(compare=False)
+    low: Array = field(compare=False)
+    high: Array = field(compare=False)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A box that holds a point of every wall, as far as the proof can tell.
+
+    Attributes:
+        bound: Of its subproblem in [rad].
+        low: Lower faces in [rad], shape (6,).
+        high: Upper faces.
+        held_by: For each wall, how hard it presses on the box.
+    """
+
+    bound: float
+    low: Array
+    high: Array
+    held_by: dict[int, Array]
+
+
+class _Body:
+    """A wall with all of its pieces and images as arrays."""
+
+    def __init__(self, wall: Wall, images: Callable[[int], Sequence[Image]]) -> None:
+        self.wall = wall
+        self.images = images
+        self._moved: dict[tuple[int, int], Piece] = {}
+        self._boxes: dict[tuple[int, int], tuple[Array, Array]] = {}
+
+    @cached_property
+    def all_spans(self) -> tuple[list[Span], Array, Array]:
+        """All pieces in all images, and a box around each."""
+        spans, low, high = [], [], []
+        for index, piece in enumerate(self.wall.pieces):
+            least, most = piece.low.min(axis=0), piece.high.max(axis=0)
+            for number, image in enumerate(self.images(piece.family)):
+                ends = image.sign * least + image.shift, image.sign * most + image.shift
+                spans.append(Span(index, number, 0, len(piece.pad_low)))
+                low.append(np.minimum(*ends))
+                high.append(np.maximum(*ends))
+        return spans, np.array(low).reshape(-1, 6), np.array(high).reshape(-1, 6)
+
+    def key(self, span: Span) -> tuple[int, tuple[int, ...]]:
+        family = self.wall.pieces[span.piece].family
+        return family, self.images(family)[span.image].key
+
+    def moved(self, span: Span) -> Piece:
+        at = (span.piece, span.image)
+        if at not in self._moved:
+            piece = self.wall.pieces[span.piece]
+            self._moved[at] = self.images(piece.family)[span.image].of(piece)
+        return self._moved[at]
+
+    def box(self, span: Span) -> tuple[Array, Array]:
+        at = (span.piece, span.image)
+        if at not in self._boxes:
+            piece = self.moved(span)
+            self._boxes[at] = piece.low, piece.high
+        low, high = self._boxes[at]
+        return low[span.first : span.end], high[span.first : span.end]
+
+
+class BoxProof:
+    """Branch and bound for the least box.
+
+    Args:
+        images: The images of each family, the family itself first.
+        threshold: Boxes of this size or more in [rad] are of no interest.
+        gap: Fraction by which the bound may stay below the threshold.
+    """
+
+    def __init__(
+        self, images: Callable[[int], Sequence[Image]], threshold: float, gap: float
+    ) -> None:
+        self._images = images
+        self._gap = gap
+        self._bodies: list[_Body] = []
+        self.threshold = threshold
+        self.stuck = np.inf  # least bound of what could not be split
+        self.subproblems = 0
+        self._count = 0
+        self._open: list[Subproblem] = []
+        self._push(0.0, [], np.full(6, np.inf), np.full(6, -np.inf))
+
+    @property
+    def walls(self) -> list[Wall]:
+        """All walls so far."""
+        return [body.wall for body in self._bodies]
+
+    @property
+    def closing(self) -> float:
+        """Subproblems with this bound are closed, in [rad]."""
+        return self.threshold * (1.0 - self._gap)
+
+    @property
+    def lower_bound(self) -> float:
+        """No box that holds a point of every wall is smaller, in [rad]."""
+        least = self._open[0].bound if self._open else np.inf
+        return float(min(least, self.stuck, self.closing))
+
+    @property
+    def closed(self) -> bool:
+        """Whether nothing is left that could be smaller than the threshold less the gap."""
+        return not self._open or self._open[0].bound >= self.closing
+
+    def add(self, wall: Wall) -> None:
+        """Take in a wall."""
+        self._bodies.append(_Body(wall, self._images))
+
+    def take_next(self) -> Candidate | None:
+        """Work on the subproblem with the least bound.
+
+        Returns:
+            Its box, where nothing is gained by splitting it further: the caller adds a wall that
+            misses the box, or lowers the threshold, and puts it back; or gives it up.
+        """
+        node = heapq.heappop(self._open)
+        self.subproblems += 1
+        known = len(node.spans)
+        node.spans = list(node.spans)
+        for index in range(known, len(self._bodies)):
+            node.spans.append(self._spans_of_new(node, index))
+        sizes = self._tighten(node)
+        if sizes is None:
+            return None
+        node.bound = max(node.bound, max(sizes, default=0.0))
+        alone = [k for k, spans in enumerate(node.spans) if len(spans) == 1]
+        found: Relaxation | None = None
+        if alone:
+            segments = []
+            for k in alone:
+                (span,) = node.spans[k]
+                segments.append(relaxed(self._bodies[k].moved(span), span.first, span.end))
+            found = least_box_of(segments, node.low, node.high)
+        if found is not None:
+            node.bound = max(node.bound, found.bound)
+        if node.bound >= self.closing:
+            return None
+        low, high = (found.low, found.high) if found is not None else (node.low, node.high)
+        branch = self._where_to_split(node, alone, found, low, high)
+        if branch is not None:
+            self._split(node, *branch)
+            return None
+        held_by = {}
+        if found is not None:
+            held_by = {k: found.prices[i] for i, k in enumerate(alone) if found.prices[i].any()}
+        self._kept = node
+        return Candidate(node.bound, low, high, held_by)
+
+    def put_back(self) -> None:
+        """Leave the subproblem of the last candidate open."""
+        heapq.heappush(self._open, self._kept)
+
+    def give_up(self) -> None:
+        """Let the subproblem of the last candidate stay as it is; its bound counts."""
+        self.stuck = min(self.stuck, self._kept.bound)
+
+    def _push(self, bound: float, spans: list[list[Span]], low: Array, high: Array) -> None:
+        heapq.heappush(self._open, Subproblem(bound, self._count, spans, low, high))
+        self._count += 1
+
+    def _spans_of_new(self, node: Subproblem, index: int) -> list[Span]:
+        body = self._bodies[index]
+        spans, low, high = body.all_spans
+        keep = _grown(low, high, node.low, node.high) < self.closing
+        if index == 0:
+            # the whole motion has images: of these the first is looked at
+            keep &= np.array([span.image == 0 for span in spans], dtype=bool)
+        elif body.wall.pass_index == self._bodies[0].wall.pass_index:
+            first = self._bodies[0]
+            keys = {first.key(span) for span in node.spans[0]}
+            keep &= np.array([body.key(span) in keys for span in spans], dtype=bool)
+        return [span for span, kept in zip(spans, keep, strict=True) if kept]
+
+    def _tighten(self, node: Subproblem) -> list[float] | None:
+        """Cut off what no box below the threshold can hold; the least growth for each wall."""
+        low, high = node.low.copy(), node.high.copy()
+        for _ in range(MOST_ROUNDS):
+            before = low.copy(), high.copy()
+            sizes = []
+            for index, body in enumerate(self._bodies):
+                kept, least, most = [], np.full(6, np.inf), np.full(6, -np.inf)
+                smallest = np.inf
+                for span in node.spans[index]:
+                    cell_low, cell_high = body.box(span)
+                    grown = _grown(cell_low, cell_high, low, high)
+                    fits = np.flatnonzero(grown < self.closing)
+                    if not len(fits):
+                        continue
+                    first, end = int(fits[0]), int(fits[-1]) + 1
+                    kept.append(Span(span.piece, span.image, span.first + first, span.first + end))
+                    least = np.minimum(least, cell_low[first:end].min(axis=0))
+                    most = np.maximum(most, cell_high[first:end].max(axis=0))
+                    smallest = min(smallest, float(grown[fits].min()))
+                if not kept:
+                    return None
+                node.spans[index] = kept
+                high, low = np.maximum(high, least), np.minimum(low, most)
+                sizes.append(smallest)
+            if not self._link(node):
+                return None
+            if np.allclose(before[0], low, atol=1e-9) and np.allclose(before[1], high, atol=1e-9):
+                break
+        node.low, node.high = low, high
+        return sizes
+
+    def _link(self, node: Subproblem) -> bool:
+        """Leave each pass the postures that all of its walls have; whether there are any."""
+        keys: dict[int, set[tuple[int, tuple[int, ...]]]] = {}
+        for body, spans in zip(self._bodies, node.spans, strict=True):
+            own = {body.key(span) for span in spans}
+            index = body.wall.pass_index
+            keys[index] = keys[index] & own if index in keys else own
+        for k, body in enumerate(self._bodies):
+            left = keys[body.wall.pass_index]
+            node.spans[k] = [span for span in node.spans[k] if body.key(span) in left]
+            if not node.spans[k]:
+                return False
+        return True
+
+    def _where_to_split(
+        self, node: Subproblem, alone: list[int], found: Relaxation | None, low: Array, high: Array
+    ) -> tuple[int, float] | None:
+        """Return the wall to be split, and where along its span; None if that gains nothing."""
+        settled = SETTLED * self._gap * self.threshold
+        best, wall, x = 0.0, -1, 0.5
+        for index, spans in enumerate(node.spans):
+            if len(spans) > 1:
+                grown = min(
+                    float(_grown(*self._bodies[index].box(span), low, high).min())
+                    for span in spans
+                )
+                missing = grown - float(np.maximum(high - low, 0.0).sum())
+                if missing > max(best, settled) or (wall < 0 and index == 0):
+                    best, wall = max(missing, settled), index
+        if found is not None:
+            lost = np.array(
+                [
+                    loss if node.spans[k][0].end - node.spans[k][0].first > 1 else 0.0
+                    for k, loss in zip(alone, found.lost, strict=True)
+                ]
+            )
+            if lost.sum() > settled:
+                worst = int(np.argmax(lost))
+                if lost[worst] > best:
+                    return alone[worst], float(found.x[worst])
+        return (wall, x) if wall >= 0 else None
+
+    def _split(self, node: Subproblem, index: int, x: float) -> None:
+        spans = node.spans[index]
+        if len(spans) > 1:
+            halves = [[span] for span in spans]
+        else:
+            (span,) = spans
+            at = self._bodies[index].wall.pieces[span.piece].at[span.first : span.end + 1]
+            n = len(at) - 1
+            least = max(n // 8, 1)
+            place = int(np.searchsorted(at, at[0] + x * (at[-1] - at[0])))
+            middle = span.first + min(max(place, least), n - least)
+            halves = [
+                [Span(span.piece, span.image, span.first, middle)],
+                [Span(span.piece, span.image, middle, span.end)],
+            ]
+        for half in halves:
+            left = list(node.spans)
+            left[index] = half
+            self._push(node.bound, left, node.low, node.high)
+
+
+def _grown(cell_low: Array, cell_high: Array, low: Array, high: Array) -> Array:
+    """Return the size of a core with a point of each cell taken in, in [rad], shape (n,)."""
+    edges = np.maximum(cell_low, high) - np.minimum(cell_high, low)
+    return np.asarray(np.maximum(edges, 0.0).sum(axis=-1))

@@ -1,0 +1,129 @@
+"""Walls: curves in joint space of which every motion must pass some point.
+
+A cutter point at every contact position is a wall: the motion grinds the point somewhere. A wall is
+known as cells: over each, the curve lies within pads of its chord, joint by joint. Cells where
+nothing may be ground are left out, so a wall is several pieces. Each posture of the inverse
+kinematics has pieces of its own, and its images: the same postures after full turns, or with the
+wrist flipped.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.geometry.frames import Array
+
+UNKNOWN = 50.0  # [rad] pad where nothing is known; beyond what any joint turns
+
+
+@dataclass(frozen=True)
+class Piece:
+    """An unbroken part of a wall in one posture.
+
+    Attributes:
+        family: Which posture.
+        at: Place of each corner along the wall, increasing, shape (n + 1,).
+        corners: Joint positions at the ends of the cells in [rad], shape (n + 1, 6).
+        pad_low: How far below the chord of each cell the curve can be, not positive, shape (n, 6).
+        pad_high: How far above, not negative, shape (n, 6).
+    """
+
+    family: int
+    at: Array
+    corners: Array
+    pad_low: Array
+    pad_high: Array
+
+    @property
+    def low(self) -> Array:
+        """Lower faces of a box around each cell in [rad], shape (n, 6)."""
+        return np.minimum(self.corners[:-1], self.corners[1:]) + self.pad_low
+
+    @property
+    def high(self) -> Array:
+        """Upper faces of it."""
+        return np.maximum(self.corners[:-1], self.corners[1:]) + self.pad_high
+
+    def part(self, first: int, end: int) -> Piece:
+        """Return the cells from ``first`` to before ``end`` alone."""
+        corners = slice(first, end + 1)
+        cells = slice(first, end)
+        return Piece(
+            self.family,
+            self.at[corners],
+            self.corners[corners],
+            self.pad_low[cells],
+            self.pad_high[cells],
+        )
+
+
+@dataclass(frozen=True)
+class Image:
+    """The same postures elsewhere in joint space: sign * q + shift.
+
+    Attributes:
+        sign: 1 or -1 for each joint, shape (6,).
+        shift: In [rad], shape (6,).
+        key: The same for images between which a pass can not change.
+    """
+
+    sign: Array
+    shift: Array
+    key: tuple[int, ...]
+
+    def of(self, piece: Piece) -> Piece:
+        """Return a piece moved there."""
+        mirrored = self.sign < 0.0
+        return Piece(
+            piece.family,
+            piece.at,
+            piece.corners * self.sign + self.shift,
+            np.where(mirrored, -piece.pad_high, piece.pad_low),
+            np.where(mirrored, -piece.pad_low, piece.pad_high),
+        )
+
+
+@dataclass(frozen=True)
+class Wall:
+    """One wall.
+
+    Attributes:
+        pass_index: The pass that crosses it.
+        place: Where: the cutter point, fractional between two.
+        pieces: Where it can be crossed; none if it cannot.
+    """
+
+    pass_index: int
+    place: float
+    pieces: tuple[Piece, ...]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A run of cells relaxed: q = start + along * x + [pad_low, pad_high] for some 0 <= x <= 1.
+
+    Attributes:
+        start: In [rad], shape (6,).
+        along: In [rad], shape (6,).
+        pad_low: In [rad], shape (6,).
+        pad_high: In [rad], shape (6,).
+    """
+
+    start: Array
+    along: Array
+    pad_low: Array
+    pad_high: Array
+
+
+def relaxed(piece: Piece, first: int, end: int) -> Segment:
+    """Return a segment that holds the curve over the cells from ``first`` to before ``end``."""
+    corners, at = piece.corners[first : end + 1], piece.at[first : end + 1]
+    x = (at - at[0]) / (at[-1] - at[0])
+    along = corners[-1] - corners[0]
+    away = corners - corners[0] - x[:, None] * along
+    # within a cell both chords are straight: they are farthest apart at its ends
+    low = np.minimum(away[:-1], away[1:]) + piece.pad_low[first:end]
+    high = np.maximum(away[:-1], away[1:]) + piece.pad_high[first:end]
+    return Segment(corners[0], along, low.min(axis=0), high.max(axis=0))
