@@ -17,7 +17,8 @@ from opl.field.layer import wheel_layer
 from opl.field.nodes import build_nodes
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
-from opl.motion.feed import dwell_refusal, slow_stretches
+from opl.job.refusals import dwell_refusal
+from opl.motion.feed import slow_stretches
 from opl.motion.timing import time_motion
 from opl.outcome import Outcome
 from opl.planning.fixed import keep_contact, runs_of

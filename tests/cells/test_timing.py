@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from opl.job.load import load
-from opl.motion.feed import HARDLY_MOVES, dwell_refusal, slow_stretches
+from opl.job.refusals import dwell_refusal
+from opl.motion.feed import HARDLY_MOVES, slow_stretches
 from opl.motion.motion import Motion, Stretch
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, fastest_law
