@@ -11,7 +11,7 @@ from opl.cell.collision import CollisionScene
 from opl.cell.enclosure import enclosing_bodies
 from opl.cell.robot import forward
 from opl.cell.workcell import PART, SECOND_OPINION_OF_A_LINK, WHEEL
-from opl.errors import InputError, NoPathError, NoWayError
+from opl.errors import InputError, NoFreeMoveError, NoPathError
 from opl.export import draw, job_date, write_program
 from opl.field.layer import wheel_layer
 from opl.field.nodes import build_nodes
@@ -60,7 +60,7 @@ def run(job: Job, progress: Progress = lambda stage, fraction: None) -> Outcome:
             outcome.plan = plan = search_path(outcome, problem)
     except NoPathError as error:
         outcome.status, outcome.refusal = "no_path", error
-        if isinstance(error, NoWayError):
+        if isinstance(error, NoFreeMoveError):
             return outcome  # on the wheel nothing has to change
         with clock("remedies"):
             outcome.remedies = find_remedies(job, points)

@@ -15,7 +15,7 @@ from itertools import islice
 import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
-from opl.errors import NoPathError, NoWayError
+from opl.errors import NoFreeMoveError, NoPathError
 from opl.field.path import BrokenStepError, GrindingPath, fill_in
 from opl.motion.air import BlockedLinkError, UnreachableApproachError, linked, whole_motion
 from opl.motion.check import Fault, find_faults
@@ -88,7 +88,7 @@ def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
         start: Which start nodes to try.
 
     Raises:
-        NoWayError: If nothing but its ways through the air stops the motion of some path.
+        NoFreeMoveError: If nothing but its ways through the air stops the motion of some path.
         NoPathError: If there is none for another reason; says where it ends and why.
     """
     branches = branches_of(problem)
@@ -200,7 +200,7 @@ def no_path(problem: GrindingProblem, branches: list[Branch]) -> NoPathError:
     """Return the error that says how far the searches came and what stopped them."""
     cut_off = sum((branch.cut_off for branch in branches), Counter())
     if cut_off:
-        return NoWayError(
+        return NoFreeMoveError(
             "no path: the passes can be ground, but there is no way through the air",
             explain_air(problem.cell, cut_off),
         )
