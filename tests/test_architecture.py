@@ -20,7 +20,6 @@ FLOORS = [
     {"documents"},
     {"geometry"},
     {"cell", "search"},
-    {"field"},
     {"motion"},
     {"planning"},
     {"verification", "program", "report"},

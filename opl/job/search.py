@@ -11,12 +11,11 @@ from pydantic import Field, model_validator
 
 from opl.cell.robot import Robot
 from opl.documents import Document
-from opl.field.path import Interpolation
 from opl.geometry.frames import Array
 from opl.motion.timing import Pace
 from opl.planning.box_search import OptimalSettings
-from opl.planning.costs import Costs
-from opl.planning.objective import ObjectiveWeights
+from opl.planning.costs import CostWeights, ObjectiveWeights
+from opl.planning.filling import Interpolation
 from opl.planning.starts import Start
 
 MM = 1e-3
@@ -89,7 +88,7 @@ class SearchSection(Document):
     def in_si(self, bow_height_mm: float) -> Search:
         """Return the section's values; the bow height is part of the contact error allowed."""
         weights = self.weights
-        costs = Costs(
+        costs = CostWeights(
             joint_weights=np.array(weights.joints),
             contact_weight=weights.contact,
             time_weight=0.0,

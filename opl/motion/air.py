@@ -11,12 +11,12 @@ import numpy as np
 
 from opl.cell.inverse import inverse
 from opl.cell.workcell import WorkCell
-from opl.field.path import GrindingPath
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.leads import lead_offsets
 from opl.motion.links import Links, NoLinkError
 from opl.motion.motion import FREE_MOVES, Motion, Stretch
+from opl.motion.path import GrindingPath
 from opl.motion.timing import Pace
 
 
@@ -70,7 +70,7 @@ def whole_motion(cell: WorkCell, points: CutterPoints, path: GrindingPath, pace:
                 points,
                 pace,
                 stretch,
-                path.branch,
+                path.ik_branch,
                 int(path.cutter_point[k]),
                 path.contact_position[k],
                 path.q[k],
@@ -168,7 +168,7 @@ def lead(
     points: CutterPoints,
     pace: Pace,
     stretch: Stretch,
-    branch: int,
+    ik_branch: int,
     column: int,
     contact_position: float,
     q_contact: Array,
@@ -180,7 +180,7 @@ def lead(
         points: The cutter points.
         pace: How long it is, and how far it turns.
         stretch: Whether it is the approach or the retract.
-        branch: Slot of the inverse kinematics.
+        ik_branch: Slot of the inverse kinematics.
         column: The cutter point that is ground.
         contact_position: Where on the wheel.
         q_contact: The posture that grinds it in [rad], shape (6,).
@@ -195,7 +195,7 @@ def lead(
     T_base_flange = cell.Ts_base_flange(contact_position, points.Ts_workpiece_cutter[column])
     T_contact_flange = np.linalg.solve(T_base_contact, T_base_flange)
     Ts_base_flange = T_base_contact @ T_contact_away @ T_contact_flange
-    solutions = inverse(cell.robot.arm, Ts_base_flange, q_contact)[:, branch]
+    solutions = inverse(cell.robot.arm, Ts_base_flange, q_contact)[:, ik_branch]
     if np.isnan(solutions).any():
         raise UnreachableApproachError(column, "reach")
     q = q_contact + np.cumsum(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.errors import NoPathError
 from opl.motion.timing import Cause, Pace, Timing
 
 # The belt dwells where the ground point is slower than this part of the feed.
@@ -72,22 +71,6 @@ def slow_stretches(timing: Timing, pace: Pace) -> tuple[SlowStretch, ...]:
     slow = np.array([cause is not Cause.NONE for cause in timing.cause])
     index = timing.motion.pass_index
     return tuple(_stretch(timing, pace, moves) for moves in _runs(slow, index))
-
-
-def dwell_refusal(stretches: tuple[SlowStretch, ...], pace: Pace) -> NoPathError | None:
-    """Return why a path is refused on which the belt would dwell too long, None if it is not."""
-    too_long = [one for one in stretches if one.dwell > pace.max_dwell]
-    if not too_long:
-        return None
-    return NoPathError(
-        f"the belt would dwell on one spot for more than {pace.max_dwell:g} s beyond the time at "
-        "the feed (process.max_dwell_s); raise process.contact_speed or lower process.feed_mm_s, "
-        "or let the contact move less (search.weights.contact)",
-        [
-            f"pass {one.pass_index + 1}, cutter point {one.dwell_at:.2f}: {one.dwell:.2f} s"
-            for one in too_long
-        ],
-    )
 
 
 def _runs(wanted: np.ndarray, index: np.ndarray) -> Iterator[np.ndarray]:

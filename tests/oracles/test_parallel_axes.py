@@ -14,7 +14,7 @@ from opl.cell.inverse import inverse
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot import controller_poses, forward, known_robots, load_robot
 from opl.cell.singularity import singularity_margins
-from opl.field.nodes import _lift
+from opl.planning.nodes import _lift
 from tests.support.closed_forms import difference
 
 UR10E = load_robot("ur10e")

@@ -1,0 +1,28 @@
+"""Refusals of a planned path in words that name the keys of the job."""
+
+from __future__ import annotations
+
+from opl.errors import NoPathError
+from opl.motion.feed import SlowStretch
+from opl.motion.timing import Pace
+
+
+def dwell_refusal(stretches: tuple[SlowStretch, ...], pace: Pace) -> NoPathError | None:
+    """Return why a path is refused on which the belt would dwell too long, None if it is not.
+
+    Args:
+        stretches: Where the path is slower than the feed.
+        pace: For the longest dwell allowed.
+    """
+    too_long = [one for one in stretches if one.dwell > pace.max_dwell]
+    if not too_long:
+        return None
+    return NoPathError(
+        f"the belt would dwell on one spot for more than {pace.max_dwell:g} s beyond the time at "
+        "the feed (process.max_dwell_s); raise process.contact_speed or lower process.feed_mm_s, "
+        "or let the contact move less (search.weights.contact)",
+        [
+            f"pass {one.pass_index + 1}, cutter point {one.dwell_at:.2f}: {one.dwell:.2f} s"
+            for one in too_long
+        ],
+    )
