@@ -120,7 +120,7 @@ def _joined(
         row: A row, which is among those returned.
         q_away: Its configuration at the end of approach or retract in [rad], shape (6,).
     """
-    t = matrix.nodes.contact_position
+    t = matrix.nodes.contact_position[column]
     free = np.flatnonzero(matrix.free[column])
     found = [row]
     # outwards on either side, from each to the next that is joined
@@ -146,7 +146,7 @@ def _away(
             stretch,
             matrix.nodes.ik_branch,
             column,
-            matrix.nodes.contact_position[row],
+            matrix.nodes.contact_position[column, row],
             matrix.nodes.q[column, row],
         )
     except UnreachableApproachError:

@@ -86,6 +86,7 @@ class ColumnWalls:
         self._part = part
         self._points = points
         self._seams = seams
+        self._images: dict[int, list[Image]] = {}
 
     @cached_property
     def families(self) -> tuple[int, ...]:
@@ -108,6 +109,11 @@ class ColumnWalls:
 
     def images(self, family: int) -> list[Image]:
         """Return the images of a posture, the posture itself first."""
+        if family not in self._images:
+            self._images[family] = self._images_of(family)
+        return self._images[family]
+
+    def _images_of(self, family: int) -> list[Image]:
         robot = self._cell.robot
         most = np.floor((robot.upper - robot.lower) / (2.0 * np.pi) + 1e-9).astype(int)
         counts = np.stack(
@@ -120,6 +126,16 @@ class ColumnWalls:
             for flip, (sign, shift) in enumerate(self.flips)
             for count in counts
         ]
+
+    def within_limits(self, q: Array) -> np.ndarray:
+        """Return which of some postures of a family have an image within the limits, shape (n,)."""
+        robot = self._cell.robot
+        allowed = np.zeros(len(q), dtype=bool)
+        for sign, shift in self.flips:
+            moved = q * sign + shift
+            up = 2.0 * np.pi * np.ceil((robot.lower - moved) / (2.0 * np.pi))
+            allowed |= (moved + up <= robot.upper).all(axis=1)
+        return allowed
 
     def walls(self, places: Sequence[float]) -> list[Wall]:
         """Return the walls at fractional cutter points."""

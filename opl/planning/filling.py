@@ -68,7 +68,7 @@ def fill_in(
         BrokenEdgeError: If an edge leaves reach, limits or branch between its ends.
     """
     columns = np.arange(len(rows))
-    q_node, t_node = nodes.along(rows), nodes.contact_position[rows]
+    q_node, t_node = nodes.along(rows), nodes.t_along(rows)
     on_wheel = np.diff(points.pass_index) == 0
     counts = [
         middle_count(step, rule.max_contact_step) if grinding else 0

@@ -30,8 +30,8 @@ class NodeMatrix:
         ik_branch: Slot of the inverse kinematics, 0 to 7.
         q: Joint positions in [rad], NaN where there is no configuration within the limits, shape
             (n_columns, n_rows, 6).
-        contact_position: t of each row, shape (n_rows,).
-        position_index: Which of the contact positions each row stands for, shape (n_rows,).
+        contact_position: t of each node, shape (n_columns, n_rows).
+        position_index: Which contact position of its column each row stands for, shape (n_rows,).
     """
 
     ik_branch: int
@@ -47,6 +47,10 @@ class NodeMatrix:
     def along(self, rows: np.ndarray) -> Array:
         """Return the configurations of a track in [rad], its row in each column given."""
         return np.asarray(self.q[np.arange(len(rows)), rows])
+
+    def t_along(self, rows: np.ndarray) -> Array:
+        """Return the contact positions of a track, its row in each column given."""
+        return np.asarray(self.contact_position[np.arange(len(rows)), rows])
 
 
 @dataclass(frozen=True)
@@ -96,7 +100,7 @@ def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) 
                 q_sheet = np.ascontiguousarray(
                     np.where(within[..., None], turned, np.nan)[:, copy, position_index]
                 )
-                t = contact_positions[position_index]
+                t = np.broadcast_to(contact_positions[position_index], q_sheet.shape[:2])
                 matrices.append(NodeMatrix(ik_branch, q_sheet, t, position_index))
     return NodeField(contact_positions, q, tuple(matrices))
 

@@ -109,14 +109,14 @@ def wheel_layer(
     Args:
         scene: The cell and its geometry.
         points: N cutter points.
-        contact_positions: M values of t.
+        contact_positions: M values of t, shape (M,), or of each cutter point, shape (N, M).
         at: Which nodes, shape (N, M), all if not given; the others are minus infinity, not free.
     """
     cell = scene.cell
     if at is None:
-        at = np.ones((len(points), len(contact_positions)), dtype=bool)
-    columns, rows = np.nonzero(at)
-    Ts_contact0_contact = cell.wheel.T_contact0_contact(contact_positions)[rows]
+        at = np.ones((len(points), contact_positions.shape[-1]), dtype=bool)
+    columns, _ = np.nonzero(at)
+    Ts_contact0_contact = cell.wheel.T_contact0_contact(np.broadcast_to(contact_positions, at.shape)[at])
     # cutter and contact coincide, whatever robot brings the part there
     Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[columns]
     layer = np.full(at.shape, -np.inf)

@@ -43,7 +43,7 @@ def impasses(ladder: Ladder, blocked: np.ndarray) -> list[tuple[int, int]]:
 
 
 @njit(
-    "boolean[:,::1](float64[:,:,::1],float64[::1],boolean[::1],float64,float64[::1],float64,"
+    "boolean[:,::1](float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
     "int64[::1],int64)",
     cache=True,
 )

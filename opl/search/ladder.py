@@ -19,7 +19,7 @@ class Ladder:
         q: Joint positions in [rad], shape (n_columns, n_rows, 6); entries of nodes that are not
             free are not looked at.
         free: Which nodes may be used, shape (n_columns, n_rows).
-        contact_position: t of each row, shape (n_rows,).
+        contact_position: t of each node, shape (n_columns, n_rows), or of each row, shape (n_rows,).
         off_wheel: Whether the step from each column to the next leaves the wheel (a new pass),
             shape (n_columns - 1,). Such a step has no intermediate nodes and may be of any size.
         max_contact_step: Largest difference of t between adjacent nodes, the paper's delta T.
@@ -38,6 +38,11 @@ class Ladder:
     max_contact_change: Array | float = np.inf
 
     @cached_property
+    def t_of_nodes(self) -> Array:
+        """Contact position of each node, shape (n_columns, n_rows)."""
+        return np.ascontiguousarray(np.broadcast_to(self.contact_position, self.q.shape[:2]))
+
+    @cached_property
     def contact_changes(self) -> Array:
         """Largest difference of t over each step, shape (n_columns - 1,)."""
         return np.broadcast_to(self.max_contact_change, len(self.q) - 1).astype(float)
@@ -51,7 +56,7 @@ class Ladder:
     def step_rule(self) -> tuple[Array, np.ndarray, float, Array, float]:
         """What tells small steps from others, in the order in which the inner loops take it."""
         return (
-            self.contact_position,
+            self.t_of_nodes,
             self.off_wheel,
             self.max_contact_step,
             self.contact_changes,
@@ -73,7 +78,7 @@ def middle_count(contact_step: float, max_contact_step: float) -> int:
 
 
 @njit(
-    "boolean(float64[:,:,::1],float64[::1],boolean[::1],float64,float64[::1],float64,int64,int64,int64)",
+    "boolean(float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,int64,int64,int64)",
     cache=True,
 )
 def continuous(  # type: ignore[no-untyped-def]
@@ -82,7 +87,7 @@ def continuous(  # type: ignore[no-untyped-def]
     """Return whether a step to a row of the next column is small in t and in every joint."""
     if off_wheel[column]:
         return True
-    t_step = abs(t[row] - t[here])
+    t_step = abs(t[column + 1, row] - t[column, here])
     if t_step > max_t_change[column] + 1e-9:
         return False
     largest = max_q_step * max(np.ceil(t_step / max_t_step - 1e-9), 1.0)
@@ -100,7 +105,7 @@ def contains(keys, key):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "boolean(float64[:,:,::1],float64[::1],boolean[::1],float64,float64[::1],float64,int64[::1],"
+    "boolean(float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,int64[::1],"
     "int64,int64,int64)",
     cache=True,
 )

@@ -99,6 +99,7 @@ class _Body:
         return spans, np.array(low).reshape(-1, 6), np.array(high).reshape(-1, 6)
 
     def key(self, span: Span) -> tuple[int, tuple[int, ...]]:
+        """Return what all spans of a pass share."""
         family = self.wall.pieces[span.piece].family
         return family, self.images(family)[span.image].key
 

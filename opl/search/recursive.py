@@ -86,7 +86,7 @@ def add_dead_ends(ladder: Ladder, blocked: np.ndarray, dead: np.ndarray) -> None
 _COMPLETE, _FAILED, _GIVEN_UP = 1, 0, 2
 
 _FIELD = (
-    "float64[:,:,::1],boolean[:,::1],float64[::1],boolean[::1],"
+    "float64[:,:,::1],boolean[:,::1],float64[:,::1],boolean[::1],"
     "float64,float64[::1],float64,int64[::1]"
 )
 

@@ -108,7 +108,7 @@ def travel_of(ladder: Ladder, rows: np.ndarray) -> Travel:
     """Return how far joints and contact move along a track, node to node."""
     on_wheel = ~ladder.off_wheel
     turned = np.abs(np.diff(ladder.q[np.arange(len(rows)), rows], axis=0))
-    moved = np.abs(np.diff(ladder.contact_position[rows]))
+    moved = np.abs(np.diff(ladder.t_of_nodes[np.arange(len(rows)), rows]))
     return Travel(float(turned[on_wheel].sum()), float(moved[on_wheel].sum()))
 
 
@@ -139,7 +139,7 @@ def smoothest_within(
 
 
 @njit(
-    "float64(float64[:,:,::1],boolean[:,::1],float64[::1],boolean[::1],float64,float64[::1],float64,"
+    "float64(float64[:,:,::1],boolean[:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
     "int64[::1],float64[::1],float64,float64,float64[::1],float64[::1],float64,float64[:,::1],"
     "int64[::1])",
     cache=True,
@@ -169,7 +169,7 @@ def _cheapest(  # type: ignore[no-untyped-def]
                 price[here] = best[here]
             if on_wheel:
                 for here in range(n_rows):
-                    price[here] += contact_weight * abs(t[row] - t[here])
+                    price[here] += contact_weight * abs(t[column, row] - t[column - 1, here])
             for joint in range(n_joints):
                 there = q[column, joint, row]
                 weight = joint_weights[joint]
@@ -177,7 +177,7 @@ def _cheapest(  # type: ignore[no-untyped-def]
                     price[here] += weight * abs(there - q[column - 1, joint, here])
             if on_wheel and time_weight > 0.0:
                 for here in range(n_rows):
-                    sliding = abs(t[row] - t[here]) / contact_speed
+                    sliding = abs(t[column, row] - t[column - 1, here]) / contact_speed
                     seconds[here] = max(step_seconds[column - 1], sliding)
                 for joint in range(n_joints):
                     there = q[column, joint, row]
