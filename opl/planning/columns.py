@@ -16,17 +16,17 @@ from functools import cached_property
 import numpy as np
 
 from opl.cell.clearance import TOLERANCE, PartTree, wheel_clearance
-from opl.cell.inverse import inverse
+from opl.cell.inverse import Arm, inverse
 from opl.cell.inverse_jets import Axes, FlangeJets, joint_derivatives
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.cell.workcell import WorkCell
-from opl.field.nodes import SEAM_GAP
-from opl.field.path import cutter_frames
 from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.geometry.jets import Interval, Jet, wave
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import MM_PER_M, ContactWheel
+from opl.planning.filling import cutter_frames
+from opl.planning.nodes import SEAM_GAP
 from opl.search.walls import UNKNOWN, Image, Piece, Wall
 
 CELL = 1.0  # belt units that a cell covers at first
@@ -69,6 +69,18 @@ def seams_of(q: Array) -> Seams:
     return Seams(start, kept)
 
 
+def wrist_flips(arm: Arm) -> list[tuple[Array, Array]]:
+    """Return sign and shift that make each flip of the wrist of the posture without one."""
+    same = (np.ones(6), np.zeros(6))
+    if not isinstance(arm, SphericalWristArm):
+        return [same]
+    sign, shift = np.ones(6), np.zeros(6)
+    sign[4] = -1.0
+    shift[4] = 2.0 * arm.offsets[4] * arm.signs[4]
+    shift[3] = shift[5] = np.pi
+    return [same, (sign, shift)]
+
+
 class ColumnWalls:
     """Makes walls of places along the passes.
 
@@ -97,15 +109,7 @@ class ColumnWalls:
     @cached_property
     def flips(self) -> list[tuple[Array, Array]]:
         """Sign and shift that make a posture with the wrist flipped of one without."""
-        arm = self._cell.robot.arm
-        same = (np.ones(6), np.zeros(6))
-        if not isinstance(arm, SphericalWristArm):
-            return [same]
-        sign, shift = np.ones(6), np.zeros(6)
-        sign[4] = -1.0
-        shift[4] = 2.0 * arm.offsets[4] * arm.signs[4]
-        shift[3] = shift[5] = np.pi
-        return [same, (sign, shift)]
+        return wrist_flips(self._cell.robot.arm)
 
     def images(self, family: int) -> list[Image]:
         """Return the images of a posture, the posture itself first."""
