@@ -135,17 +135,17 @@ def _refuse_jumps(q: Array, place: Array, points: CutterPoints, max_joint_step: 
 def _contact_error_between(
     cell: WorkCell, points: CutterPoints, t_node: Array, place: Array, q: Array
 ) -> Array:
-    """Return how far the ground point is from its place on the wheel half-way to the next posture.
+    """Return how far the ground point is from its place on the wheel half-way to the next node.
 
     Args:
         cell: The cell.
         points: The cutter points.
         t_node: Contact position at each cutter point, shape (N,).
-        place: Fractional cutter point of each posture, shape (n,).
-        q: The postures in [rad], shape (n, 6).
+        place: Fractional cutter point of each configuration, shape (n,).
+        q: The configurations in [rad], shape (n, 6).
 
     Returns:
-        Distances in [m], shape (n - 1,); 0 where the step leaves the wheel.
+        Distances in [m], shape (n - 1,); 0 where the move leaves the wheel.
     """
     middle = (place[:-1] + place[1:]) / 2.0
     T_base_flange = forward(cell.robot, (q[:-1] + q[1:]) / 2.0)

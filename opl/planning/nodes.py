@@ -57,7 +57,7 @@ class NodeField:
         contact_positions: The values of t, shape (M,).
         q: All inverse solutions as principal angles in [rad], NaN out of reach, shape
             (n_columns, M, 8, 6). Kept to tell reach from limits when nothing is left; without
-            columns where that is not asked.
+            columns where nobody needs to know.
         matrices: The matrices that have a node within the limits, in slot order.
     """
 
@@ -81,7 +81,9 @@ def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) 
         contact_positions: M values of t.
     """
     robot = cell.robot
-    q = solve(cell, points.Ts_workpiece_cutter[:, None], contact_positions)  # (N, M, 8, 6)
+    q = inverse_solutions(
+        cell, points.Ts_workpiece_cutter[:, None], contact_positions
+    )  # (N, M, 8, 6)
     matrices = []
     for ik_branch in range(q.shape[2]):
         if np.isnan(q[:, :, ik_branch, 0]).all():
@@ -101,7 +103,9 @@ def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) 
     return NodeField(contact_positions, q, tuple(matrices))
 
 
-def solve(cell: WorkCell, Ts_workpiece_cutter: Array, contact_positions: Array) -> Array:
+def inverse_solutions(
+    cell: WorkCell, Ts_workpiece_cutter: Array, contact_positions: Array
+) -> Array:
     """Return every inverse solution in [rad], NaN where there is none, shape (..., 8, 6).
 
     Args:
@@ -113,7 +117,7 @@ def solve(cell: WorkCell, Ts_workpiece_cutter: Array, contact_positions: Array) 
 
 
 def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
-    """Unroll the angles of one branch where they leave a gap.
+    """Unroll the angles of one branch of the inverse kinematics where they leave a gap.
 
     Args:
         q: Principal angles in [rad], NaN where there are none, shape (N, M, 6).

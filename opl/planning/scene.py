@@ -1,4 +1,4 @@
-"""What a planner asks of a cell: bodies that collide, part against wheel, free-space paths."""
+"""The cell as a planner uses it: bodies that collide, part against wheel, free moves."""
 
 from __future__ import annotations
 

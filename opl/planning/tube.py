@@ -13,7 +13,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.motion.path import GrindingPath
-from opl.planning.nodes import NodeField, NodeMatrix, solve
+from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
 from opl.planning.problem import wheel_layer
 from opl.planning.refine import RefinedProblem
 
@@ -39,7 +39,9 @@ def tube(refined: RefinedProblem, path: GrindingPath, finer: Array) -> RefinedPr
     layer = wheel_layer(problem.scene, points, t, near)
     columns, at = np.nonzero(near)
     q = np.full((*near.shape, 6), np.nan)
-    q[near] = solve(problem.cell, points.Ts_workpiece_cutter[columns], t[at])[:, path.ik_branch]
+    q[near] = inverse_solutions(problem.cell, points.Ts_workpiece_cutter[columns], t[at])[
+        :, path.ik_branch
+    ]
     # on the same count of turns as the path
     q = q + 2.0 * np.pi * np.round((q_path[:, None] - q) / (2.0 * np.pi))
     q = np.where(problem.cell.within_limits(q)[..., None], q, np.nan)
