@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from opl.cell.inverse import branch_name
+from opl.cell.inverse_kinematics import branch_name
 from opl.motion.feed import SlowStretch
 from opl.motion.figures import Figures
 from opl.outcome import Outcome

@@ -9,7 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.inverse import turns
+from opl.cell.inverse_kinematics import turns
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot import Robot
 from opl.cell.triangle import bend_to

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.inverse import Arm
+from opl.cell.inverse_kinematics import Arm
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot_file import N_JOINTS
 from opl.cell.spherical_wrist import SphericalWristArm

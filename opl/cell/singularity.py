@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from opl.cell.inverse import Arm
+from opl.cell.inverse_kinematics import Arm
 from opl.geometry.frames import Array
 
 

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from opl.cell.inverse import Arm, inverse
+from opl.cell.inverse_kinematics import Arm, inverse_kinematics
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.recognise import RecognisedArm, recognise
 from opl.cell.robot import Robot, forward, load_robot
@@ -123,7 +123,7 @@ def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:
     """
     q = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (n, 6))
     Ts_base_flange = forward(robot, q)
-    found = inverse(robot.arm, Ts_base_flange)
+    found = inverse_kinematics(robot.arm, Ts_base_flange)
     apart = np.abs(np.remainder(found - q[:, None] + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
     regular = singularity_margins(robot.arm, q).min(axis=-1) > 0.02
     nearest = np.where(np.isnan(apart), np.inf, apart).min(axis=1)

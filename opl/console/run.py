@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from opl.batch import Row
-from opl.cell.inverse import branch_name
+from opl.cell.inverse_kinematics import branch_name
 from opl.console.cell import cell_lines, wheel_lines
 from opl.console.times import told_times
 from opl.geometry.toolpath import CutterPoints

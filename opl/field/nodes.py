@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from opl.cell.inverse import inverse, turns
+from opl.cell.inverse_kinematics import inverse_kinematics, turns
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
@@ -80,7 +80,7 @@ def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) 
     Ts_base_flange = cell.Ts_base_flange(
         contact_positions[None, :], points.Ts_workpiece_cutter[:, None]
     )
-    q = inverse(robot.arm, Ts_base_flange)  # (N, M, 8, 6)
+    q = inverse_kinematics(robot.arm, Ts_base_flange)  # (N, M, 8, 6)
     branches = []
     for branch in range(q.shape[2]):
         if np.isnan(q[:, :, branch, 0]).all():

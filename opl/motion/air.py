@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from opl.cell.inverse import inverse
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.workcell import WorkCell
 from opl.field.path import GrindingPath
 from opl.geometry.frames import Array
@@ -195,7 +195,7 @@ def lead(
     T_base_flange = cell.Ts_base_flange(contact_position, points.Ts_workpiece_cutter[column])
     T_contact_flange = np.linalg.solve(T_base_contact, T_base_flange)
     Ts_base_flange = T_base_contact @ T_contact_away @ T_contact_flange
-    solutions = inverse(cell.robot.arm, Ts_base_flange, q_contact)[:, branch]
+    solutions = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_contact)[:, branch]
     if np.isnan(solutions).any():
         raise UnreachableApproachError(column, "reach")
     q = q_contact + np.cumsum(

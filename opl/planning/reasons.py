@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from opl.cell.inverse import turns
+from opl.cell.inverse_kinematics import turns
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.motion.links import Blocker
 from opl.planning.impasse import Impasse

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opl.cell.inverse import inverse
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.workcell import WorkCell
 from opl.field.layer import layer_at
 from opl.field.nodes import NodeField, NodeMatrix
@@ -114,7 +114,7 @@ def _solutions(problem: GrindingProblem, Ts_workpiece_cutter: Array) -> Array:
     """Return all inverse solutions of some cutter frames in [rad], shape (k, M, 8, 6)."""
     t = problem.field.contact_positions
     Ts_base_flange = problem.cell.Ts_base_flange(t[None, :], Ts_workpiece_cutter[:, None])
-    return inverse(problem.cell.robot.arm, Ts_base_flange)
+    return inverse_kinematics(problem.cell.robot.arm, Ts_base_flange)
 
 
 def solve_at(
@@ -135,7 +135,7 @@ def solve_at(
     Ts_base_flange = cell.Ts_base_flange(
         contact_positions[rows], points.Ts_workpiece_cutter[columns]
     )
-    return inverse(cell.robot.arm, Ts_base_flange)
+    return inverse_kinematics(cell.robot.arm, Ts_base_flange)
 
 
 def _between(rows: np.ndarray) -> np.ndarray:

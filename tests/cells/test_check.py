@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from opl.cell.clearance import part_tree
 from opl.cell.collision import CollisionScene
-from opl.cell.inverse import inverse
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward
 from opl.motion.check import RESOLUTION, densify, find_faults
 from opl.motion.motion import Stretch
@@ -101,7 +101,7 @@ def shifted_along_normal(motion, index, depth):
     # only moved: the contact normal is that of the contact frame at this t
     into = cell.wheel.T_base_contact(motion.contact_position[index])[:3, 2]
     T_base_flange[:3, 3] += depth * into
-    found = inverse(cell.robot.arm, T_base_flange, motion.q[index])
+    found = inverse_kinematics(cell.robot.arm, T_base_flange, motion.q[index])
     found = found + 2 * np.pi * np.round((motion.q[index] - found) / (2 * np.pi))
     q = motion.q.copy()
     q[index] = found[np.nanargmin(np.abs(found - q[index]).max(axis=1))]

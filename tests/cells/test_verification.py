@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import opl
-from opl.cell.inverse import inverse
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward
 from opl.findings import Level
 from opl.geometry.frames import pose
@@ -247,7 +247,7 @@ def moved_into_wheel(motion, index, depth):
     T_base_flange = forward(cell.robot, motion.q[index])
     into = cell.wheel.T_base_contact(motion.contact_position[index])[:3, 2]
     T_base_flange[:3, 3] += depth * into
-    found = inverse(cell.robot.arm, T_base_flange, motion.q[index])
+    found = inverse_kinematics(cell.robot.arm, T_base_flange, motion.q[index])
     found = found + 2 * np.pi * np.round((motion.q[index] - found) / (2 * np.pi))
     q = motion.q.copy()
     q[index] = found[np.nanargmin(np.abs(found - q[index]).max(axis=1))]

@@ -15,7 +15,7 @@ import trimesh
 import yaml
 
 from opl import pipeline
-from opl.cell.inverse import inverse
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward
 from opl.job.load import load
 from opl.program.inform.files import load_jobs
@@ -207,7 +207,7 @@ def test_a_swapped_branch_in_the_middle_is_found(tmp_path):
     robot = load(planned() / "job.yaml").cell.robot
     scale = PulseScale.of(robot)
     q = scale.to_angles(np.array(text.pulses(number)))
-    slots = inverse(robot.arm, forward(robot, q), q)
+    slots = inverse_kinematics(robot.arm, forward(robot, q), q)
     here = int(np.abs(np.remainder(slots - q + np.pi, 2 * np.pi) - np.pi).max(axis=1).argmin())
     other = slots[(here + 4) % 8]  # the same pose, the wrist flipped
     ended = verify(tmp_path, text.put(number, scale.to_pulses(other)))

@@ -11,7 +11,7 @@ import pytest
 
 from opl.cell.clearance import part_tree, wheel_clearance
 from opl.cell.collision import CollisionScene
-from opl.cell.inverse import inverse
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward
 from opl.job.load import load
 from opl.pipeline import cutter_points
@@ -57,7 +57,9 @@ def postures_of_interest(job, points, count):
     column = random.integers(len(points), size=20 * count)
     t = random.uniform(-1.0, 1.0, len(column)) * job.cell.wheel.last_position
     Ts = job.cell.Ts_base_flange(t, points.Ts_workpiece_cutter[column])
-    slots = inverse(robot.arm, Ts)[np.arange(len(column)), random.integers(8, size=len(column))]
+    slots = inverse_kinematics(robot.arm, Ts)[
+        np.arange(len(column)), random.integers(8, size=len(column))
+    ]
     within = ((slots >= robot.lower) & (slots <= robot.upper)).all(axis=1)
     on_wheel = slots[within][: count - n]
     # some stay within hundredths of a millimetre of the wheel, some come near to other things

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from opl.cell.inverse import inverse, turns
+from opl.cell.inverse_kinematics import inverse_kinematics, turns
 from opl.cell.robot import controller_poses, forward, known_robots, load_robot, robot_path
 from opl.cell.robot_file import read_robot_file
 from opl.cell.urdf_import import closure_error
@@ -134,7 +134,9 @@ def test_forward_agrees_with_denavit_hartenberg(robot):
 def test_every_posture_found_reaches_the_pose_and_the_original_is_among_them(robot):
     assert closure_error(robot) < 1e-11
     q = random_postures(robot, 300, seed=1)
-    found = inverse(robot.arm, forward(robot, q))[:, :, None] + turns(robot.lower, robot.upper)
+    found = inverse_kinematics(robot.arm, forward(robot, q))[:, :, None] + turns(
+        robot.lower, robot.upper
+    )
     distance = np.abs(found - q[:, None, None]).max(axis=-1)
     assert np.nanmin(distance.reshape(len(q), -1), axis=1).max() < 1e-8
 
@@ -142,7 +144,9 @@ def test_every_posture_found_reaches_the_pose_and_the_original_is_among_them(rob
 @every_spherical_wrist
 def test_an_independent_package_finds_the_same_postures(robot):
     Ts = forward(robot, random_postures(robot, 60, seed=2))
-    for q, q_opw in zip(inverse(robot.arm, Ts), opw_solutions(robot.arm, Ts), strict=True):
+    for q, q_opw in zip(
+        inverse_kinematics(robot.arm, Ts), opw_solutions(robot.arm, Ts), strict=True
+    ):
         q = q[~np.isnan(q).any(axis=-1)]
         assert len(q) == len(q_opw) > 0
         apart = np.abs(np.remainder(q[:, None] - q_opw[None] + np.pi, 2 * np.pi) - np.pi)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.cell.inverse import inverse as postures_of
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward
 from opl.errors import UnsafeError
 from opl.geometry.frames import from_roll_pitch_yaw, inverse, roll_pitch_yaw
@@ -55,7 +55,7 @@ def pose_of(values: tuple[float, ...]) -> Array:
 
 def configuration(robot: Robot, q: Array) -> tuple[int, ...]:
     """Return the six meaningful numbers of RCONF for a posture, shape (6,)."""
-    slots = postures_of(robot.arm, forward(robot, q), q)
+    slots = inverse_kinematics(robot.arm, forward(robot, q), q)
     apart = np.abs(np.remainder(slots - q + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
     slot = int(np.nanargmin(apart))
     flip, back, elbow = slot // 4, slot // 2 % 2, slot % 2
@@ -82,7 +82,7 @@ def postures(
         return np.empty((0, 6))
     no_flip, lower, back, *beyond = numbers[:6]
     slot = 4 * (1 - no_flip) + 2 * back + int(lower != back)
-    q = postures_of(robot.arm, T_base_flange, near)[slot]
+    q = inverse_kinematics(robot.arm, T_base_flange, near)[slot]
     if np.isnan(q).any():
         return np.empty((0, 6))
     found = [q]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from opl.cell.inverse import inverse as postures_of
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward
 from opl.errors import InputError
 from opl.findings import Finding, Level
@@ -142,7 +142,7 @@ def line(robot: Robot, start: Array, end: Array, T_flange_tool: Array) -> Array 
         (first * Rotation.from_rotvec(s * turn)).as_matrix(), T_start[:3, 3] + s * way
     )
     guess = start + s * (end - start)
-    slots = postures_of(robot.arm, Ts_base_tool @ inverse(T_flange_tool), guess)
+    slots = inverse_kinematics(robot.arm, Ts_base_tool @ inverse(T_flange_tool), guess)
     found, q = [], start
     for candidates in slots:
         turned = candidates + 2.0 * np.pi * np.round((q - candidates) / (2.0 * np.pi))

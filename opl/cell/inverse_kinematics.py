@@ -21,7 +21,7 @@ N_BRANCHES = 8
 Arm = SphericalWristArm | ParallelAxesArm
 
 
-def inverse(arm: Arm, Ts_base_flange: Array, near: Array | None = None) -> Array:
+def inverse_kinematics(arm: Arm, Ts_base_flange: Array, near: Array | None = None) -> Array:
     """Return all postures that bring the flange to poses, limits not regarded.
 
     Args:
