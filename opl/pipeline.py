@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, contextmanager
 from opl.cell.clearance import PartTree, part_tree, wheel_clearance
 from opl.cell.collision import CollisionScene
 from opl.cell.enclosure import enclosing_bodies
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.cell.workcell import PART, SECOND_OPINION_OF_A_LINK, WHEEL
 from opl.errors import InputError, NoPathError, NoWayError
 from opl.export import draw, job_date, write_program
@@ -154,7 +154,7 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
 def _part_near_wheel(job: Job, part: PartTree) -> list[tuple[str, str]]:
     """Return part and wheel if they are too near at home, where they do not touch on purpose."""
     home = job.pace.home[None]
-    Ts_contact0_workpiece = job.cell.Ts_contact0_workpiece(forward(job.cell.robot, home))
+    Ts_contact0_workpiece = job.cell.Ts_contact0_workpiece(forward_kinematics(job.cell.robot, home))
     needed = job.cell.part_from_wheel
     distance = wheel_clearance(part, job.cell.wheel, Ts_contact0_workpiece, needed)[0]
     return [(PART, WHEEL)] if distance < needed else []

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.cell.workcell import PART, WorkCell
 from opl.geometry.frames import Array, inverse, transform
 from opl.geometry.mesh import TriangleMesh
@@ -18,7 +18,7 @@ FLANGE = "flange"
 
 def enclosing_bodies(cell: WorkCell, q: Array) -> list[tuple[str, str]]:
     """Return flange or part with the mesh they are inside of, at one posture, shape (6,)."""
-    T_base_flange = forward(cell.robot, q)
+    T_base_flange = forward_kinematics(cell.robot, q)
     p_base_part = transform(T_base_flange @ cell.T_flange_workpiece, cell.part.vertices[0])
     points = {FLANGE: T_base_flange[:3, 3], PART: p_base_part}
     return [

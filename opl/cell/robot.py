@@ -144,7 +144,7 @@ def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
     return robot
 
 
-def forward(robot: Robot, q: Array) -> Array:
+def forward_kinematics(robot: Robot, q: Array) -> Array:
     """Return the flange poses Ts_base_flange of postures.
 
     Args:
@@ -168,9 +168,9 @@ def forward(robot: Robot, q: Array) -> Array:
 def controller_poses(robot: Robot, q: Array) -> Array:
     """Return the flange poses of postures as the maker's controller counts them.
 
-    As `forward`, from the controller's own base frame instead of opl's.
+    As `forward_kinematics`, from the controller's own base frame instead of opl's.
     """
-    return robot.T_controller_base @ forward(robot, q)
+    return robot.T_controller_base @ forward_kinematics(robot, q)
 
 
 def link_names(robot: Robot) -> tuple[str, ...]:
@@ -209,7 +209,7 @@ def _arm_fits_urdf(robot: Robot) -> bool:
     """Return whether the closed form finds postures again that the URDF was put in."""
     fractions = np.array([[0.3, 0.6, 0.4, 0.7, 0.2, 0.6], [0.8, 0.3, 0.7, 0.4, 0.6, 0.3]])
     q = robot.lower + fractions * (robot.upper - robot.lower)  # any two
-    difference = inverse_kinematics(robot.arm, forward(robot, q), q) - q[:, None]
+    difference = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q) - q[:, None]
     distance = np.abs(np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
     # some URDFs round right angles to seven digits
     return bool((distance < 1e-5).any(axis=-1).all())

@@ -18,7 +18,7 @@ import numpy as np
 from opl.cell.inverse_kinematics import Arm, inverse_kinematics
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.recognise import RecognisedArm, recognise
-from opl.cell.robot import Robot, forward, load_robot
+from opl.cell.robot import Robot, forward_kinematics, load_robot
 from opl.cell.robot_file import FROM_URDF
 from opl.cell.singularity import singularity_margins
 from opl.cell.urdf_tree import UrdfTree
@@ -122,7 +122,7 @@ def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:
     where rounded right angles move joints far, that is not asked.
     """
     q = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (n, 6))
-    Ts_base_flange = forward(robot, q)
+    Ts_base_flange = forward_kinematics(robot, q)
     found = inverse_kinematics(robot.arm, Ts_base_flange)
     apart = np.abs(np.remainder(found - q[:, None] + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
     regular = singularity_margins(robot.arm, q).min(axis=-1) > 0.02
@@ -131,7 +131,7 @@ def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:
         return float("inf")
     exists = ~np.isnan(found).any(axis=-1)
     wanted = np.broadcast_to(Ts_base_flange[:, None], (*exists.shape, 4, 4))[exists]
-    return float(np.abs(forward(robot, found[exists]) - wanted).max())
+    return float(np.abs(forward_kinematics(robot, found[exists]) - wanted).max())
 
 
 def _doubts(found: RecognisedArm) -> Iterator[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.cell.inverse_kinematics import inverse_kinematics
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.cell.workcell import WorkCell
 from opl.field.nodes import NodeMatrix
 from opl.geometry.frames import Array, interpolate, transform
@@ -197,7 +197,7 @@ def _contact_error_between(
         Distances in [m], shape (n - 1,); 0 where the step leaves the wheel.
     """
     middle = (place[:-1] + place[1:]) / 2.0
-    T_base_flange = forward(cell.robot, (q[:-1] + q[1:]) / 2.0)
+    T_base_flange = forward_kinematics(cell.robot, (q[:-1] + q[1:]) / 2.0)
     p_workpiece = cutter_frames(points, middle)[:, :3, 3]
     p_base = transform(T_base_flange @ cell.T_flange_workpiece, p_workpiece)
     t = np.interp(middle, np.arange(len(t_node)), t_node)

@@ -8,7 +8,7 @@ import numpy as np
 
 from opl.cell.clearance import PartTree, wheel_clearance
 from opl.cell.collision import CollisionScene
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.motion.motion import FREE_MOVES, Motion
@@ -65,7 +65,7 @@ def find_faults(
         motion: The motion.
     """
     q, move = densify(motion.q, RESOLUTION)
-    Ts_base_flange = forward(cell.robot, q)
+    Ts_base_flange = forward_kinematics(cell.robot, q)
     free_move = np.array([stretch in FREE_MOVES for stretch in motion.stretch])
     needed = np.where(free_move[move], cell.part_from_wheel, -cell.planned_allowance)
     Ts_contact0_workpiece = cell.Ts_contact0_workpiece(Ts_base_flange)

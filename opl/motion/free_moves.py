@@ -12,7 +12,7 @@ import numpy as np
 
 from opl.cell.clearance import PartTree, wheel_clearance
 from opl.cell.collision import CollisionScene, Pair
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.cell.workcell import PART, SECOND_OPINION, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.motion.check import RESOLUTION, densify
@@ -99,7 +99,9 @@ class FreeMoves:
         """Return at which postures, shape (n, 6), the part does not keep away from the wheel."""
         needed = self._cell.part_from_wheel + SECOND_OPINION + reserve
         wheel = self._cell.wheel
-        Ts_contact0_workpiece = self._cell.Ts_contact0_workpiece(forward(self._cell.robot, q))
+        Ts_contact0_workpiece = self._cell.Ts_contact0_workpiece(
+            forward_kinematics(self._cell.robot, q)
+        )
         R, p = (
             Ts_contact0_workpiece[:, :3, :3].swapaxes(1, 2),
             Ts_contact0_workpiece[:, None, :3, 3],

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from opl.cell.collision import CollisionScene
 from opl.cell.enclosure import enclosing_bodies, winding_number
 from opl.cell.pairs import PairRules
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import pose
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Body
@@ -131,7 +131,7 @@ def only_the_part_meets(name):
 
 def in_front_of(cell, part_to_body):
     """Return the pose of a body so far from the part at the zero posture."""
-    T_base_part = forward(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece
+    T_base_part = forward_kinematics(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece
     return pose(np.eye(3), T_base_part[:3, 3] + part_to_body)
 
 
@@ -210,7 +210,7 @@ def test_an_arm_inside_a_solid_is_told_though_no_surface_meets():
 def test_a_clearance_of_one_pair_is_proven():
     # a post in 30 to 60 mm from the part somewhere on its way
     cell, motion = tiny_problem().cell, tiny_motion()
-    T = forward(cell.robot, motion.q[1]) @ cell.T_flange_workpiece
+    T = forward_kinematics(cell.robot, motion.q[1]) @ cell.T_flange_workpiece
     away = cell.part.vertices.max(axis=0) + np.array([0.06, 0.0, 0.0])
     ready = with_obstacle(cell, (T @ [*away, 1.0])[:3])
     assert replay_tiny(cell=ready).verified is not None

@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from opl.cell.inverse_kinematics import N_BRANCHES, branch_name, inverse_kinematics, turns
-from opl.cell.robot import forward, load_robot
+from opl.cell.robot import forward_kinematics, load_robot
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.geometry.frames import pose
 from tests.support.closed_forms import difference, opw_solutions
@@ -41,23 +41,23 @@ def assert_reaches(q, T_base_flange, atol=1e-11):
     """Assert that every posture there is, and there is one, has the flange at the pose."""
     found = q[~np.isnan(q).any(axis=-1)]
     assert len(found)
-    np.testing.assert_allclose(forward(MH24, found) - T_base_flange, 0, atol=atol)
+    np.testing.assert_allclose(forward_kinematics(MH24, found) - T_base_flange, 0, atol=atol)
 
 
 # closing the circle
 
 
 def test_every_posture_found_reaches_the_pose():
-    Ts = forward(MH24, random_postures(2000))
+    Ts = forward_kinematics(MH24, random_postures(2000))
     q = inverse_kinematics(ARM, Ts)
     found = ~np.isnan(q).any(axis=-1)
     wanted = np.broadcast_to(Ts[:, None], (2000, N_BRANCHES, 4, 4))[found]
-    np.testing.assert_allclose(forward(MH24, q[found]), wanted, atol=1e-11)
+    np.testing.assert_allclose(forward_kinematics(MH24, q[found]), wanted, atol=1e-11)
 
 
 def test_the_original_posture_is_among_slots_and_turns():
     q = random_postures(2000)
-    candidates = inverse_kinematics(ARM, forward(MH24, q))[:, :, None] + turns(
+    candidates = inverse_kinematics(ARM, forward_kinematics(MH24, q))[:, :, None] + turns(
         MH24.lower, MH24.upper
     )
     distance = np.abs(candidates - q[:, None, None]).max(axis=-1)
@@ -70,12 +70,12 @@ whole_degrees = arrays(np.int64, 6, elements=st.integers(-180, 180))
 @settings(deadline=None, max_examples=200)
 @given(whole_degrees)
 def test_whole_degrees_come_back_however_singular_they_are(degrees):
-    T = forward(MH24, np.radians(degrees))
+    T = forward_kinematics(MH24, np.radians(degrees))
     assert_reaches(inverse_kinematics(ARM, T), T)
 
 
 def test_single_poses_and_stacks_agree():
-    Ts = forward(MH24, random_postures(6)).reshape(2, 3, 4, 4)
+    Ts = forward_kinematics(MH24, random_postures(6)).reshape(2, 3, 4, 4)
     q = inverse_kinematics(ARM, Ts)
     assert q.shape == (2, 3, 8, 6)
     assert inverse_kinematics(ARM, Ts[:0]).shape == (0, 3, 8, 6)
@@ -87,14 +87,14 @@ def test_angles_are_principal_to_the_last_digit(wrist):
     q = random_postures(2000)
     if wrist is not None:
         q[:, [3, 5]] = wrist  # the flipped slot, or this one, has joints 4 and 6 at the seam
-    q = inverse_kinematics(ARM, forward(MH24, q))
+    q = inverse_kinematics(ARM, forward_kinematics(MH24, q))
     assert np.nanmin(q) > -np.pi
     assert np.nanmax(q) <= np.pi
 
 
 def test_a_pose_straight_behind_stays_within_the_limits_of_s():
     q = np.array([np.pi, 0.2, 0.3, 0.4, 0.5, 0.6])
-    q1 = inverse_kinematics(ARM, forward(MH24, q))[:, 0]
+    q1 = inverse_kinematics(ARM, forward_kinematics(MH24, q))[:, 0]
     assert np.nanmax(q1) <= MH24.upper[0]
     assert np.nanmin(q1) >= MH24.lower[0]
     assert np.nanmin(np.abs(np.abs(q1) - np.pi)) < 1e-15
@@ -130,7 +130,7 @@ def with_joint_4(angle):
 @pytest.mark.parametrize("straight", [0.0, np.pi, -np.pi])
 @pytest.mark.parametrize("q4", [0.0, 0.7, -3.0, np.pi])
 def test_a_straight_wrist_takes_joint_4_from_the_argument(straight, q4):
-    T = forward(MH24, np.array([0.3, 0.2, -0.1, 0.9, straight, -0.5]))
+    T = forward_kinematics(MH24, np.array([0.3, 0.2, -0.1, 0.9, straight, -0.5]))
     q = inverse_kinematics(ARM, T, with_joint_4(q4))
     assert_reaches(q, T)
     found = q[~np.isnan(q[:, 0])]
@@ -141,14 +141,14 @@ def test_a_straight_wrist_takes_joint_4_from_the_argument(straight, q4):
 
 def test_each_pose_may_have_its_own_joint_4():
     q = np.array([[0.3, 0.2, -0.1, 0.9, 0.0, -0.5], [0.3, 0.2, -0.1, 0.9, 0.4, -0.5]])
-    found = inverse_kinematics(ARM, forward(MH24, q), q)
+    found = inverse_kinematics(ARM, forward_kinematics(MH24, q), q)
     assert (difference(found, q[:, None]).min(axis=1) < 1e-11).all()
 
 
 @pytest.mark.parametrize("exponent", range(-16, -2))
 def test_a_nearly_straight_wrist_closes_as_well(exponent):
     q = np.array([0.3, 0.2, -0.1, 0.9, 10.0**exponent, -0.5])
-    T = forward(MH24, q)
+    T = forward_kinematics(MH24, q)
     assert_reaches(inverse_kinematics(ARM, T), T)
     assert_reaches(inverse_kinematics(ARM, T, with_joint_4(-2.0)), T)
 
@@ -157,7 +157,7 @@ def test_a_nearly_straight_wrist_closes_as_well(exponent):
 @pytest.mark.parametrize("shoulder", np.radians([-100, -37, 0, 41, 90]))
 def test_an_arm_in_line_is_reached(elbow, shoulder):
     q = np.array([0.3, shoulder, elbow, 0.4, 0.5, 0.6])
-    T = forward(MH24, q)
+    T = forward_kinematics(MH24, q)
     found = inverse_kinematics(ARM, T)
     assert_reaches(found, T, atol=1e-9)
     assert difference(found, q).min() < 1e-6  # the cosine of an angle near 0 knows half its digits
@@ -166,7 +166,8 @@ def test_an_arm_in_line_is_reached(elbow, shoulder):
 def flange_ahead_of_axis_2(distance):
     """Return a pose facing forward whose wrist centre lies so far ahead of axis 2."""
     return pose(
-        forward(MH24, np.zeros(6))[:3, :3], np.array([ARM.a1 + distance + ARM.c4, 0.0, ARM.c1])
+        forward_kinematics(MH24, np.zeros(6))[:3, :3],
+        np.array([ARM.a1 + distance + ARM.c4, 0.0, ARM.c1]),
     )
 
 
@@ -177,7 +178,7 @@ def test_reach_ends_where_the_arm_is_straight():
 
 
 def test_out_of_reach_is_nan_in_all_joints():
-    Ts = forward(MH24, random_postures(500))
+    Ts = forward_kinematics(MH24, random_postures(500))
     Ts[:, :3, 3] *= 1.3
     missing = np.isnan(inverse_kinematics(ARM, Ts))
     assert missing.any()
@@ -191,7 +192,7 @@ def test_a_wrist_centre_beside_an_offset_arm_is_out_of_reach():
 
 
 def test_a_wrist_centre_on_axis_1_is_reached():
-    T = forward(MH24, np.zeros(6))
+    T = forward_kinematics(MH24, np.zeros(6))
     T[:3, 3] = [ARM.c4, 0.0, 0.9]  # facing forward
     q = inverse_kinematics(ARM, T)
     assert_reaches(q, T)
@@ -205,7 +206,9 @@ def test_a_posture_keeps_its_slot_along_a_path():
     start = np.array([-0.4, -0.5, 0.3, -1.0, -1.2, 0.0])
     end = np.array([0.6, 0.5, -0.4, 1.0, -0.3, 2.0])
     path = start + np.linspace(0, 1, 200)[:, None] * (end - start)
-    slots = difference(inverse_kinematics(ARM, forward(MH24, path)), path[:, None]).argmin(axis=1)
+    slots = difference(
+        inverse_kinematics(ARM, forward_kinematics(MH24, path)), path[:, None]
+    ).argmin(axis=1)
     assert set(slots) == {0}
 
 
@@ -229,7 +232,7 @@ def test_names_say_how_the_arm_stands():
     model = pin.buildModelFromUrdf(str(MH24.urdf))
     data = model.createData()
     seen = set()
-    for q in inverse_kinematics(ARM, forward(MH24, random_postures(100))):
+    for q in inverse_kinematics(ARM, forward_kinematics(MH24, random_postures(100))):
         for slot in np.flatnonzero(~np.isnan(q[:, 0])):
             pin.forwardKinematics(model, data, q[slot])
             axis_2, axis_3, wrist = (data.oMi[joint].translation for joint in (2, 3, 5))

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.parallel_axes import ParallelAxesArm
-from opl.cell.robot import controller_poses, forward, known_robots, load_robot
+from opl.cell.robot import controller_poses, forward_kinematics, known_robots, load_robot
 from opl.cell.singularity import singularity_margins
 from opl.field.nodes import _lift
 from tests.support.closed_forms import difference
@@ -76,7 +76,9 @@ def test_every_posture_found_reaches_the_pose_and_the_original_is_among_them(arm
 
 def test_the_drawing_is_the_urdf():
     q = np.random.default_rng(0).uniform(UR10E.lower, UR10E.upper, (50, 6))
-    np.testing.assert_allclose(forward(UR10E, q), [drawn(UR10E.arm, row) for row in q], atol=1e-12)
+    np.testing.assert_allclose(
+        forward_kinematics(UR10E, q), [drawn(UR10E.arm, row) for row in q], atol=1e-12
+    )
 
 
 def test_eaik_finds_the_same_postures():
@@ -89,7 +91,9 @@ def test_eaik_finds_the_same_postures():
     assert eaik.getKinematicFamily() == "6R-THREE_INNER_PARALLEL"
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (300, 6))
     Ts = controller_poses(UR10E, q)
-    for T, found in zip(Ts, inverse_kinematics(UR10E.arm, forward(UR10E, q)), strict=True):
+    for T, found in zip(
+        Ts, inverse_kinematics(UR10E.arm, forward_kinematics(UR10E, q)), strict=True
+    ):
         theirs = eaik.IK(T)
         exact = np.array(theirs.Q)[~np.array(theirs.is_LS)]
         ours = found[~np.isnan(found[:, 0])]
@@ -105,7 +109,9 @@ def test_eaik_on_the_urdf_agrees_about_every_robot_that_comes_with_opl(name):
     eaik = UrdfRobot(str(robot.urdf), [])
     q = np.random.default_rng(2).uniform(robot.lower, robot.upper, (40, 6))
     q = q[singularity_margins(robot.arm, q).min(axis=-1) > 0.02]
-    for row, found in zip(q, inverse_kinematics(robot.arm, forward(robot, q)), strict=True):
+    for row, found in zip(
+        q, inverse_kinematics(robot.arm, forward_kinematics(robot, q)), strict=True
+    ):
         theirs = eaik.IK(eaik.fwdKin(row))
         exact = np.array(theirs.Q)[~np.array(theirs.is_LS)]
         ours = found[~np.isnan(found[:, 0])]
@@ -148,12 +154,12 @@ def test_a_nearly_straight_wrist_closes_as_well(exponent):
 @pytest.mark.parametrize("elbow", [0.0, np.pi])
 def test_an_arm_in_line_is_reached(elbow):
     q = np.array([0.3, -0.9, elbow, 0.4, 0.8, -0.5])
-    T = forward(UR10E, q)
+    T = forward_kinematics(UR10E, q)
     assert_reached(UR10E.arm, inverse_kinematics(UR10E.arm, T), T, atol=1e-8)
 
 
 def test_out_of_reach_is_nan_in_all_joints():
-    Ts = forward(UR10E, np.random.default_rng(0).uniform(-np.pi, np.pi, (300, 6)))
+    Ts = forward_kinematics(UR10E, np.random.default_rng(0).uniform(-np.pi, np.pi, (300, 6)))
     Ts[:, :3, 3] *= 1.3
     missing = np.isnan(inverse_kinematics(UR10E.arm, Ts))
     assert missing.any() and not missing.all()
@@ -183,7 +189,7 @@ def test_a_slot_is_left_only_through_a_singularity(arm):
 
 def test_full_turns_of_nearly_every_joint_do_not_multiply_the_work():
     q = inverse_kinematics(
-        UR10E.arm, forward(UR10E, np.array([[[0.1, -1.5, 1.2, 0.3, -1.4, 0.2]]]))
+        UR10E.arm, forward_kinematics(UR10E, np.array([[[0.1, -1.5, 1.2, 0.3, -1.4, 0.2]]]))
     )
     _, sheets, copies = _lift(q[:, :, 0], UR10E.lower, UR10E.upper)
     assert len(sheets) == len(copies) == 1

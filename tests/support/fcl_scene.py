@@ -7,7 +7,7 @@ import fcl
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Box
@@ -193,7 +193,7 @@ def margin_along(cell, q, step=0.4):
     least = np.inf
     for posture in dense:
         least = min(least, *scene.clearances(posture).values(), np.inf)
-        T = cell.Ts_contact0_workpiece(forward(cell.robot, posture))
+        T = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, posture))
         gap = cell.wheel.clearance(transform(T, corners)).min()
         least = min(least, gap - cell.part_from_wheel)
     return least

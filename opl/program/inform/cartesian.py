@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opl.cell.inverse_kinematics import inverse_kinematics
-from opl.cell.robot import Robot, forward
+from opl.cell.robot import Robot, forward_kinematics
 from opl.errors import UnsafeError
 from opl.geometry.frames import from_roll_pitch_yaw, inverse, roll_pitch_yaw
 from opl.program.controller import ControllerProfile
@@ -55,7 +55,7 @@ def pose_of(values: tuple[float, ...]) -> Array:
 
 def configuration(robot: Robot, q: Array) -> tuple[int, ...]:
     """Return the six meaningful numbers of RCONF for a posture, shape (6,)."""
-    slots = inverse_kinematics(robot.arm, forward(robot, q), q)
+    slots = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)
     apart = np.abs(np.remainder(slots - q + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
     slot = int(np.nanargmin(apart))
     flip, back, elbow = slot // 4, slot // 2 % 2, slot % 2
