@@ -6,10 +6,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 
-from opl.cell.clearance import PartTree, part_tree, wheel_clearance
 from opl.cell.collision import CollisionScene
 from opl.cell.enclosure import enclosing_bodies
 from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import PartTree, part_tree, signed_wheel_distance
 from opl.cell.workcell import PART, SECOND_OPINION_OF_A_LINK, WHEEL
 from opl.errors import InputError, NoPathError, NoWayError
 from opl.export import draw, job_date, write_program
@@ -156,7 +156,7 @@ def _part_near_wheel(job: Job, part: PartTree) -> list[tuple[str, str]]:
     home = job.pace.home[None]
     Ts_contact0_workpiece = job.cell.Ts_contact0_workpiece(forward_kinematics(job.cell.robot, home))
     needed = job.cell.part_from_wheel
-    distance = wheel_clearance(part, job.cell.wheel, Ts_contact0_workpiece, needed)[0]
+    distance = signed_wheel_distance(part, job.cell.wheel, Ts_contact0_workpiece, needed)[0]
     return [(PART, WHEEL)] if distance < needed else []
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from opl.cell.clearance import part_tree
 from opl.cell.collision import CollisionScene
+from opl.cell.wheel_distance import part_tree
 from opl.cell.workcell import WorkCell
 from opl.field.layer import wheel_layer
 from opl.field.nodes import build_nodes

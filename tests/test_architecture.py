@@ -57,7 +57,7 @@ HOMES = {
     "xacro": {"cell/xacro_file"},
     "toppra": {"motion/time_law"},
     "ompl": {"motion/sampling"},
-    "numba": {"cell/clearance", "search"},
+    "numba": {"cell/wheel_distance", "search"},
 }
 
 LONGEST = 300  # lines

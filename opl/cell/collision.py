@@ -1,7 +1,7 @@
 """Whether robot, held part or fixture touch anything at a posture, by pinocchio and coal.
 
 Part against wheel is not asked here: that pair may touch, and has a closed form in
-`opl.cell.clearance`. A collision is a yes or a no, never a cost.
+`opl.cell.wheel_distance`. A collision is a yes or a no, never a cost.
 """
 
 from __future__ import annotations

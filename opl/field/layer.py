@@ -1,10 +1,10 @@
-"""The clearance layer of a node matrix: part against wheel at every cutter point and t, or some."""
+"""The layer of wheel distances of a node matrix: part against wheel at every cutter point and t, or some."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from opl.cell.clearance import PartTree, wheel_clearance
+from opl.cell.wheel_distance import PartTree, signed_wheel_distance
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
@@ -15,7 +15,7 @@ def wheel_layer(
 ) -> Array:
     """Return the signed distance of the part to the wheel in [m], shape (N, M).
 
-    As in `wheel_clearance`: exact where it is less than the contact allowance permits.
+    As in `signed_wheel_distance`: exact where it is less than the contact allowance permits.
 
     Args:
         cell: The cell.
@@ -26,7 +26,7 @@ def wheel_layer(
     Ts_contact0_contact = cell.wheel.T_contact0_contact(contact_positions)
     # cutter and contact coincide, whatever robot brings the part there
     Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[:, None]
-    return wheel_clearance(part, cell.wheel, Ts_contact0_workpiece, -cell.planned_allowance)
+    return signed_wheel_distance(part, cell.wheel, Ts_contact0_workpiece, -cell.planned_allowance)
 
 
 def layer_at(
@@ -45,5 +45,7 @@ def layer_at(
     Ts_contact0_contact = cell.wheel.T_contact0_contact(contact_positions)[rows]
     Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[columns]
     layer = np.full(at.shape, -np.inf)
-    layer[at] = wheel_clearance(part, cell.wheel, Ts_contact0_workpiece, -cell.planned_allowance)
+    layer[at] = signed_wheel_distance(
+        part, cell.wheel, Ts_contact0_workpiece, -cell.planned_allowance
+    )
     return layer

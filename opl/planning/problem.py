@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.clearance import PartTree
 from opl.cell.collision import CollisionScene
+from opl.cell.wheel_distance import PartTree
 from opl.cell.workcell import WorkCell
 from opl.field.nodes import NodeField, NodeMatrix
 from opl.field.path import Interpolation

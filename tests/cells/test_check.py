@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from opl.cell.clearance import part_tree
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import part_tree
 from opl.motion.check import RESOLUTION, densify, find_faults
 from opl.motion.motion import Stretch
 from tests.support.bare_cells import bare_cell, block, free_move, with_obstacle

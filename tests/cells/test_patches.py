@@ -34,7 +34,7 @@ def test_the_drum_is_the_contact_wheel(p):
     p_contact0 = np.array([in_drum[2], in_drum[1], in_drum[0] + DRUM.radius])
     p_base = DRUM.T_base_drum[:3, :3] @ in_drum + DRUM.T_base_drum[:3, 3]
     distance, _ = DRUM.distances(p_base[None])
-    assert distance[0] == pytest.approx(wheel.clearance(p_contact0), abs=1e-12)
+    assert distance[0] == pytest.approx(wheel.signed_distance(p_contact0), abs=1e-12)
 
 
 @settings(max_examples=200, deadline=None, derandomize=True)

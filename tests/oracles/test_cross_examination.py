@@ -9,10 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from opl.cell.clearance import part_tree, wheel_clearance
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import part_tree, signed_wheel_distance
 from opl.job.load import load
 from opl.pipeline import cutter_points
 from opl.resources import folder
@@ -75,7 +75,7 @@ def examined(part, count=COUNT):
     cell = job.cell
     postures = postures_of_interest(job, cutter_points(job), count)
     Ts = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, postures))
-    exact = wheel_clearance(part_tree(cell.part), cell.wheel, Ts, 0.02)
+    exact = signed_wheel_distance(part_tree(cell.part), cell.wheel, Ts, 0.02)
     fcl_scene = FclScene(cell)
     by_fcl = [min(fcl_scene.clearances(q).values(), default=np.inf) for q in postures]
     by_bullet, as_held_to, gap = [], [], []

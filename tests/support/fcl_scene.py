@@ -194,6 +194,6 @@ def margin_along(cell, q, step=0.4):
     for posture in dense:
         least = min(least, *scene.clearances(posture).values(), np.inf)
         T = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, posture))
-        gap = cell.wheel.clearance(transform(T, corners)).min()
+        gap = cell.wheel.signed_distance(transform(T, corners)).min()
         least = min(least, gap - cell.part_from_wheel)
     return least

@@ -5,8 +5,8 @@ from functools import cache
 
 import numpy as np
 
-from opl.cell.clearance import part_tree
 from opl.cell.collision import CollisionScene
+from opl.cell.wheel_distance import part_tree
 from opl.field.layer import wheel_layer
 from opl.field.nodes import build_nodes
 from opl.geometry.toolpath import CutterPoints
