@@ -143,8 +143,8 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
     hits = [*scene.colliding_pairs(job.pace.home), *_part_near_wheel(job, part)]
     if hits:
         pairs = ", ".join(" and ".join(pair) for pair in hits)
-        needed = f"{1e3 * job.cell.clearance:g} mm (clearance_mm)"
-        needed += " or their own clearance" if job.cell.pairs.clearances else ""
+        needed = f"{1e3 * job.cell.required_clearance:g} mm (clearance_mm)"
+        needed += " or their own clearance" if job.cell.pairs.required else ""
         told = f"at home these are nearer to each other than {needed} or collide: {pairs}"
         told += f"; links are planned {1e3 * SECOND_OPINION_OF_A_LINK:g} mm farther away"
         raise InputError(job.around.home_key, told)

@@ -189,8 +189,8 @@ class CollisionScene:
                     continue
                 # joint 0 is what does not move: next to the first link, but not its neighbour
                 held_at_wrist = apart == 1 and min(joints[first], joints[second]) > 0
-                usual = 0.0 if both_links or held_at_wrist else cell.clearance
-                margin = cell.pairs.needed(*pair, otherwise=usual)
+                usual = 0.0 if both_links or held_at_wrist else cell.required_clearance
+                margin = cell.pairs.between(*pair, otherwise=usual)
                 if margin is None:
                     continue
                 self._geometry.addCollisionPair(pin.CollisionPair(first, second))

@@ -14,13 +14,13 @@ class PairRules:
 
     Attributes:
         allowed: Pairs that may touch; they are not looked at.
-        clearances: Distance in [m] that a pair must keep, instead of the clearance of the cell.
+        required: Distance in [m] that a pair must keep, instead of that of the cell.
     """
 
     allowed: frozenset[PairOfNames] = frozenset()
-    clearances: Mapping[PairOfNames, float] = field(default_factory=dict)
+    required: Mapping[PairOfNames, float] = field(default_factory=dict)
 
-    def needed(self, first: str, second: str, otherwise: float) -> float | None:
+    def between(self, first: str, second: str, otherwise: float) -> float | None:
         """Return how far two bodies must stay apart in [m], None if they may touch.
 
         Args:
@@ -29,9 +29,8 @@ class PairRules:
             otherwise: The distance if nothing is said of this pair, in [m].
         """
         pair = frozenset((first, second))
-        return None if pair in self.allowed else self.clearances.get(pair, otherwise)
+        return None if pair in self.allowed else self.required.get(pair, otherwise)
 
     def widened(self, by: float) -> PairRules:
         """Return rules that ask for so much more distance in [m]."""
-        wider = {pair: clearance + by for pair, clearance in self.clearances.items()}
-        return replace(self, clearances=wider)
+        return replace(self, required={pair: far + by for pair, far in self.required.items()})

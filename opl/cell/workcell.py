@@ -34,7 +34,7 @@ class WorkCell:
         fixture: Bodies between flange and part, given in the flange frame.
         T_flange_workpiece: How the fixture holds the part, shape (4, 4).
         contact_allowance: How deep the part may sink into the belt in [m].
-        clearance: Distance to keep from everything else in [m].
+        required_clearance: Distance to keep from everything else in [m].
         pairs: The pairs that keep another distance, or none.
         limits: Limits of joints and sums of joints beside the robot's own.
     """
@@ -46,7 +46,7 @@ class WorkCell:
     fixture: tuple[Body, ...]
     T_flange_workpiece: Array
     contact_allowance: float
-    clearance: float
+    required_clearance: float
     pairs: PairRules = field(default_factory=PairRules)
     limits: tuple[Limit, ...] = ()
 
@@ -62,13 +62,17 @@ class WorkCell:
     @property
     def part_from_wheel(self) -> float:
         """Distance that the part keeps from the wheel on free moves in [m]."""
-        needed = self.pairs.needed(PART, WHEEL, self.clearance)
+        needed = self.pairs.between(PART, WHEEL, self.required_clearance)
         assert needed is not None, "the belt has its own allowance"
         return needed
 
     def widened(self, by: float) -> WorkCell:
         """Return a cell in which everything must stay so much farther apart, in [m]."""
-        return replace(self, clearance=self.clearance + by, pairs=self.pairs.widened(by))
+        return replace(
+            self,
+            required_clearance=self.required_clearance + by,
+            pairs=self.pairs.widened(by),
+        )
 
     def within_limits(self, q: Array) -> np.ndarray:
         """Return which postures, shape (..., 6) in [rad], keep every joint limit, shape (...)."""

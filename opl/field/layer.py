@@ -1,4 +1,4 @@
-"""The layer of wheel distances of a node matrix: part against wheel at every cutter point and t, or some."""
+"""Signed distances of part and wheel at the nodes of a matrix: at all of them, or at some."""
 
 from __future__ import annotations
 

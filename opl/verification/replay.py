@@ -216,7 +216,7 @@ class _Run:
         grinding = motion.stretch[move] in ON_WHEEL
         touching_down = grinding and motion.stretch[move - 1] is Stretch.APPROACH
         free = not grinding and motion.stretch[move] not in ALONG_LEAD
-        off_wheel = cell.pairs.clearances.get(frozenset((PART, WHEEL)), cell.clearance)
+        off_wheel = cell.pairs.required.get(frozenset((PART, WHEEL)), cell.required_clearance)
         needed = off_wheel if free else -cell.contact_allowance
         farthest = self._allowed_error + GAP_ACCURACY if grinding and not touching_down else np.inf
         gap = self._world.gap(farthest if farthest < np.inf else max(needed, 0.0))

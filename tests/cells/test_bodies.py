@@ -52,7 +52,7 @@ def meshed_cell():
     jaw = Body("jaw", c_shape(0.12, 0.02, 0.06), at(0.0, 0.0, 0.05))
     rules = PairRules(
         allowed=frozenset([pair("jaw", "belt run"), pair("R_link", "gate")]),
-        clearances={
+        required={
             pair("part", "gate"): 0.04,
             pair("jaw", "gate"): 0.0,
             pair("B_link", "floor"): 0.1,
@@ -214,7 +214,7 @@ def test_a_clearance_of_one_pair_is_proven():
     away = cell.part.vertices.max(axis=0) + np.array([0.06, 0.0, 0.0])
     ready = with_obstacle(cell, (T @ [*away, 1.0])[:3])
     assert replay_tiny(cell=ready).verified is not None
-    strict = PairRules(clearances={pair("post", "part"): 0.08})
+    strict = PairRules(required={pair("post", "part"): 0.08})
     refused = replay_tiny(cell=replace(ready, pairs=strict))
     assert refused.verified is None
     told = [f.message for f in refused.findings if f.kind == "collision"]
@@ -229,14 +229,14 @@ def test_a_clearance_of_one_pair_is_proven():
 
 def test_the_wheel_keeps_a_clearance_of_its_own_on_free_moves():
     cell = tiny_problem().cell
-    far = PairRules(clearances={pair("part", "wheel"): 0.3})
+    far = PairRules(required={pair("part", "wheel"): 0.3})
     found = replay_tiny(cell=replace(cell, pairs=far))
     assert any("part and wheel" in f.message and "300 mm" in f.message for f in found.findings)
 
 
 def test_rules_widen_with_the_clearance():
     cell = meshed_cell().widened(0.01)
-    assert cell.clearance == pytest.approx(v_job().cell.clearance + 0.01)
-    assert cell.pairs.needed("gate", "part", 1.0) == pytest.approx(0.05)
-    assert cell.pairs.needed("R_link", "gate", 1.0) is None
-    assert cell.pairs.needed("T_link", "gate", 1.0) == 1.0
+    assert cell.required_clearance == pytest.approx(v_job().cell.required_clearance + 0.01)
+    assert cell.pairs.between("gate", "part", 1.0) == pytest.approx(0.05)
+    assert cell.pairs.between("R_link", "gate", 1.0) is None
+    assert cell.pairs.between("T_link", "gate", 1.0) == 1.0

@@ -34,7 +34,7 @@ def unordered(pairs):
 
 @pytest.mark.parametrize("clearance", [0.0, 0.005, 0.02])
 def test_an_independent_scene_finds_the_same_pairs(clearance):
-    cell = replace(v_job().cell, clearance=clearance)
+    cell = replace(v_job().cell, required_clearance=clearance)
     scene, other = CollisionScene(cell), FclScene(cell)
     postures = postures_of_interest(cell)
     collides = scene.collides(postures)
@@ -50,7 +50,7 @@ def test_an_independent_scene_finds_the_same_pairs(clearance):
 
 def test_the_broad_phase_misses_no_pair_however_large_the_clearance():
     # with 80 mm the boxes that the broad phase compares are apart long before the margins are
-    cell = replace(v_job().cell, clearance=0.08, fixture=())
+    cell = replace(v_job().cell, required_clearance=0.08, fixture=())
     lifted = cell.T_flange_workpiece.copy()
     lifted[2, 3] += 0.25  # else the part is always within 80 mm of the forearm
     cell = replace(cell, T_flange_workpiece=lifted)
@@ -63,7 +63,7 @@ def test_the_broad_phase_misses_no_pair_however_large_the_clearance():
 
 
 def test_asking_every_pair_agrees_with_the_broad_phase():
-    cell = replace(v_job().cell, clearance=0.03)
+    cell = replace(v_job().cell, required_clearance=0.03)
     scene = CollisionScene(cell)
     postures = postures_of_interest(cell, seed=2)
     one_by_one = [bool(scene.colliding_pairs(q)) for q in postures]

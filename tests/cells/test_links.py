@@ -82,7 +82,7 @@ def test_a_move_is_free_if_and_only_if_an_independent_scene_says_so(seed):
 
 def test_a_plate_thinner_than_the_way_between_two_looks_is_found():
     cell = open_cell()
-    cell = replace(cell, part=block((0.12, 0.002, 0.06)), clearance=0.0)
+    cell = replace(cell, part=block((0.12, 0.002, 0.06)), required_clearance=0.0)
     # the arm sweeps a thin plate over S, far out: by 14 mm from look to look
     swept = HOME + np.deg2rad([20.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     between = HOME + np.deg2rad([9.5, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -193,7 +193,7 @@ def test_the_v_motion_is_proven():
     assert verification.limit_violations == 0
     assert isinstance(verification.verified, VerifiedMotion)
     assert verification.max_contact_error <= v_job().search.max_contact_error
-    assert verification.min_clearance >= v_job().cell.clearance
+    assert verification.min_clearance >= v_job().cell.required_clearance
     assert verification.engine.startswith("PyBullet ")
 
 

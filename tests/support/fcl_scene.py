@@ -96,18 +96,18 @@ class FclScene:
             elif a in place and b in held:
                 if place[a] < len(chain) - 1:
                     near = place[a] == len(chain) - 2
-                    pairs.append((one, other, 0.0 if near else cell.clearance))
+                    pairs.append((one, other, 0.0 if near else cell.required_clearance))
             elif (a, b) == ("part", "wheel") or place.get(a) == 0:
                 continue
             elif a in place or (a in held and b not in held):
-                pairs.append((one, other, cell.clearance))
+                pairs.append((one, other, cell.required_clearance))
         return list(self._as_said(pairs, cell.pairs))
 
     def _as_said(self, pairs, rules):
         for one, other, needed in pairs:
             names = frozenset([self.pieces[one][0], self.pieces[other][0]])
             if names not in rules.allowed:
-                yield one, other, rules.clearances.get(names, needed)
+                yield one, other, rules.required.get(names, needed)
 
     @staticmethod
     def _rank(place, held):
