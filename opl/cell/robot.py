@@ -18,6 +18,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
+from opl.cell.full_turns import angular_distance
 from opl.cell.inverse_kinematics import Arm, inverse_kinematics
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot_file import N_JOINTS, RobotFile, read_robot_file
@@ -209,8 +210,8 @@ def _arm_fits_urdf(robot: Robot) -> bool:
     """Return whether the closed form finds postures again that the URDF was put in."""
     fractions = np.array([[0.3, 0.6, 0.4, 0.7, 0.2, 0.6], [0.8, 0.3, 0.7, 0.4, 0.6, 0.3]])
     q = robot.lower + fractions * (robot.upper - robot.lower)  # any two
-    difference = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q) - q[:, None]
-    distance = np.abs(np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
+    found = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)
+    distance = angular_distance(found, q[:, None]).max(axis=-1)
     # some URDFs round right angles to seven digits
     return bool((distance < 1e-5).any(axis=-1).all())
 

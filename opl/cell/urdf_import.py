@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from opl.cell.full_turns import FULL_TURN, angular_distance
 from opl.cell.inverse_kinematics import Arm, inverse_kinematics
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.recognise import RecognisedArm, recognise
@@ -124,7 +125,7 @@ def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:
     q = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (n, 6))
     Ts_base_flange = forward_kinematics(robot, q)
     found = inverse_kinematics(robot.arm, Ts_base_flange)
-    apart = np.abs(np.remainder(found - q[:, None] + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
+    apart = angular_distance(found, q[:, None]).max(axis=-1)
     regular = singularity_margins(robot.arm, q).min(axis=-1) > 0.02
     nearest = np.where(np.isnan(apart), np.inf, apart).min(axis=1)
     if not (nearest[regular] < 1e-2).all():
@@ -143,7 +144,7 @@ def _doubts(found: RecognisedArm) -> Iterator[str]:
     # no arm turns these all round, unless its axes 2 to 4 are parallel
     for k in () if isinstance(found.arm, ParallelAxesArm) else (1, 4):
         low, high = found.lower[k], found.upper[k]
-        if high - low > 2.0 * np.pi - 1e-3:
+        if high - low > FULL_TURN - 1e-3:
             yield (
                 f"{names[k]}: limits {np.rad2deg(low):.0f} to {np.rad2deg(high):.0f} deg look like "
                 "a placeholder; see the data sheet"

@@ -16,7 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
-from opl.cell.inverse_kinematics import inverse_kinematics, turns
+from opl.cell.full_turns import full_turns
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
@@ -117,7 +118,7 @@ def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
     sheet_turns: list[Array] = [np.zeros(1)] * 6
     copy_turns: list[Array] = [np.zeros(1)] * 6
     central: list[Array] = [np.zeros(1)] * 6
-    all_turns = turns(lower, upper)
+    all_turns = full_turns(lower, upper)
     for joint in range(6):
         counts = np.unique(all_turns[:, joint])
         if len(counts) == 1:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from opl.cell.full_turns import nearest_turn
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.cell.workcell import WorkCell
@@ -161,7 +162,7 @@ def _solve(
     q_guess = np.stack([np.interp(place, columns, joint) for joint in q_node.T], axis=-1)
     Ts_base_flange = cell.Ts_base_flange(t, cutter_frames(points, place))
     q = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_guess)[:, nodes.branch]
-    q = q + 2.0 * np.pi * np.round((q_guess - q) / (2.0 * np.pi))
+    q = nearest_turn(q, q_guess)
     at_node = place == np.floor(place)
     q[at_node] = q_node[place[at_node].astype(int)]
     lost = np.isnan(q).any(axis=1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from opl.cell.full_turns import principal
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.workcell import WorkCell
 from opl.field.path import GrindingPath
@@ -198,11 +199,8 @@ def lead(
     solutions = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_contact)[:, branch]
     if np.isnan(solutions).any():
         raise UnreachableApproachError(column, "reach")
-    q = q_contact + np.cumsum(
-        np.remainder(np.diff(solutions, axis=0, prepend=q_contact[None]) + np.pi, 2 * np.pi)
-        - np.pi,
-        axis=0,
-    )
+    steps = principal(np.diff(solutions, axis=0, prepend=q_contact[None]))
+    q = q_contact + np.cumsum(steps, axis=0)
     if not cell.within_limits(q).all():
         names = " ".join(cell.broken_limits(q))
         raise UnreachableApproachError(column, f"limits of {names}")

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opl.cell.full_turns import nearest_turn
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.workcell import WorkCell
 from opl.field.layer import layer_at
@@ -169,7 +170,7 @@ def _on_branch(problem: GrindingProblem, nodes: NodeMatrix, q: Array, before: np
     added = q[:, nodes.position_index, nodes.branch]
     near = nodes.q[before]
     near = np.where(np.isnan(near), nodes.q[before + 1], near)
-    added = added + 2.0 * np.pi * np.round((near - added) / (2.0 * np.pi))
+    added = nearest_turn(added, near)
     within = problem.cell.within_limits(added)
     return np.where(within[..., None], added, np.nan)
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from opl.cell.full_turns import nearest_turn
 from opl.field.layer import layer_at
 from opl.field.nodes import NodeField, NodeMatrix
 from opl.field.path import GrindingPath
@@ -40,7 +41,7 @@ def tube(refined: RefinedProblem, path: GrindingPath, finer: Array) -> RefinedPr
     q = np.full((*near.shape, 6), np.nan)
     q[near] = solve_at(problem.cell, problem.points, t, near)[:, path.branch]
     # on the same count of turns as the path
-    q = q + 2.0 * np.pi * np.round((q_path[:, None] - q) / (2.0 * np.pi))
+    q = nearest_turn(q, q_path[:, None])
     q = np.where(problem.cell.within_limits(q)[..., None], q, np.nan)
     # to the bit what is known to be free
     q[np.arange(len(q)), np.searchsorted(np.flatnonzero(used), own)] = q_path

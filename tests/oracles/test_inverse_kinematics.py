@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from opl.cell.inverse_kinematics import N_BRANCHES, branch_name, inverse_kinematics, turns
+from opl.cell.full_turns import full_turns
+from opl.cell.inverse_kinematics import N_IK_BRANCHES, ik_branch_name, inverse_kinematics
 from opl.cell.robot import forward_kinematics, load_robot
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.geometry.frames import pose
@@ -51,13 +52,13 @@ def test_every_posture_found_reaches_the_pose():
     Ts = forward_kinematics(MH24, random_postures(2000))
     q = inverse_kinematics(ARM, Ts)
     found = ~np.isnan(q).any(axis=-1)
-    wanted = np.broadcast_to(Ts[:, None], (2000, N_BRANCHES, 4, 4))[found]
+    wanted = np.broadcast_to(Ts[:, None], (2000, N_IK_BRANCHES, 4, 4))[found]
     np.testing.assert_allclose(forward_kinematics(MH24, q[found]), wanted, atol=1e-11)
 
 
 def test_the_original_posture_is_among_slots_and_turns():
     q = random_postures(2000)
-    candidates = inverse_kinematics(ARM, forward_kinematics(MH24, q))[:, :, None] + turns(
+    candidates = inverse_kinematics(ARM, forward_kinematics(MH24, q))[:, :, None] + full_turns(
         MH24.lower, MH24.upper
     )
     distance = np.abs(candidates - q[:, None, None]).max(axis=-1)
@@ -199,7 +200,7 @@ def test_a_wrist_centre_on_axis_1_is_reached():
     assert not np.isnan(q).any()
 
 
-# slots, turns, names
+# slots, names
 
 
 def test_a_posture_keeps_its_slot_along_a_path():
@@ -210,22 +211,6 @@ def test_a_posture_keeps_its_slot_along_a_path():
         inverse_kinematics(ARM, forward_kinematics(MH24, path)), path[:, None]
     ).argmin(axis=1)
     assert set(slots) == {0}
-
-
-def test_only_r_and_t_of_the_mh24_have_turns():
-    found = turns(MH24.lower, MH24.upper) / (2 * np.pi)
-    assert found.shape == (9, 6)
-    np.testing.assert_array_equal(found[0], np.zeros(6))
-    np.testing.assert_array_equal(found[:, [0, 1, 2, 4]], np.zeros((9, 4)))
-    assert {(r, t) for r, t in found[:, [3, 5]]} == {(r, t) for r in (-1, 0, 1) for t in (-1, 0, 1)}
-    n_turns = np.abs(found).sum(axis=1)
-    np.testing.assert_array_equal(n_turns, np.sort(n_turns))
-
-
-def test_turns_cover_limits_on_one_side():
-    lower, upper = np.zeros(6), np.full(6, np.pi / 2)
-    lower[5], upper[5] = np.radians([200, 400])  # principal angles -160..180 or -180..40, turned
-    np.testing.assert_allclose(turns(lower, upper), [[0, 0, 0, 0, 0, 2 * np.pi]])
 
 
 def test_names_say_how_the_arm_stands():
@@ -247,6 +232,6 @@ def test_names_say_how_the_arm_stands():
                 "elbow up" if height > 0 else "elbow down",
                 "no flip" if q[slot, 4] < 0 else "flip",
             ]
-            assert branch_name(slot) == ", ".join(name)
+            assert ik_branch_name(slot) == ", ".join(name)
             seen.add(slot)
-    assert seen == set(range(N_BRANCHES))
+    assert seen == set(range(N_IK_BRANCHES))

@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from opl.cell.inverse_kinematics import inverse_kinematics, turns
+from opl.cell.full_turns import full_turns
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import (
     controller_poses,
     forward_kinematics,
@@ -140,7 +141,7 @@ def test_forward_agrees_with_denavit_hartenberg(robot):
 def test_every_posture_found_reaches_the_pose_and_the_original_is_among_them(robot):
     assert closure_error(robot) < 1e-11
     q = random_postures(robot, 300, seed=1)
-    found = inverse_kinematics(robot.arm, forward_kinematics(robot, q))[:, :, None] + turns(
+    found = inverse_kinematics(robot.arm, forward_kinematics(robot, q))[:, :, None] + full_turns(
         robot.lower, robot.upper
     )
     distance = np.abs(found - q[:, None, None]).max(axis=-1)

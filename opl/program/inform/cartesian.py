@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from opl.cell.full_turns import FULL_TURN, angular_distance
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
 from opl.errors import UnsafeError
@@ -56,7 +57,7 @@ def pose_of(values: tuple[float, ...]) -> Array:
 def configuration(robot: Robot, q: Array) -> tuple[int, ...]:
     """Return the six meaningful numbers of RCONF for a posture, shape (6,)."""
     slots = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)
-    apart = np.abs(np.remainder(slots - q + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
+    apart = angular_distance(slots, q).max(axis=-1)
     slot = int(np.nanargmin(apart))
     flip, back, elbow = slot // 4, slot // 2 % 2, slot % 2
     beyond = (int(abs(q[joint]) > np.pi) for joint in _HALF_TURN_JOINTS)
@@ -87,7 +88,7 @@ def postures(
         return np.empty((0, 6))
     found = [q]
     for joint, is_beyond in zip(_HALF_TURN_JOINTS, beyond, strict=True):
-        turns = 2.0 * np.pi * np.array([-1.0, 1.0]) if is_beyond else np.zeros(1)
+        turns = FULL_TURN * np.array([-1.0, 1.0]) if is_beyond else np.zeros(1)
         found = [p + turn * np.eye(6)[joint] for p in found for turn in turns]
     stack = np.array(found)
     slack = 1e-6  # a posture at its limit, rounded

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from opl.cell.full_turns import nearest_turn
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
 from opl.errors import InputError
@@ -145,7 +146,7 @@ def line(robot: Robot, start: Array, end: Array, T_flange_tool: Array) -> Array 
     slots = inverse_kinematics(robot.arm, Ts_base_tool @ inverse(T_flange_tool), guess)
     found, q = [], start
     for candidates in slots:
-        turned = candidates + 2.0 * np.pi * np.round((q - candidates) / (2.0 * np.pi))
+        turned = nearest_turn(candidates, q)
         apart = np.abs(turned - q).max(axis=1)
         if np.isnan(apart).all() or np.nanmin(apart) > _FURTHEST_TURN:
             return None
