@@ -6,8 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 
-from opl.cell.collision import CollisionScene
-from opl.cell.enclosure import enclosing_bodies
+from opl.cell.collision import CollisionScene, enclosing_bodies
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import PartTree, part_tree, signed_wheel_distance
 from opl.cell.workcell import PART, SECOND_OPINION_OF_A_LINK, WHEEL

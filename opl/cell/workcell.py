@@ -1,13 +1,13 @@
-"""The cell as a value: robot, wheel, held part and everything that stands around."""
+"""The cell as a value: robot, wheel, held part, what stands around, and how far apart all stay."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from opl.cell.limits import Limit, broken, within
-from opl.cell.pairs import PairRules
 from opl.cell.robot import Robot
 from opl.geometry.frames import Array, inverse, pose
 from opl.geometry.mesh import TriangleMesh
@@ -20,6 +20,36 @@ PART = "part"
 # differ by 0.08 mm at the rim of the wheel, and it is held to rounding the edges of a link
 SECOND_OPINION = 1e-4
 SECOND_OPINION_OF_A_LINK = 1e-3
+
+PairOfNames = frozenset[str]
+
+
+@dataclass(frozen=True)
+class PairRules:
+    """What is said of single pairs, by the names of links and bodies.
+
+    Attributes:
+        allowed: Pairs that may touch; they are not looked at.
+        required: Distance in [m] that a pair must keep, instead of that of the cell.
+    """
+
+    allowed: frozenset[PairOfNames] = frozenset()
+    required: Mapping[PairOfNames, float] = field(default_factory=dict)
+
+    def between(self, first: str, second: str, otherwise: float) -> float | None:
+        """Return how far two bodies must stay apart in [m], None if they may touch.
+
+        Args:
+            first: Name of one.
+            second: Name of the other.
+            otherwise: The distance if nothing is said of this pair, in [m].
+        """
+        pair = frozenset((first, second))
+        return None if pair in self.allowed else self.required.get(pair, otherwise)
+
+    def widened(self, by: float) -> PairRules:
+        """Return rules that ask for so much more distance in [m]."""
+        return replace(self, required={pair: far + by for pair, far in self.required.items()})
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from opl.cell.limits import Limit
-from opl.cell.pairs import PairRules
 from opl.cell.robot import Robot
-from opl.cell.workcell import WorkCell
+from opl.cell.workcell import PairRules, WorkCell
 from opl.errors import InputError
 from opl.geometry.frames import Array
 from opl.geometry.shapes import Body

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.cell.collision import CollisionScene
-from opl.cell.singularity import singularity_margins
+from opl.cell.inverse_kinematics import singularity_margins
 from opl.field.nodes import NodeMatrix
 from opl.geometry.frames import Array
 from opl.planning.problem import GrindingProblem

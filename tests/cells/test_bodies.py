@@ -9,12 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from opl.cell.collision import CollisionScene
-from opl.cell.enclosure import enclosing_bodies, winding_number
-from opl.cell.pairs import PairRules
+from opl.cell.collision import CollisionScene, enclosing_bodies
 from opl.cell.robot import forward_kinematics
+from opl.cell.workcell import PairRules
 from opl.geometry.frames import pose
-from opl.geometry.mesh import TriangleMesh
+from opl.geometry.mesh import TriangleMesh, winding_number
 from opl.geometry.shapes import Body
 from opl.verification.meshes import is_inside
 from opl.verification.replay import replay

@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.inverse_kinematics import inverse_kinematics, singularity_margins
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot import controller_poses, forward_kinematics, known_robots, load_robot
-from opl.cell.singularity import singularity_margins
 from opl.field.nodes import _lift
 from tests.support.closed_forms import difference
 
