@@ -52,7 +52,7 @@ HOMES = {
     "rich": {"console"},
     "matplotlib": {"report"},
     "trimesh": {"geometry/mesh"},
-    "contourpy": {"geometry/sections"},
+    "contourpy": {"geometry/section_curves"},
     "OCP": {"geometry/cad"},
     "xacro": {"cell/xacro_file"},
     "toppra": {"motion/time_law"},

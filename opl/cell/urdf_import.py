@@ -18,9 +18,9 @@ import numpy as np
 from opl.cell.full_turns import FULL_TURN, angular_distance
 from opl.cell.inverse_kinematics import Arm, inverse_kinematics, singularity_margins
 from opl.cell.parallel_axes import ParallelAxesArm
-from opl.cell.recognise import RecognisedArm, recognise
 from opl.cell.robot import Robot, forward_kinematics, load_robot
 from opl.cell.robot_file import FROM_URDF
+from opl.cell.urdf_arm import UrdfArm, arm_of_urdf
 from opl.cell.urdf_tree import UrdfTree
 from opl.cell.xacro_file import SUFFIX, expand
 from opl.errors import InputError
@@ -106,13 +106,13 @@ def import_urdf(
     return ImportedRobot(robot, files, closure, tuple(cautions))
 
 
-def _read(urdf: Path) -> tuple[UrdfTree, RecognisedArm]:
+def _read(urdf: Path) -> tuple[UrdfTree, UrdfArm]:
     if urdf.suffix != SUFFIX:
-        return UrdfTree(urdf), recognise(urdf)
+        return UrdfTree(urdf), arm_of_urdf(urdf)
     with TemporaryDirectory() as scratch:
         plain = Path(scratch) / "arm.urdf"
         plain.write_text(expand(urdf), encoding="utf-8")
-        return UrdfTree(plain, urdf), recognise(plain, urdf)
+        return UrdfTree(plain, urdf), arm_of_urdf(plain, urdf)
 
 
 def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:
@@ -134,7 +134,7 @@ def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:
     return float(np.abs(forward_kinematics(robot, found[exists]) - wanted).max())
 
 
-def _doubts(found: RecognisedArm) -> Iterator[str]:
+def _doubts(found: UrdfArm) -> Iterator[str]:
     """Yield what looks like a placeholder."""
     names = found.joint_names
     for name, speed in zip(names, found.max_speed, strict=True):
@@ -155,7 +155,7 @@ def _doubts(found: RecognisedArm) -> Iterator[str]:
 
 
 def _robot_yaml(
-    found: RecognisedArm, name: str, maker: str, height: float, controller: Controller, urdf: str
+    found: UrdfArm, name: str, maker: str, height: float, controller: Controller, urdf: str
 ) -> str:
     """Return the text of ``robot.yaml``."""
     origin = [f"source: {urdf}", f"certainty: {FROM_URDF}"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from opl.cell.limits import Limit, broken, within
+from opl.cell.joint_limits import JointLimit
 from opl.cell.robot import Robot
 from opl.geometry.frames import Array, inverse, pose
 from opl.geometry.mesh import TriangleMesh
@@ -78,7 +78,7 @@ class WorkCell:
     contact_allowance: float
     required_clearance: float
     pairs: PairRules = field(default_factory=PairRules)
-    limits: tuple[Limit, ...] = ()
+    limits: tuple[JointLimit, ...] = ()
 
     @property
     def planned_allowance(self) -> float:
@@ -105,12 +105,19 @@ class WorkCell:
         )
 
     def within_limits(self, q: Array) -> np.ndarray:
-        """Return which postures, shape (..., 6) in [rad], keep every joint limit, shape (...)."""
-        return within(self.robot, self.limits, q)
+        """Return which postures, shape (..., 6) in [rad], keep every limit, shape (...)."""
+        kept = ((q >= self.robot.lower) & (q <= self.robot.upper)).all(axis=-1)
+        for limit in self.limits:
+            kept &= limit.holds(q)
+        return np.asarray(kept)
 
     def broken_limits(self, q: Array) -> list[str]:
-        """Return the names of the limits that postures, shape (..., 6) in [rad], break."""
-        return broken(self.robot, self.limits, q)
+        """Return the names of the limits that any of the postures, shape (..., 6), breaks."""
+        q = q.reshape(-1, 6)
+        beyond = ((q < self.robot.lower) | (q > self.robot.upper)).any(axis=0)
+        names = [self.robot.joint_names[joint] for joint in np.flatnonzero(beyond)]
+        names += [limit.name for limit in self.limits if not limit.holds(q).all()]
+        return list(dict.fromkeys(names))
 
     def Ts_base_flange(self, t: Array | float, Ts_workpiece_cutter: Array) -> Array:
         """Return the flange poses that bring cutter points onto contact positions.

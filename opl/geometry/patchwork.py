@@ -13,7 +13,7 @@ from opl.geometry.curves import MEETING, SurfaceCurve, joined
 from opl.geometry.frames import Array
 from opl.geometry.nurbs import NurbsSurface
 from opl.geometry.section import Section
-from opl.geometry.sections import section_curves
+from opl.geometry.section_curves import section_curves
 from opl.geometry.surface_grid import SurfaceGrid, extent_along, sample_grid
 from opl.geometry.trim import Trim, parts_inside
 

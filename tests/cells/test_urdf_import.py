@@ -10,9 +10,9 @@ import trimesh
 
 from opl.cell.collision import CollisionScene
 from opl.cell.drawing import drawn_arm
-from opl.cell.recognise import recognise
 from opl.cell.robot import controller_poses, forward_kinematics, known_robots, load_robot
 from opl.cell.robot_file import read_robot_file
+from opl.cell.urdf_arm import arm_of_urdf
 from opl.cell.urdf_import import import_urdf
 from opl.errors import InputError
 from opl.job.load import load
@@ -40,7 +40,7 @@ def wrist_origin(dx, dy):
 @pytest.mark.parametrize("name", known_robots())
 def test_our_own_robots_are_recognised(name, tmp_path):
     robot = load_robot(name)
-    found = recognise(robot.urdf)
+    found = arm_of_urdf(robot.urdf)
     assert type(found.arm) is type(robot.arm)
     known = asdict(replace(robot.arm, c1=robot.base_height))
     for key, value in asdict(found.arm).items():

@@ -30,7 +30,7 @@ _ANGLE = 2e-5  # [rad]
 
 
 @dataclass(frozen=True, eq=False)
-class RecognisedArm:
+class UrdfArm:
     """An arm as its URDF has it.
 
     Attributes:
@@ -48,7 +48,7 @@ class RecognisedArm:
     max_speed: Array
 
 
-def recognise(urdf: Path, source: Path | None = None) -> RecognisedArm:
+def arm_of_urdf(urdf: Path, source: Path | None = None) -> UrdfArm:
     """Return the closed form of the arm in a URDF, made from ``source`` if that is given.
 
     Raises:
@@ -84,7 +84,7 @@ def recognise(urdf: Path, source: Path | None = None) -> RecognisedArm:
     read_off = _parallel_axes if _parallel(axes[1], axes[3]) else _spherical_wrist
     arm = read_off(where, axes, points, flange)
     lower, upper = model.lowerPositionLimit, model.upperPositionLimit
-    return RecognisedArm(names, arm, lower.copy(), upper.copy(), model.velocityLimit.copy())
+    return UrdfArm(names, arm, lower.copy(), upper.copy(), model.velocityLimit.copy())
 
 
 def _spherical_wrist(
