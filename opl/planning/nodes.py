@@ -16,7 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
-from opl.cell.inverse import inverse, turns
+from opl.cell.full_turns import full_turns
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
@@ -81,9 +82,8 @@ def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) 
         contact_positions: M values of t.
     """
     robot = cell.robot
-    q = inverse_solutions(
-        cell, points.Ts_workpiece_cutter[:, None], contact_positions
-    )  # (N, M, 8, 6)
+    frames = points.Ts_workpiece_cutter[:, None]
+    q = inverse_solutions(cell, frames, contact_positions)  # (N, M, 8, 6)
     matrices = []
     for ik_branch in range(q.shape[2]):
         if np.isnan(q[:, :, ik_branch, 0]).all():
@@ -113,7 +113,9 @@ def inverse_solutions(
         Ts_workpiece_cutter: The cutter frames, shape (..., 4, 4).
         contact_positions: Where on the wheel each is ground, shape (...).
     """
-    return inverse(cell.robot.arm, cell.Ts_base_flange(contact_positions, Ts_workpiece_cutter))
+    return inverse_kinematics(
+        cell.robot.arm, cell.Ts_base_flange(contact_positions, Ts_workpiece_cutter)
+    )
 
 
 def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
@@ -133,7 +135,7 @@ def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
     sheet_turns: list[Array] = [np.zeros(1)] * 6
     copy_turns: list[Array] = [np.zeros(1)] * 6
     central: list[Array] = [np.zeros(1)] * 6
-    all_turns = turns(lower, upper)
+    all_turns = full_turns(lower, upper)
     for joint in range(6):
         counts = np.unique(all_turns[:, joint])
         if len(counts) == 1:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from opl.cell.inverse import turns
+from opl.cell.full_turns import full_turns
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.errors import NoFreeMoveError, NoPathError
 from opl.motion.links import Blocker
@@ -124,7 +124,7 @@ def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
     for position in np.unique(np.linspace(0, n_positions - 1, MOST_POSITIONS).astype(int)):
         q = problem.field.q[column, position]
         q = q[~np.isnan(q[:, 0])]
-        turned = q[:, None] + turns(robot.lower, robot.upper)
+        turned = q[:, None] + full_turns(robot.lower, robot.upper)
         within = cell.within_limits(turned)
         if not len(q):
             counts["out of reach"] += 1

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opl.cell.full_turns import nearest_turn
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion, Stretch
@@ -136,7 +137,7 @@ def _taken(problem: GrindingProblem, nodes: NodeMatrix, q: Array, before: np.nda
     added = q[:, nodes.position_index, nodes.ik_branch]
     near = nodes.q[before]
     near = np.where(np.isnan(near), nodes.q[before + 1], near)
-    added = added + 2.0 * np.pi * np.round((near - added) / (2.0 * np.pi))
+    added = nearest_turn(added, near)
     within = problem.cell.within_limits(added)
     return np.where(within[..., None], added, np.nan)
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from opl.cell.full_turns import nearest_turn
 from opl.geometry.frames import Array
 from opl.motion.path import GrindingPath
 from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
@@ -43,7 +44,7 @@ def tube(refined: RefinedProblem, path: GrindingPath, finer: Array) -> RefinedPr
         :, path.ik_branch
     ]
     # on the same count of turns as the path
-    q = q + 2.0 * np.pi * np.round((q_path[:, None] - q) / (2.0 * np.pi))
+    q = nearest_turn(q, q_path[:, None])
     q = np.where(problem.cell.within_limits(q)[..., None], q, np.nan)
     # to the bit what is known to be free
     q[np.arange(len(q)), np.searchsorted(np.flatnonzero(used), own)] = q_path
