@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from opl import documents
-from opl.cell.clearance import use_threads
+from opl.cell.wheel_distance import use_threads
 from opl.deliver import deliver
 from opl.errors import InputError, NoPathError, OplError, UnsafeError
 from opl.job.load import load

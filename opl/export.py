@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 from datetime import datetime, timezone
 
-import numpy as np
-
 from opl.errors import InputError
 from opl.geometry.frames import transform
+from opl.geometry.mesh import box_corners
 from opl.motion.motion import VerifiedMotion
 from opl.outcome import Outcome
 from opl.planning.problem import GrindingProblem
@@ -24,10 +23,10 @@ def write_program(outcome: Outcome, verified: VerifiedMotion) -> Program:
     job, found = outcome.job, outcome.verification
     assert found is not None
     vertices = transform(job.cell.T_flange_workpiece, job.cell.part.vertices)
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
     # what the proven path leaves of the allowed contact error
-    limit = StraightLimit(corners, job.search.max_contact_error - found.max_contact_error)
+    limit = StraightLimit(
+        box_corners(vertices), job.search.max_contact_error - found.max_contact_error
+    )
     program, files = write_files(
         verified, job.name, job.cell.robot, job.program, limit, job_date(), ["OPL"]
     )

@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 
-from opl.cell.clearance import PartTree, wheel_clearance
-from opl.cell.enclosure import enclosing_bodies
-from opl.cell.robot import forward
+from opl.cell.collision import enclosing_bodies
+from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import PartTree, signed_wheel_distance
 from opl.cell.workcell import PART, SECOND_OPINION_OF_A_LINK, WHEEL
 from opl.errors import InputError, NoFreeMoveError, NoPathError
 from opl.export import draw, job_date, write_program
@@ -138,8 +138,8 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
     hits = [*scene.collision.colliding_pairs(job.pace.home), *_part_near_wheel(job, scene.part)]
     if hits:
         pairs = ", ".join(" and ".join(pair) for pair in hits)
-        needed = f"{1e3 * job.cell.clearance:g} mm (clearance_mm)"
-        needed += " or their own clearance" if job.cell.pairs.clearances else ""
+        needed = f"{1e3 * job.cell.required_clearance:g} mm (clearance_mm)"
+        needed += " or their own clearance" if job.cell.pairs.required else ""
         told = f"at home these are nearer to each other than {needed} or collide: {pairs}"
         told += f"; links are planned {1e3 * SECOND_OPINION_OF_A_LINK:g} mm farther away"
         raise InputError(job.around.home_key, told)
@@ -149,9 +149,9 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
 def _part_near_wheel(job: Job, part: PartTree) -> list[tuple[str, str]]:
     """Return part and wheel if they are too near at home, where they do not touch on purpose."""
     home = job.pace.home[None]
-    Ts_contact0_workpiece = job.cell.Ts_contact0_workpiece(forward(job.cell.robot, home))
+    Ts_contact0_workpiece = job.cell.Ts_contact0_workpiece(forward_kinematics(job.cell.robot, home))
     needed = job.cell.part_from_wheel
-    distance = wheel_clearance(part, job.cell.wheel, Ts_contact0_workpiece, needed)[0]
+    distance = signed_wheel_distance(part, job.cell.wheel, Ts_contact0_workpiece, needed)[0]
     return [(PART, WHEEL)] if distance < needed else []
 
 

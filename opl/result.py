@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from opl.cell.inverse import branch_name
+from opl.cell.inverse_kinematics import ik_branch_name
 from opl.motion.feed import SlowStretch
 from opl.motion.figures import Figures
 from opl.outcome import Outcome
@@ -111,7 +111,7 @@ def _path(outcome: Outcome, plan: Plan | None) -> dict[str, Any] | None:
     return {
         "method": outcome.job.search.method.value,
         "objective": outcome.job.search.objective.value,
-        "branch": branch_name(path.ik_branch),
+        "branch": ik_branch_name(path.ik_branch),
         "joint_ranges_rad": _rounded(path.joint_ranges),
         "joint_range_sum_rad": _rounded(path.joint_range_sum),
         "joint_travel_rad": _rounded(path.joint_travel),

@@ -1,7 +1,7 @@
 """Whether robot, held part or fixture touch anything at a posture, by pinocchio and coal.
 
 Part against wheel is not asked here: that pair may touch, and has a closed form in
-`opl.cell.clearance`. A collision is a yes or a no, never a cost.
+`opl.cell.wheel_distance`. A collision is a yes or a no, never a cost.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from opl.cell.robot import forward_kinematics
 from opl.cell.workcell import (
     PART,
     SECOND_OPINION,
@@ -20,8 +21,8 @@ from opl.cell.workcell import (
     WHEEL,
     WorkCell,
 )
-from opl.geometry.frames import Array
-from opl.geometry.mesh import TriangleMesh
+from opl.geometry.frames import Array, inverse, transform
+from opl.geometry.mesh import TriangleMesh, winding_number
 from opl.geometry.shapes import Body, Box, Cylinder
 
 Pair = tuple[str, str]
@@ -189,8 +190,8 @@ class CollisionScene:
                     continue
                 # joint 0 is what does not move: next to the first link, but not its neighbour
                 held_at_wrist = apart == 1 and min(joints[first], joints[second]) > 0
-                usual = 0.0 if both_links or held_at_wrist else cell.clearance
-                margin = cell.pairs.needed(*pair, otherwise=usual)
+                usual = 0.0 if both_links or held_at_wrist else cell.required_clearance
+                margin = cell.pairs.between(*pair, otherwise=usual)
                 if margin is None:
                     continue
                 self._geometry.addCollisionPair(pin.CollisionPair(first, second))
@@ -204,6 +205,25 @@ class CollisionScene:
         if index < self._n_links:
             return str(self._model.frames[geometry.parentFrame].name)
         return str(geometry.name)
+
+
+def enclosing_bodies(cell: WorkCell, q: Array) -> list[tuple[str, str]]:
+    """Return flange or part with each obstacle they are inside of, at one posture, shape (6,).
+
+    Collisions with a mesh are collisions with its triangles: whoever is wholly inside touches none
+    of them. A motion that starts outside of a mesh and never meets its surface stays outside, so it
+    is enough to look at one posture.
+    """
+    T_base_flange = forward_kinematics(cell.robot, q)
+    p_base_part = transform(T_base_flange @ cell.T_flange_workpiece, cell.part.vertices[0])
+    points = {"flange": T_base_flange[:3, 3], PART: p_base_part}
+    return [
+        (name, body.name)
+        for body in cell.obstacles
+        if isinstance(body.shape, TriangleMesh) and body.shape.is_closed
+        for name, p_base in points.items()
+        if abs(winding_number(body.shape, transform(inverse(body.T_parent_body), p_base))) > 0.5
+    ]
 
 
 def _solid(body: Body) -> coal.CollisionGeometry:

@@ -9,7 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.inverse import turns
+from opl.cell.full_turns import full_turns, principal
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot import Robot
 from opl.cell.triangle import bend_to
@@ -92,10 +92,9 @@ def wrist_reach(robot: Robot, ahead: Array, up: Array) -> Array:
     forward, above = (np.reshape(v, (1, -1)) for v in (ahead - arm.a1, up - arm.c1))
     angles = bend_to(forward, above, arm.c2, forearm)
     theta = np.stack([angles[0], angles[1] - tilt], axis=-1)  # (2 elbows, n, 2)
-    q = (theta + np.array(arm.offsets[1:3])) * np.array(arm.signs[1:3])
-    q = np.remainder(q + np.pi, 2.0 * np.pi) - np.pi
+    q = principal((theta + np.array(arm.offsets[1:3])) * np.array(arm.signs[1:3]))
     lower, upper = robot.lower[1:3], robot.upper[1:3]
-    beyond = np.unique(turns(robot.lower, robot.upper)[:, 1:3], axis=0)
+    beyond = np.unique(full_turns(robot.lower, robot.upper)[:, 1:3], axis=0)
     margins = [np.minimum(q + turn - lower, upper - q - turn).min(axis=-1) for turn in beyond]
     away = np.hypot(forward, above)[0]
     to_end = np.minimum(arm.c2 + forearm - away, away - abs(arm.c2 - forearm))

@@ -109,7 +109,7 @@ class ParallelAxesArm:
         return theta1, theta2, theta3, theta4, theta5, np.arctan2(sin6, cos6)
 
     def margins(self, theta: Array) -> Array:
-        """Return how far angles, shape (..., 6), are from singularities; see `singularity`."""
+        """Return the figures of `singularity_margins` for angles in [rad], shape (..., 6)."""
         tilt = np.cumsum(theta[..., 1:4], axis=-1)
         ahead = self.a1 + np.sin(tilt) @ np.array([self.c2, self.c3, self.c4])
         return np.stack(

@@ -1,7 +1,7 @@
 """The robot: joints, limits, speeds and pulses from ``robots/<name>/``, and forward kinematics.
 
-Forward kinematics is pinocchio's, on the URDF. The closed form of `opl.cell.inverse` has its own
-numbers, in ``robot.yaml``; a robot whose two descriptions disagree is refused.
+Forward kinematics is pinocchio's, on the URDF. The closed form of `opl.cell.inverse_kinematics` has
+its own numbers, in ``robot.yaml``; a robot whose two descriptions disagree is refused.
 
 Base frame of every robot that comes with opl, whatever its maker counts from: on axis 1 at the
 height of axis 2, z up, x ahead. So a cell stays as it is when another arm takes its place.
@@ -18,7 +18,8 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
-from opl.cell.inverse import Arm, inverse
+from opl.cell.full_turns import angular_distance
+from opl.cell.inverse_kinematics import Arm, inverse_kinematics
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot_file import N_JOINTS, RobotFile, read_robot_file
 from opl.cell.spherical_wrist import SphericalWristArm
@@ -144,7 +145,7 @@ def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
     return robot
 
 
-def forward(robot: Robot, q: Array) -> Array:
+def forward_kinematics(robot: Robot, q: Array) -> Array:
     """Return the flange poses Ts_base_flange of postures.
 
     Args:
@@ -168,9 +169,9 @@ def forward(robot: Robot, q: Array) -> Array:
 def controller_poses(robot: Robot, q: Array) -> Array:
     """Return the flange poses of postures as the maker's controller counts them.
 
-    As `forward`, from the controller's own base frame instead of opl's.
+    As `forward_kinematics`, from the controller's own base frame instead of opl's.
     """
-    return robot.T_controller_base @ forward(robot, q)
+    return robot.T_controller_base @ forward_kinematics(robot, q)
 
 
 def link_names(robot: Robot) -> tuple[str, ...]:
@@ -209,8 +210,8 @@ def _arm_fits_urdf(robot: Robot) -> bool:
     """Return whether the closed form finds postures again that the URDF was put in."""
     fractions = np.array([[0.3, 0.6, 0.4, 0.7, 0.2, 0.6], [0.8, 0.3, 0.7, 0.4, 0.6, 0.3]])
     q = robot.lower + fractions * (robot.upper - robot.lower)  # any two
-    difference = inverse(robot.arm, forward(robot, q), q) - q[:, None]
-    distance = np.abs(np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
+    found = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)
+    distance = angular_distance(found, q[:, None]).max(axis=-1)
     # some URDFs round right angles to seven digits
     return bool((distance < 1e-5).any(axis=-1).all())
 

@@ -95,7 +95,7 @@ class SphericalWristArm:
         )
 
     def margins(self, theta: Array) -> Array:
-        """Return how far angles, shape (..., 6), are from singularities; see `singularity`."""
+        """Return the figures of `singularity_margins` for angles in [rad], shape (..., 6)."""
         forearm, bend = np.hypot(self.a2, self.c3), np.arctan2(self.a2, self.c3)
         ahead = (
             self.a1

@@ -15,12 +15,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from opl.cell.inverse import Arm, inverse
+from opl.cell.full_turns import FULL_TURN, angular_distance
+from opl.cell.inverse_kinematics import Arm, inverse_kinematics, singularity_margins
 from opl.cell.parallel_axes import ParallelAxesArm
-from opl.cell.recognise import RecognisedArm, recognise
-from opl.cell.robot import Robot, forward, load_robot
+from opl.cell.robot import Robot, forward_kinematics, load_robot
 from opl.cell.robot_file import FROM_URDF
-from opl.cell.singularity import singularity_margins
+from opl.cell.urdf_arm import UrdfArm, arm_of_urdf
 from opl.cell.urdf_tree import UrdfTree
 from opl.cell.xacro_file import SUFFIX, expand
 from opl.errors import InputError
@@ -106,13 +106,13 @@ def import_urdf(
     return ImportedRobot(robot, files, closure, tuple(cautions))
 
 
-def _read(urdf: Path) -> tuple[UrdfTree, RecognisedArm]:
+def _read(urdf: Path) -> tuple[UrdfTree, UrdfArm]:
     if urdf.suffix != SUFFIX:
-        return UrdfTree(urdf), recognise(urdf)
+        return UrdfTree(urdf), arm_of_urdf(urdf)
     with TemporaryDirectory() as scratch:
         plain = Path(scratch) / "arm.urdf"
         plain.write_text(expand(urdf), encoding="utf-8")
-        return UrdfTree(plain, urdf), recognise(plain, urdf)
+        return UrdfTree(plain, urdf), arm_of_urdf(plain, urdf)
 
 
 def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:
@@ -122,19 +122,19 @@ def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:
     where rounded right angles move joints far, that is not asked.
     """
     q = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (n, 6))
-    Ts_base_flange = forward(robot, q)
-    found = inverse(robot.arm, Ts_base_flange)
-    apart = np.abs(np.remainder(found - q[:, None] + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
+    Ts_base_flange = forward_kinematics(robot, q)
+    found = inverse_kinematics(robot.arm, Ts_base_flange)
+    apart = angular_distance(found, q[:, None]).max(axis=-1)
     regular = singularity_margins(robot.arm, q).min(axis=-1) > 0.02
     nearest = np.where(np.isnan(apart), np.inf, apart).min(axis=1)
     if not (nearest[regular] < 1e-2).all():
         return float("inf")
     exists = ~np.isnan(found).any(axis=-1)
     wanted = np.broadcast_to(Ts_base_flange[:, None], (*exists.shape, 4, 4))[exists]
-    return float(np.abs(forward(robot, found[exists]) - wanted).max())
+    return float(np.abs(forward_kinematics(robot, found[exists]) - wanted).max())
 
 
-def _doubts(found: RecognisedArm) -> Iterator[str]:
+def _doubts(found: UrdfArm) -> Iterator[str]:
     """Yield what looks like a placeholder."""
     names = found.joint_names
     for name, speed in zip(names, found.max_speed, strict=True):
@@ -143,7 +143,7 @@ def _doubts(found: RecognisedArm) -> Iterator[str]:
     # no arm turns these all round, unless its axes 2 to 4 are parallel
     for k in () if isinstance(found.arm, ParallelAxesArm) else (1, 4):
         low, high = found.lower[k], found.upper[k]
-        if high - low > 2.0 * np.pi - 1e-3:
+        if high - low > FULL_TURN - 1e-3:
             yield (
                 f"{names[k]}: limits {np.rad2deg(low):.0f} to {np.rad2deg(high):.0f} deg look like "
                 "a placeholder; see the data sheet"
@@ -155,7 +155,7 @@ def _doubts(found: RecognisedArm) -> Iterator[str]:
 
 
 def _robot_yaml(
-    found: RecognisedArm, name: str, maker: str, height: float, controller: Controller, urdf: str
+    found: UrdfArm, name: str, maker: str, height: float, controller: Controller, urdf: str
 ) -> str:
     """Return the text of ``robot.yaml``."""
     origin = [f"source: {urdf}", f"certainty: {FROM_URDF}"]

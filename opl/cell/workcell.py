@@ -1,13 +1,13 @@
-"""The cell as a value: robot, wheel, held part and everything that stands around."""
+"""The cell as a value: robot, wheel, held part, what stands around, and how far apart all stay."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from opl.cell.limits import Limit, broken, within
-from opl.cell.pairs import PairRules
+from opl.cell.joint_limits import JointLimit
 from opl.cell.robot import Robot
 from opl.geometry.frames import Array, inverse, pose
 from opl.geometry.mesh import TriangleMesh
@@ -20,6 +20,36 @@ PART = "part"
 # differ by 0.08 mm at the rim of the wheel, and it is held to rounding the edges of a link
 SECOND_OPINION = 1e-4
 SECOND_OPINION_OF_A_LINK = 1e-3
+
+PairOfNames = frozenset[str]
+
+
+@dataclass(frozen=True)
+class PairRules:
+    """What is said of single pairs, by the names of links and bodies.
+
+    Attributes:
+        allowed: Pairs that may touch; they are not looked at.
+        required: Distance in [m] that a pair must keep, instead of that of the cell.
+    """
+
+    allowed: frozenset[PairOfNames] = frozenset()
+    required: Mapping[PairOfNames, float] = field(default_factory=dict)
+
+    def between(self, first: str, second: str, otherwise: float) -> float | None:
+        """Return how far two bodies must stay apart in [m], None if they may touch.
+
+        Args:
+            first: Name of one.
+            second: Name of the other.
+            otherwise: The distance if nothing is said of this pair, in [m].
+        """
+        pair = frozenset((first, second))
+        return None if pair in self.allowed else self.required.get(pair, otherwise)
+
+    def widened(self, by: float) -> PairRules:
+        """Return rules that ask for so much more distance in [m]."""
+        return replace(self, required={pair: far + by for pair, far in self.required.items()})
 
 
 @dataclass(frozen=True)
@@ -34,7 +64,7 @@ class WorkCell:
         fixture: Bodies between flange and part, given in the flange frame.
         T_flange_workpiece: How the fixture holds the part, shape (4, 4).
         contact_allowance: How deep the part may sink into the belt in [m].
-        clearance: Distance to keep from everything else in [m].
+        required_clearance: Distance to keep from everything else in [m].
         pairs: The pairs that keep another distance, or none.
         limits: Limits of joints and sums of joints beside the robot's own.
     """
@@ -46,9 +76,9 @@ class WorkCell:
     fixture: tuple[Body, ...]
     T_flange_workpiece: Array
     contact_allowance: float
-    clearance: float
+    required_clearance: float
     pairs: PairRules = field(default_factory=PairRules)
-    limits: tuple[Limit, ...] = ()
+    limits: tuple[JointLimit, ...] = ()
 
     @property
     def planned_allowance(self) -> float:
@@ -62,21 +92,32 @@ class WorkCell:
     @property
     def part_from_wheel(self) -> float:
         """Distance that the part keeps from the wheel on free moves in [m]."""
-        needed = self.pairs.needed(PART, WHEEL, self.clearance)
+        needed = self.pairs.between(PART, WHEEL, self.required_clearance)
         assert needed is not None, "the belt has its own allowance"
         return needed
 
     def widened(self, by: float) -> WorkCell:
         """Return a cell in which everything must stay so much farther apart, in [m]."""
-        return replace(self, clearance=self.clearance + by, pairs=self.pairs.widened(by))
+        return replace(
+            self,
+            required_clearance=self.required_clearance + by,
+            pairs=self.pairs.widened(by),
+        )
 
     def within_limits(self, q: Array) -> np.ndarray:
-        """Return which postures, shape (..., 6) in [rad], keep every joint limit, shape (...)."""
-        return within(self.robot, self.limits, q)
+        """Return which postures, shape (..., 6) in [rad], keep every limit, shape (...)."""
+        kept = ((q >= self.robot.lower) & (q <= self.robot.upper)).all(axis=-1)
+        for limit in self.limits:
+            kept &= limit.holds(q)
+        return np.asarray(kept)
 
     def broken_limits(self, q: Array) -> list[str]:
-        """Return the names of the limits that postures, shape (..., 6) in [rad], break."""
-        return broken(self.robot, self.limits, q)
+        """Return the names of the limits that any of the postures, shape (..., 6), breaks."""
+        q = q.reshape(-1, 6)
+        beyond = ((q < self.robot.lower) | (q > self.robot.upper)).any(axis=0)
+        names = [self.robot.joint_names[joint] for joint in np.flatnonzero(beyond)]
+        names += [limit.name for limit in self.limits if not limit.holds(q).all()]
+        return list(dict.fromkeys(names))
 
     def Ts_base_flange(self, t: Array | float, Ts_workpiece_cutter: Array) -> Array:
         """Return the flange poses that bring cutter points onto contact positions.

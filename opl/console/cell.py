@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from opl.cell.limits import Limit
+from opl.cell.joint_limits import JointLimit
 from opl.cell.robot import Robot
 from opl.geometry.frames import Array, roll_pitch_yaw
 from opl.geometry.shapes import Body, Box, Cylinder
@@ -154,5 +154,5 @@ def _pair(pair: Names) -> str:
     return " and ".join(pair)
 
 
-def _limit(limit: Limit) -> str:
+def _limit(limit: JointLimit) -> str:
     return f"{limit.name} {np.rad2deg(limit.lower):g} to {np.rad2deg(limit.upper):g} deg"

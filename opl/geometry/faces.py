@@ -14,7 +14,7 @@ from opl.geometry.frames import Array
 from opl.geometry.machined import CAD, MESHES, NURBS
 from opl.geometry.mesh import TriangleMesh, load_triangles
 from opl.geometry.mesh_surface import MeshSurface
-from opl.geometry.passes import MachinedSurface
+from opl.geometry.passes import MachinedSurface, bounding_box
 from opl.geometry.patchwork import Face, Patchwork
 from opl.geometry.regions import smooth_regions
 from opl.geometry.surface_file import load_faces
@@ -108,7 +108,7 @@ def _mesh_faces(mesh: TriangleMesh, crease: float) -> list[FaceSummary]:
 
 
 def _summary(number: int, name: str, face: MachinedSurface, holes: int | None) -> FaceSummary:
-    low, high = np.array([face.extent_along(axis) for axis in np.eye(3)]).T
+    low, high = bounding_box(face)
     samples = face.area_samples(float((high - low).max()) / _LOOKS)
     area = float(samples.areas.sum())
     return FaceSummary(

@@ -12,7 +12,7 @@ from opl.findings import Finding, Level
 from opl.geometry.coverage import AreaSamples, lying_on_others, uncovered
 from opl.geometry.frames import rotation_angle
 from opl.geometry.mesh_surface import MeshSurface
-from opl.geometry.passes import LaidPasses, MachinedSurface, Order, Passes
+from opl.geometry.passes import LaidPasses, MachinedSurface, Order, Passes, bounding_box
 from opl.geometry.wheel import ContactWheel
 
 # normals that turn by more than this from one cutter point to the next jump [rad]
@@ -99,8 +99,8 @@ def inspect(
 
 def _spacing(surface: MachinedSurface, passes: Passes) -> float:
     """Return how far apart in [m] the area is looked at."""
-    extents = [np.ptp(surface.extent_along(axis)) for axis in np.eye(3)]
-    return max(passes.pitch / _LOOKS_PER_PITCH, float(max(extents)) / _MOST_LOOKS)
+    longest = float(np.ptp(bounding_box(surface), axis=0).max())
+    return max(passes.pitch / _LOOKS_PER_PITCH, longest / _MOST_LOOKS)
 
 
 def _hollows(laid: LaidPasses, wheel: ContactWheel, allowance: float) -> Iterator[_Doubt]:

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from opl.geometry.curvature import curvature_tensor
 from opl.geometry.curves import SurfaceCurve, curvature_jumps
 from opl.geometry.frames import Array, from_axes
 from opl.geometry.patchwork import Face
@@ -141,4 +140,4 @@ def _frames(face: Face, uv: Array, axis: int) -> Array:
 
 def _bending(face: Face, uv: Array, axis: int) -> Array:
     R = _frames(face, uv, axis)[:, :3, :3]
-    return face.outward * curvature_tensor(face.surface, uv, R[:, :, 0], R[:, :, 1])
+    return face.outward * face.surface.curvature_tensor(uv, R[:, :, 0], R[:, :, 1])

@@ -70,6 +70,30 @@ class TriangleMesh:
         return float(np.sum(np.cross(a, b) * c) / 6.0)
 
 
+def winding_number(mesh: TriangleMesh, point: Array) -> float:
+    """Return how often a surface winds around a point: 1 in a solid, 0 outside, a part if open.
+
+    It is the sum of the solid angles of its triangles (Van Oosterom and Strackee, The Solid Angle
+    of a Plane Triangle, 1983), over that of a whole sphere.
+
+    Args:
+        mesh: The surface.
+        point: In [m], shape (3,).
+    """
+    a, b, c = np.moveaxis(mesh.triangles - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
+    volume = np.sum(a * np.cross(b, c), axis=1)
+    ab, bc, ca = (np.sum(p * q, axis=1) for p, q in ((a, b), (b, c), (c, a)))
+    angles = 2.0 * np.arctan2(volume, la * lb * lc + ab * lc + bc * la + ca * lb)
+    return float(angles.sum() / (4.0 * np.pi))
+
+
+def box_corners(points: Array) -> Array:
+    """Return the corners of the box around points in [m], along the axes, shape (8, 3)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    return np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+
+
 def load_mesh(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
     """Read a closed solid from an STL, PLY or OBJ file.
 

@@ -3,7 +3,7 @@
 Cutter points lie on the triangles themselves: they are as exact as the mesh. Normals are those of
 the smooth surface that the triangles stand for: at a corner the mean of the triangles around it,
 weighted with angle and area, and in between interpolated. They differ from the true ones by no more
-than neighbouring triangles differ from each other (`MeshSurface.largest_turn`).
+than neighbouring triangles differ from each other.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh, load_triangles
 from opl.geometry.mesh_curves import MeshCurve, plane_polylines
 from opl.geometry.patchwork import in_order
-from opl.geometry.regions import face_normals, neighbours, smooth_regions
+from opl.geometry.regions import face_normals, smooth_regions
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +77,6 @@ class MeshSurface:
             np.add.at(total, faces[:, k], areas[:, None, None] * tensors)
             np.add.at(weight, faces[:, k], areas)
         return total / np.where(weight > 0.0, weight, 1.0)[:, None, None]
-
-    @cached_property
-    def largest_turn(self) -> float:
-        """Largest angle in [rad] between neighbouring triangles."""
-        pairs, _ = neighbours(self.mesh.faces)
-        flat, _ = face_normals(self.mesh)
-        chord = np.linalg.norm(flat[pairs[:, 0]] - flat[pairs[:, 1]], axis=1)
-        return float(2.0 * np.arcsin(0.5 * chord.max(initial=0.0)))
 
     @cached_property
     def facet_error(self) -> float:

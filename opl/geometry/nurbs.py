@@ -154,32 +154,33 @@ class NurbsSurface:
         S = self.derivatives(uv, 1)
         return self.unit_normal(uv, S)
 
-    def principal_curvatures(self, uv: Array, S: Array | None = None) -> Array:
-        """Return the smallest and the largest normal curvature in [1/m], shape (..., 2).
+    def curvature_tensor(self, uv: Array, x: Array, y: Array) -> Array:
+        """Return the second fundamental form in two orthonormal tangent directions.
 
-        They are the eigenvalues of the second fundamental form in the first (do Carmo, Differential
-        Geometry of Curves and Surfaces, section 3.3). Where the surface bends away from du x dv, as
-        a ball does from its outward normal, they are positive.
+        The diagonal holds the normal curvatures along x and y (do Carmo, Differential Geometry of
+        Curves and Surfaces, section 3.2), positive where the surface bends away from du x dv, as a
+        ball does from its outward normal.
 
         Args:
             uv: Parameters, shape (..., 2).
-            S: What `derivatives` of order 2 returned for them, if that is known.
+            x: First unit tangent, shape (..., 3).
+            y: Second unit tangent, normal to the first, shape (..., 3).
+
+        Returns:
+            Symmetric matrices in [1/m], with respect to the normal du x dv, shape (..., 2, 2).
 
         Raises:
             DegenerateNormalError: Where the surface has no normal.
         """
-        if S is None:
-            S = self.derivatives(uv, 2)
+        S = self.derivatives(uv, 2)
         n = self.unit_normal(uv, S)
-        du, dv = S[..., 1, 0, :], S[..., 0, 1, :]
-        E, F, G = (np.sum(a * b, axis=-1) for a, b in ((du, du), (du, dv), (dv, dv)))
-        # sign turned: positive means bending away from the normal
+        tangents = np.stack([S[..., 1, 0, :], S[..., 0, 1, :]], axis=-2)
+        first = tangents @ np.swapaxes(tangents, -1, -2)
+        # of each direction the components along du and dv
+        mixed = np.linalg.solve(first, tangents @ np.stack([x, y], axis=-1))
         L, M, N = (-np.sum(S[..., k, m, :] * n, axis=-1) for k, m in ((2, 0), (1, 1), (0, 2)))
-        area_squared = E * G - F * F
-        mean = (E * N - 2.0 * F * M + G * L) / (2.0 * area_squared)
-        gauss = (L * N - M * M) / area_squared
-        half_difference = np.sqrt(np.maximum(mean * mean - gauss, 0.0))
-        return np.stack([mean - half_difference, mean + half_difference], axis=-1)
+        second = np.stack([np.stack([L, M], axis=-1), np.stack([M, N], axis=-1)], axis=-2)
+        return np.swapaxes(mixed, -1, -2) @ second @ mixed
 
     def unit_normal(self, uv: Array, S: Array) -> Array:
         """Return the unit normals of known derivatives.

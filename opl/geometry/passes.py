@@ -61,6 +61,11 @@ class MachinedSurface(Protocol):
         """Return curvature in [1/m] across the rows, and cosine of planes' normal to surface."""
 
 
+def bounding_box(surface: MachinedSurface) -> Array:
+    """Return the least and the largest x, y, z of a surface in [m], shape (2, 3)."""
+    return np.array([surface.extent_along(axis) for axis in np.eye(3)]).T
+
+
 @dataclass(frozen=True)
 class Passes:
     """How a surface is cut into passes; lengths in [m].

@@ -9,12 +9,11 @@ from functools import cached_property
 import numpy as np
 
 from opl.geometry.coverage import AreaSamples
-from opl.geometry.curvature import curvature_tensor
 from opl.geometry.curves import MEETING, SurfaceCurve, joined
 from opl.geometry.frames import Array
 from opl.geometry.nurbs import NurbsSurface
 from opl.geometry.section import Section
-from opl.geometry.sections import section_curves
+from opl.geometry.section_curves import section_curves
 from opl.geometry.surface_grid import SurfaceGrid, extent_along, sample_grid
 from opl.geometry.trim import Trim, parts_inside
 
@@ -177,7 +176,7 @@ class Patchwork:
             cut = slope > 0.05
             x = x[cut] / slope[cut, None]
             y = np.cross(samples.normals[cut], x)
-            tensor = face.outward * curvature_tensor(face.surface, samples.uv[cut], x, y)
+            tensor = face.outward * face.surface.curvature_tensor(samples.uv[cut], x, y)
             curvatures.append(tensor[:, 1, 1])
             slopes.append(slope[cut])
         return np.concatenate(curvatures), np.concatenate(slopes)

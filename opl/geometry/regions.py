@@ -18,22 +18,15 @@ def face_normals(mesh: TriangleMesh) -> tuple[Array, Array]:
     return normals / lengths[:, None], 0.5 * lengths
 
 
-def neighbours(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pairs of triangles that share an edge, and that edge.
-
-    Args:
-        faces: Vertices of each triangle, shape (m, 3).
-
-    Returns:
-        Indices of both triangles, shape (k, 2), and of the edge's vertices, shape (k, 2).
-    """
+def neighbours(faces: np.ndarray) -> np.ndarray:
+    """Return the pairs of triangles, vertices of shape (m, 3), that share an edge; shape (k, 2)."""
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(len(faces)), 3)
     order = np.lexsort(edges.T[::-1])
     edges, owner = edges[order], owner[order]
     same = (edges[1:] == edges[:-1]).all(axis=1)
     # where three triangles meet the first pairs are as good as any
-    return np.stack([owner[:-1][same], owner[1:][same]], axis=1), edges[:-1][same]
+    return np.stack([owner[:-1][same], owner[1:][same]], axis=1)
 
 
 def smooth_regions(mesh: TriangleMesh, crease: float) -> np.ndarray:
@@ -46,7 +39,7 @@ def smooth_regions(mesh: TriangleMesh, crease: float) -> np.ndarray:
         crease: Angle in [rad] between two normals that makes an edge a crease.
     """
     normals, areas = face_normals(mesh)
-    pairs, _ = neighbours(mesh.faces)
+    pairs = neighbours(mesh.faces)
     cosine = np.sum(normals[pairs[:, 0]] * normals[pairs[:, 1]], axis=1)
     first, second = pairs[cosine >= np.cos(crease)].T
     graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(areas), len(areas)))

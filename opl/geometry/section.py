@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.geometry.curvature import curvature_tensor
 from opl.geometry.frames import Array, from_axes
 from opl.geometry.nurbs import NurbsSurface
 
@@ -64,7 +63,7 @@ class Section:
     def bending(self, uv: Array) -> Array:
         """Return the curvature in [1/m] in the frames' axes x and y, shape (k, 2, 2)."""
         R = self.frames(uv)[:, :3, :3]
-        return self.outward * curvature_tensor(self.surface, uv, R[:, :, 0], R[:, :, 1])
+        return self.outward * self.surface.curvature_tensor(uv, R[:, :, 0], R[:, :, 1])
 
     def closest(self, uv: Array, targets: Array, tangents: Array) -> Array:
         """Return the parameters of the points of the section abreast of given points.

@@ -59,15 +59,6 @@ def load_faces(path: Path) -> tuple[Face, ...]:
     return (_face(path, documents.read(path, _SurfaceFile), ""),)
 
 
-def load_surface(path: Path) -> NurbsSurface:
-    """Read the surface of a file that holds a single face; see `load_faces`.
-
-    Raises:
-        InputError: If the file cannot be read or does not hold a surface.
-    """
-    return load_faces(path)[0].surface
-
-
 def _face(path: Path, content: _SurfaceFile, key: str) -> Face:
     for name in ("control_points_mm", "weights"):
         lengths = [len(row) for row in getattr(content, name)]

@@ -76,7 +76,7 @@ class ContactWheel:
         """Return the contact frame at contact position t in the base frame, shape (..., 4, 4)."""
         return self.T_base_contact0 @ self.T_contact0_contact(t)
 
-    def clearance(self, p_contact0: Array) -> Array:
+    def signed_distance(self, p_contact0: Array) -> Array:
         """Return the signed distance of points to the wheel in [m], negative inside.
 
         Exact for the finite cylinder of this width and radius.

@@ -11,10 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from opl.cell.limits import Limit
-from opl.cell.pairs import PairRules
+from opl.cell.joint_limits import JointLimit
 from opl.cell.robot import Robot
-from opl.cell.workcell import WorkCell
+from opl.cell.workcell import PairRules, WorkCell
 from opl.errors import InputError
 from opl.geometry.frames import Array
 from opl.geometry.shapes import Body
@@ -49,7 +48,7 @@ class Surroundings:
     gripper: tuple[Body, ...]
     clearance: float
     pairs: PairRules
-    limits: tuple[Limit, ...]
+    limits: tuple[JointLimit, ...]
     home: Array
     home_key: str
     wheel_key: str

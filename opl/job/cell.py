@@ -15,7 +15,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
-from opl.cell.limits import Limit
+from opl.cell.joint_limits import JointLimit
 from opl.cell.robot import Robot, link_names, load_robot
 from opl.cell.workcell import PART, WHEEL, wheel_solid
 from opl.documents import Document, read
@@ -101,7 +101,7 @@ class Cell:
     gripper: tuple[Body, ...]
     clearance: float
     said: SaidOfPairs
-    limits: tuple[Limit, ...]
+    limits: tuple[JointLimit, ...]
     home: Array | None
 
     def pick(self, name: str | None, where: str) -> PlacedWheel:
@@ -216,7 +216,7 @@ def _require_names(path: Path, file: CellFile, robot: Robot) -> None:
         )
 
 
-def _limits(path: Path, file: CellFile, robot: Robot) -> tuple[Limit, ...]:
+def _limits(path: Path, file: CellFile, robot: Robot) -> tuple[JointLimit, ...]:
     limits = []
     for place, one in enumerate(file.joint_limits):
         where = f"{path}: joint_limits.{place}"
@@ -244,9 +244,9 @@ def _joint(robot: Robot, name: str, where: str) -> int:
     return robot.joint_names.index(name)
 
 
-def _limit(name: str, coefficients: Array, limits: _Range) -> Limit:
+def _limit(name: str, coefficients: Array, limits: _Range) -> JointLimit:
     lower, upper = np.deg2rad([limits.lower_deg, limits.upper_deg])
-    return Limit(name, coefficients, float(lower), float(upper))
+    return JointLimit(name, coefficients, float(lower), float(upper))
 
 
 def _sum(coefficients: dict[str, float]) -> str:

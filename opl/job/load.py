@@ -80,7 +80,7 @@ def load(path: Path, method: str | None = None) -> Job:
         fixture=fixture,
         T_flange_workpiece=pose_of(file.fixture.T_flange_workpiece_mm),
         contact_allowance=around.placed.contact_allowance,
-        clearance=around.clearance,
+        required_clearance=around.clearance,
         pairs=around.pairs,
         limits=around.limits,
     )

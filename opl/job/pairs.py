@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
-from opl.cell.pairs import PairRules
-from opl.cell.workcell import PART, WHEEL
+from opl.cell.workcell import PART, WHEEL, PairRules
 from opl.errors import InputError
 
 ROBOT = "robot"  # every link

@@ -12,10 +12,9 @@ from opl.documents import Document
 from opl.errors import InputError
 from opl.geometry.machined import CAD, MESHES, load_machined
 from opl.geometry.mesh import TriangleMesh, load_mesh
-from opl.geometry.outside import facing_inward
 from opl.geometry.passes import Kind, MachinedSurface, Order, Passes
 from opl.geometry.scallop import row_pitch
-from opl.geometry.size import check_sizes
+from opl.geometry.surface_on_solid import check_sizes, facing_inward
 
 MM = 1e-3
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from opl.cell.inverse import inverse
+from opl.cell.full_turns import principal
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
@@ -195,14 +196,11 @@ def lead(
     T_base_flange = cell.Ts_base_flange(contact_position, points.Ts_workpiece_cutter[column])
     T_contact_flange = np.linalg.solve(T_base_contact, T_base_flange)
     Ts_base_flange = T_base_contact @ T_contact_away @ T_contact_flange
-    solutions = inverse(cell.robot.arm, Ts_base_flange, q_contact)[:, ik_branch]
+    solutions = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_contact)[:, ik_branch]
     if np.isnan(solutions).any():
         raise UnreachableApproachError(column, "reach")
-    q = q_contact + np.cumsum(
-        np.remainder(np.diff(solutions, axis=0, prepend=q_contact[None]) + np.pi, 2 * np.pi)
-        - np.pi,
-        axis=0,
-    )
+    steps = principal(np.diff(solutions, axis=0, prepend=q_contact[None]))
+    q = q_contact + np.cumsum(steps, axis=0)
     if not cell.within_limits(q).all():
         names = " ".join(cell.broken_limits(q))
         raise UnreachableApproachError(column, f"limits of {names}")

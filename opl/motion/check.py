@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.clearance import PartTree, wheel_clearance
 from opl.cell.collision import CollisionScene
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import PartTree, signed_wheel_distance
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.motion.motion import FREE_MOVES, Motion
@@ -65,11 +65,11 @@ def find_faults(
         motion: The motion.
     """
     q, move = densify(motion.q, RESOLUTION)
-    Ts_base_flange = forward(cell.robot, q)
+    Ts_base_flange = forward_kinematics(cell.robot, q)
     free_move = np.array([stretch in FREE_MOVES for stretch in motion.stretch])
     needed = np.where(free_move[move], cell.part_from_wheel, -cell.planned_allowance)
     Ts_contact0_workpiece = cell.Ts_contact0_workpiece(Ts_base_flange)
-    cuts = wheel_clearance(part, cell.wheel, Ts_contact0_workpiece, needed) < needed
+    cuts = signed_wheel_distance(part, cell.wheel, Ts_contact0_workpiece, needed) < needed
     # a move that is refused for the wheel need not be asked about the rest
     ask = ~np.isin(move, move[cuts])
     hits = np.zeros(len(q), dtype=bool)

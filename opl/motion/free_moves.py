@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from opl.cell.clearance import PartTree, wheel_clearance
 from opl.cell.collision import CollisionScene, Pair
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import PartTree, signed_wheel_distance
 from opl.cell.workcell import PART, SECOND_OPINION, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.motion.check import RESOLUTION, densify
@@ -99,17 +99,19 @@ class FreeMoves:
         """Return at which postures, shape (n, 6), the part does not keep away from the wheel."""
         needed = self._cell.part_from_wheel + SECOND_OPINION + reserve
         wheel = self._cell.wheel
-        Ts_contact0_workpiece = self._cell.Ts_contact0_workpiece(forward(self._cell.robot, q))
+        Ts_contact0_workpiece = self._cell.Ts_contact0_workpiece(
+            forward_kinematics(self._cell.robot, q)
+        )
         R, p = (
             Ts_contact0_workpiece[:, :3, :3].swapaxes(1, 2),
             Ts_contact0_workpiece[:, None, :3, 3],
         )
-        near = np.asarray((wheel.clearance(self._corners @ R + p) < needed).any(axis=1))
+        near = np.asarray((wheel.signed_distance(self._corners @ R + p) < needed).any(axis=1))
         centres = self._spheres[:, :3] @ R[~near] + p[~near]
-        doubtful = (wheel.clearance(centres) - self._spheres[:, 3] < needed).any(axis=1)
+        doubtful = (wheel.signed_distance(centres) - self._spheres[:, 3] < needed).any(axis=1)
         # few poses are left to be measured
         unknown = np.flatnonzero(~near)[doubtful]
-        clearance = wheel_clearance(self._part, wheel, Ts_contact0_workpiece[unknown], needed)
+        clearance = signed_wheel_distance(self._part, wheel, Ts_contact0_workpiece[unknown], needed)
         near[unknown] = clearance < needed
         return near
 

@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from opl.cell.clearance import PartTree
 from opl.cell.collision import CollisionScene
+from opl.cell.wheel_distance import PartTree
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.motion.free_moves import FreeMoves

@@ -78,7 +78,6 @@ def _block_link(
     index = int(motion.pass_index[move])
     after = len(track) if index < 0 else int(np.argmax(problem.points.pass_index == index))
     before = after - 1  # the cutter points on either side of the free move
-    start, goal = motion.q[move - 1], motion.q[move]
     if motion.stretch[move] is Stretch.LINK:
         kind, cause, home_end = FreeMove.BETWEEN_PASSES, str(error), None
     else:
@@ -87,28 +86,23 @@ def _block_link(
     if error.end in (None, home_end):
         matrix.cut_off[kind, error.pair] += 1
     if kind is FreeMove.TO_HOME:
-        for row in _joined(problem, matrix, Stretch.RETRACT, before, track[before], start):
+        for row in _joined(problem, matrix, Stretch.RETRACT, before, track[before]):
             matrix.block_node(before, row, cause)
     elif kind is FreeMove.FROM_HOME:
-        for row in _joined(problem, matrix, Stretch.APPROACH, after, track[after], goal):
+        for row in _joined(problem, matrix, Stretch.APPROACH, after, track[after]):
             matrix.block_node(after, row, cause)
     elif error.end == 0:
         matrix.block_node(before, track[before], f"retract: {cause}")
     elif error.end == 1:
         matrix.block_node(after, track[after], f"approach: {cause}")
     else:
-        from_rows = _joined(problem, matrix, Stretch.RETRACT, before, track[before], start)
-        to_rows = _joined(problem, matrix, Stretch.APPROACH, after, track[after], goal)
+        from_rows = _joined(problem, matrix, Stretch.RETRACT, before, track[before])
+        to_rows = _joined(problem, matrix, Stretch.APPROACH, after, track[after])
         matrix.block_edges(before, from_rows, to_rows, f"link: {cause}")
 
 
 def _joined(
-    problem: GrindingProblem,
-    matrix: OpenMatrix,
-    stretch: Stretch,
-    column: int,
-    row: int,
-    q_away: Array,
+    problem: GrindingProblem, matrix: OpenMatrix, stretch: Stretch, column: int, row: int
 ) -> list[int]:
     """Return the rows whose configurations off the wheel are joined to one of them by free moves.
 
@@ -118,17 +112,18 @@ def _joined(
         stretch: Whether they are off the wheel before it, approach, or after it, retract.
         column: The cutter point.
         row: A row, which is among those returned.
-        q_away: Its configuration at the end of approach or retract in [rad], shape (6,).
     """
     t = matrix.nodes.contact_position[column]
     free = np.flatnonzero(matrix.free[column])
-    found = [row]
+    found, q_row = [row], _away(problem, matrix, stretch, column, row)
     # outwards on either side, from each to the next that is joined
     for side in (free[t[free] > t[row]], free[t[free] < t[row]], free[t[free] == t[row]]):
-        last = q_away
+        last = q_row
         for other in side[np.argsort(np.abs(t[side] - t[row]), kind="stable")].tolist():
             q = _away(problem, matrix, stretch, column, other)
-            if other != row and q is not None and problem.scene.links.joined(last, q):
+            if other == row or q is None or last is None:
+                continue
+            if problem.scene.links.joined(last, q):
                 found.append(other)
                 last = q
     return found

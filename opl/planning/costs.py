@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.cell.collision import CollisionScene
-from opl.cell.singularity import singularity_margins
+from opl.cell.inverse_kinematics import singularity_margins
 from opl.geometry.frames import Array
 from opl.motion.figures import Figures
 from opl.planning.nodes import NodeMatrix

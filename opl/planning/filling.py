@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.inverse import inverse
-from opl.cell.robot import forward
+from opl.cell.full_turns import nearest_turn
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import forward_kinematics
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array, interpolate, transform
 from opl.geometry.toolpath import CutterPoints
@@ -111,8 +112,8 @@ def _solve(
     t = np.interp(place, columns, t_node)
     q_guess = np.stack([np.interp(place, columns, joint) for joint in q_node.T], axis=-1)
     Ts_base_flange = cell.Ts_base_flange(t, cutter_frames(points, place))
-    q = inverse(cell.robot.arm, Ts_base_flange, q_guess)[:, ik_branch]
-    q = q + 2.0 * np.pi * np.round((q_guess - q) / (2.0 * np.pi))
+    q = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_guess)[:, ik_branch]
+    q = nearest_turn(q, q_guess)
     at_node = place == np.floor(place)
     q[at_node] = q_node[place[at_node].astype(int)]
     lost = np.isnan(q).any(axis=1)
@@ -135,20 +136,20 @@ def _refuse_jumps(q: Array, place: Array, points: CutterPoints, max_joint_step: 
 def _contact_error_between(
     cell: WorkCell, points: CutterPoints, t_node: Array, place: Array, q: Array
 ) -> Array:
-    """Return how far the ground point is from its place on the wheel half-way to the next posture.
+    """Return how far the ground point is from its place on the wheel half-way to the next node.
 
     Args:
         cell: The cell.
         points: The cutter points.
         t_node: Contact position at each cutter point, shape (N,).
-        place: Fractional cutter point of each posture, shape (n,).
-        q: The postures in [rad], shape (n, 6).
+        place: Fractional cutter point of each configuration, shape (n,).
+        q: The configurations in [rad], shape (n, 6).
 
     Returns:
-        Distances in [m], shape (n - 1,); 0 where the step leaves the wheel.
+        Distances in [m], shape (n - 1,); 0 where the move leaves the wheel.
     """
     middle = (place[:-1] + place[1:]) / 2.0
-    T_base_flange = forward(cell.robot, (q[:-1] + q[1:]) / 2.0)
+    T_base_flange = forward_kinematics(cell.robot, (q[:-1] + q[1:]) / 2.0)
     p_workpiece = cutter_frames(points, middle)[:, :3, 3]
     p_base = transform(T_base_flange @ cell.T_flange_workpiece, p_workpiece)
     t = np.interp(middle, np.arange(len(t_node)), t_node)

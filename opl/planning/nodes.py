@@ -16,7 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
-from opl.cell.inverse import inverse, turns
+from opl.cell.full_turns import full_turns
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
@@ -61,7 +62,7 @@ class NodeField:
         contact_positions: The values of t, shape (M,).
         q: All inverse solutions as principal angles in [rad], NaN out of reach, shape
             (n_columns, M, 8, 6). Kept to tell reach from limits when nothing is left; without
-            columns where that is not asked.
+            columns where nobody needs to know.
         matrices: The matrices that have a node within the limits, in slot order.
     """
 
@@ -85,7 +86,8 @@ def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) 
         contact_positions: M values of t.
     """
     robot = cell.robot
-    q = solve(cell, points.Ts_workpiece_cutter[:, None], contact_positions)  # (N, M, 8, 6)
+    frames = points.Ts_workpiece_cutter[:, None]
+    q = inverse_solutions(cell, frames, contact_positions)  # (N, M, 8, 6)
     matrices = []
     for ik_branch in range(q.shape[2]):
         if np.isnan(q[:, :, ik_branch, 0]).all():
@@ -105,7 +107,9 @@ def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) 
     return NodeField(contact_positions, q, tuple(matrices))
 
 
-def solve(cell: WorkCell, Ts_workpiece_cutter: Array, contact_positions: Array) -> Array:
+def inverse_solutions(
+    cell: WorkCell, Ts_workpiece_cutter: Array, contact_positions: Array
+) -> Array:
     """Return every inverse solution in [rad], NaN where there is none, shape (..., 8, 6).
 
     Args:
@@ -113,11 +117,13 @@ def solve(cell: WorkCell, Ts_workpiece_cutter: Array, contact_positions: Array) 
         Ts_workpiece_cutter: The cutter frames, shape (..., 4, 4).
         contact_positions: Where on the wheel each is ground, shape (...).
     """
-    return inverse(cell.robot.arm, cell.Ts_base_flange(contact_positions, Ts_workpiece_cutter))
+    return inverse_kinematics(
+        cell.robot.arm, cell.Ts_base_flange(contact_positions, Ts_workpiece_cutter)
+    )
 
 
 def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
-    """Unroll the angles of one branch where they leave a gap.
+    """Unroll the angles of one branch of the inverse kinematics where they leave a gap.
 
     Args:
         q: Principal angles in [rad], NaN where there are none, shape (N, M, 6).
@@ -133,7 +139,7 @@ def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
     sheet_turns: list[Array] = [np.zeros(1)] * 6
     copy_turns: list[Array] = [np.zeros(1)] * 6
     central: list[Array] = [np.zeros(1)] * 6
-    all_turns = turns(lower, upper)
+    all_turns = full_turns(lower, upper)
     for joint in range(6):
         counts = np.unique(all_turns[:, joint])
         if len(counts) == 1:

@@ -48,7 +48,7 @@ class OpenMatrix:
         blocked: Keys of the edges that may not be used; grows.
         causes: How often each cause blocked something, by cutter point.
         cut_off: How many tracks, otherwise free, were refused for a free move: by which one, and
-            the pair that is in its way.
+            the pair of bodies that blocks it.
         reached: Largest number of columns that a search passed.
     """
 
@@ -115,7 +115,7 @@ class OpenMatrix:
 
 
 def open_matrices(problem: GrindingProblem) -> list[OpenMatrix]:
-    """Return every matrix of a problem, nothing blocked but what its nodes tell."""
+    """Return every matrix of a problem, nothing blocked yet but nodes that cut into the wheel."""
     matrices = []
     for nodes in problem.field.matrices:
         free = problem.free_nodes(nodes)

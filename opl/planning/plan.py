@@ -63,7 +63,7 @@ class Plan:
 
     Attributes:
         path: Configurations on the wheel.
-        motion: The whole motion, free of collision as far as the planner can tell.
+        motion: The whole motion, free of collision as far as the planner knows.
         checks: How many motions were checked, this one included.
         lower_bound: No path through the cutter points, at the contact positions that it holds for,
             has a smaller joint range sum, in [rad]; None if no bound was wanted.
@@ -142,7 +142,7 @@ def first_free(
 
     Raises:
         NoFreeMoveError: If nothing but its free moves stops the motion of some path.
-        NoPathError: If there is none for another reason; says where it ends and why.
+        NoPathError: If there is none for another reason; with place and reasons.
     """
     outcome = propose_and_check(problem, matrices, proposals)
     if isinstance(outcome, Found):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.clearance import wheel_clearance
+from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
@@ -104,7 +104,7 @@ def wheel_layer(
 ) -> Array:
     """Return the signed distance of the part to the wheel at nodes in [m], shape (N, M).
 
-    As in `wheel_clearance`: exact where it is less than the belt penetration permits.
+    As in `signed_wheel_distance`: exact where it is less than the belt penetration permits.
 
     Args:
         scene: The cell and its geometry.
@@ -121,5 +121,5 @@ def wheel_layer(
     Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[columns]
     layer = np.full(at.shape, -np.inf)
     allowed = -cell.planned_allowance
-    layer[at] = wheel_clearance(scene.part, cell.wheel, Ts_contact0_workpiece, allowed)
+    layer[at] = signed_wheel_distance(scene.part, cell.wheel, Ts_contact0_workpiece, allowed)
     return layer

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from opl.cell.inverse import turns
+from opl.cell.full_turns import full_turns
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.errors import NoFreeMoveError, NoPathError
 from opl.motion.links import Blocker
@@ -30,7 +30,7 @@ MOST_ENDS = 3  # cutter points listed, where tracks came through but none was fr
 
 
 def no_path(problem: GrindingProblem, matrices: list[OpenMatrix]) -> NoPathError:
-    """Return the error that says how far the searches came and what stopped them."""
+    """Return the error with how far the searches came and what stopped them."""
     cut_off = sum((matrix.cut_off for matrix in matrices), Counter())
     if cut_off:
         return NoFreeMoveError(
@@ -74,7 +74,7 @@ def explain_free_moves(cell: WorkCell, cut_off: Counter[tuple[FreeMove, Blocker]
 
     Args:
         cell: The cell.
-        cut_off: How many tracks were refused for each free move and pair in its way; not empty.
+        cut_off: How many tracks were refused for each free move and pair of bodies; not empty.
     """
     met = sorted(cut_off.items(), key=lambda item: (-item[1], item[0]))[:MOST_FREE_MOVES]
     lines = [f"{move.value}: {' and '.join(pair)} ({count} times)" for (move, pair), count in met]
@@ -124,12 +124,12 @@ def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
     for position in np.unique(np.linspace(0, n_positions - 1, MOST_POSITIONS).astype(int)):
         q = problem.field.q[column, position]
         q = q[~np.isnan(q[:, 0])]
-        turned = q[:, None] + turns(robot.lower, robot.upper)
+        turned = q[:, None] + full_turns(robot.lower, robot.upper)
         within = cell.within_limits(turned)
         if not len(q):
             counts["out of reach"] += 1
         elif not within.any():
-            # the posture that breaks the fewest tells best what is in the way
+            # the configuration that breaks the fewest shows best what is in the way
             names = min(map(cell.broken_limits, turned.reshape(-1, 6)), key=len)
             counts[f"beyond the limits of {' '.join(names)}"] += 1
         elif cuts[position]:
@@ -138,8 +138,8 @@ def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
             # a full turn of the wrist brings the same bodies to the same places
             solutions = np.flatnonzero(within.any(axis=1))
             for solution in solutions:
-                posture = turned[solution, np.argmax(within[solution])]
-                pairs = problem.scene.collision.colliding_pairs(posture)
+                q_within = turned[solution, np.argmax(within[solution])]
+                pairs = problem.scene.collision.colliding_pairs(q_within)
                 cause = " hits ".join(pairs[0]) if pairs else "free"
                 counts[cause] += 1 / len(solutions)  # type: ignore[assignment]
     return counts

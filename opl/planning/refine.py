@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opl.cell.full_turns import nearest_turn
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion, Stretch
 from opl.motion.path import GrindingPath
 from opl.planning.filling import cutter_frames
-from opl.planning.nodes import NodeField, NodeMatrix, solve
+from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
 from opl.planning.open_matrix import OpenMatrix, open_matrices
 from opl.planning.problem import GrindingProblem, wheel_layer
 
@@ -72,7 +73,7 @@ def refine(refined: RefinedProblem, places: Array) -> RefinedProblem:
     layer = wheel_layer(problem.scene, added, t, wanted)
     q = np.full((*wanted.shape, *problem.field.q.shape[2:]), np.nan)
     column, row = np.nonzero(wanted)
-    q[wanted] = solve(problem.cell, added.Ts_workpiece_cutter[column], t[row])
+    q[wanted] = inverse_solutions(problem.cell, added.Ts_workpiece_cutter[column], t[row])
     at = before + 1
     field = NodeField(
         t,
@@ -109,7 +110,7 @@ def configurations_between(problem: GrindingProblem, nodes: NodeMatrix, places: 
         Joint positions in [rad], shape (k, n_rows, 6).
     """
     frames = cutter_frames(problem.points, places)[:, None]
-    q = solve(problem.cell, frames, problem.field.contact_positions)
+    q = inverse_solutions(problem.cell, frames, problem.field.contact_positions)
     return _taken(problem, nodes, q, places.astype(int))
 
 
@@ -136,7 +137,7 @@ def _taken(problem: GrindingProblem, nodes: NodeMatrix, q: Array, before: np.nda
     added = q[:, nodes.position_index, nodes.ik_branch]
     near = nodes.q[before]
     near = np.where(np.isnan(near), nodes.q[before + 1], near)
-    added = added + 2.0 * np.pi * np.round((near - added) / (2.0 * np.pi))
+    added = nearest_turn(added, near)
     within = problem.cell.within_limits(added)
     return np.where(within[..., None], added, np.nan)
 

@@ -1,12 +1,12 @@
-"""What a planner asks of a cell: bodies that collide, part against wheel, free-space paths."""
+"""The cell as a planner uses it: bodies that collide, part against wheel, free moves."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
 
-from opl.cell.clearance import PartTree, part_tree
 from opl.cell.collision import CollisionScene
+from opl.cell.wheel_distance import PartTree, part_tree
 from opl.cell.workcell import WorkCell
 from opl.motion.links import Links
 

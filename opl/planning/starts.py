@@ -103,12 +103,9 @@ def tracks_from_nearest_start(matrices: list[OpenMatrix], home: Array) -> Iterat
     ]
     searches = [_Search(matrix) for matrix in matrices]
     for _, index, row in sorted(starts):
-        while True:
-            descent = searches[index].descend(row, np.inf)
-            if descent.rows is None:
-                break
-            yield Track(index, descent.rows)
-            if matrices[index].allows(descent.rows):
+        while (rows := searches[index].descend(row, np.inf).rows) is not None:
+            yield Track(index, rows)
+            if matrices[index].allows(rows):
                 break
 
 

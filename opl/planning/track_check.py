@@ -58,7 +58,7 @@ class NoLink:
 
     Attributes:
         motion: The motion, its free moves straight.
-        error: Which of them found no way, and why.
+        error: Which of them was not found, and why.
     """
 
     motion: Motion

@@ -11,9 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from opl.cell.full_turns import nearest_turn
 from opl.geometry.frames import Array
 from opl.motion.path import GrindingPath
-from opl.planning.nodes import NodeField, NodeMatrix, solve
+from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
 from opl.planning.problem import wheel_layer
 from opl.planning.refine import RefinedProblem
 
@@ -39,9 +40,11 @@ def tube(refined: RefinedProblem, path: GrindingPath, finer: Array) -> RefinedPr
     layer = wheel_layer(problem.scene, points, t, near)
     columns, at = np.nonzero(near)
     q = np.full((*near.shape, 6), np.nan)
-    q[near] = solve(problem.cell, points.Ts_workpiece_cutter[columns], t[at])[:, path.ik_branch]
+    q[near] = inverse_solutions(problem.cell, points.Ts_workpiece_cutter[columns], t[at])[
+        :, path.ik_branch
+    ]
     # on the same count of turns as the path
-    q = q + 2.0 * np.pi * np.round((q_path[:, None] - q) / (2.0 * np.pi))
+    q = nearest_turn(q, q_path[:, None])
     q = np.where(problem.cell.within_limits(q)[..., None], q, np.nan)
     # to the bit what is known to be free
     q[np.arange(len(q)), np.searchsorted(np.flatnonzero(used), own)] = q_path

@@ -3,8 +3,8 @@
 Travel and time add up along a track, the joint range sum does not. But no track in a box has a
 larger one than the box, and dynamic programming finds the least of the rest in it: so the least box
 is widened step by step up to the whole field, and the best trade between the two is kept. It is the
-best of these, not proven to be the best of all; the lower bound says how far from it the path may
-be at the most: it is the least of each part alone, added up.
+best of these, not proven to be the best of all; the lower bound is the least of each part alone,
+added up.
 """
 
 from __future__ import annotations

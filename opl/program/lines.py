@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from opl.cell.robot import Robot, forward
+from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import inverse, pose, transform
 from opl.program.moves import Kind, Program
 
@@ -56,9 +56,10 @@ def stray(robot: Robot, q: Array, T_flange_tool: Array, corners: Array) -> Array
     """
     start, end = q[:-1], q[1:]
     s = _BETWEEN[:, None, None]
-    Ts_joint = forward(robot, start + s * (end - start))
+    Ts_joint = forward_kinematics(robot, start + s * (end - start))
     Ts_straight = _straight(
-        forward(robot, start) @ T_flange_tool, forward(robot, end) @ T_flange_tool
+        forward_kinematics(robot, start) @ T_flange_tool,
+        forward_kinematics(robot, end) @ T_flange_tool,
     ) @ inverse(T_flange_tool)
     apart = transform(Ts_joint[..., None, :, :], corners) - transform(
         Ts_straight[..., None, :, :], corners

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, transform
+from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion, VerifiedMotion
@@ -174,10 +175,9 @@ def _with_times(motion: Motion, postures: list[int], playback: Playback) -> Moti
 def _apart(job: Job, q: Array, other: Array) -> float:
     """Return the farthest in [m] that a corner of the part's box is moved between postures."""
     cell = job.cell
-    low, high = cell.part.vertices.min(axis=0), cell.part.vertices.max(axis=0)
-    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+    corners = box_corners(cell.part.vertices)
     places = [
-        transform((forward(cell.robot, p) @ cell.T_flange_workpiece)[:, None], corners)
+        transform((forward_kinematics(cell.robot, p) @ cell.T_flange_workpiece)[:, None], corners)
         for p in (q, other)
     ]
     return float(np.linalg.norm(places[0] - places[1], axis=-1).max(initial=0.0))

@@ -75,7 +75,7 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
     )
 
 
-def broken(pass_index: np.ndarray, x: Array, y: Array) -> tuple[Array, Array]:
+def line_by_pass(pass_index: np.ndarray, x: Array, y: Array) -> tuple[Array, Array]:
     """Return a line that is not drawn where the pass changes.
 
     Args:

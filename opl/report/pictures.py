@@ -21,10 +21,10 @@ from opl.report.canvas import (
     INK,
     RULE,
     blank_figure,
-    broken,
     draw_pass_borders,
     house_style,
     legend_below,
+    line_by_pass,
     svg,
 )
 
@@ -104,7 +104,7 @@ def contact_chart(
         for code in np.flatnonzero(counts).tolist()
     ]
     if len(path_pass):
-        line = broken(path_pass, path_cutter_point, path_contact_position)
+        line = line_by_pass(path_pass, path_cutter_point, path_contact_position)
         axes.plot(*line, color="white", linewidth=2.0 * FOUND["linewidth"])
         axes.plot(*line, **FOUND, gid="found")
         handles.append(Line2D([], [], **FOUND))
@@ -158,8 +158,8 @@ def joint_chart(
             fixed = np.rad2deg(fixed_q[:, joint])
             shown = np.append(found, fixed)
             heading += f" (fixed {np.ptp(fixed):.1f} deg)"
-            axes.plot(*broken(pass_index, points, fixed), **FIXED, gid=f"fixed_{joint}")
-        line = broken(found_pass, found_cutter_point, found)
+            axes.plot(*line_by_pass(pass_index, points, fixed), **FIXED, gid=f"fixed_{joint}")
+        line = line_by_pass(found_pass, found_cutter_point, found)
         axes.plot(*line, **FOUND, gid=f"found_{joint}")
         limit_seen |= _frame_angles(axes, shown, limits[joint])
         draw_pass_borders(axes, pass_index)

@@ -79,7 +79,7 @@ def find_touches(
     found: list[tuple[Array, ...]] = []
     for posture, T_contact0_workpiece in enumerate(Ts_contact0_workpiece):
         p_contact0 = transform(T_contact0_workpiece, Ts_workpiece_cutter[:, :3, 3])
-        near = np.flatnonzero(np.abs(wheel.clearance(p_contact0)) <= tolerance)
+        near = np.flatnonzero(np.abs(wheel.signed_distance(p_contact0)) <= tolerance)
         Ts_contact0_cutter = T_contact0_workpiece @ Ts_workpiece_cutter[near]
         t = contact_positions(wheel, Ts_contact0_cutter)
         distance, angle = misfit(wheel, Ts_contact0_cutter, t)

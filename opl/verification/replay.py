@@ -19,6 +19,7 @@ import numpy as np
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, transform
+from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion, Stretch, VerifiedMotion
 from opl.verification.limits import limit_findings, missing_points
@@ -152,8 +153,7 @@ class _Run:
         self._levers = np.array(moved).reshape(-1, len(joints)) * world.levers()
         # what each pair is at least apart, as far as known, in [m]
         self._apart = np.full(len(self._pairs), -np.inf)
-        low, high = cell.part.vertices.min(axis=0), cell.part.vertices.max(axis=0)
-        self._corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+        self._corners = box_corners(cell.part.vertices)
         self._q = motion.q[0]
         self._at = transform(world.move_to(self._q), self._corners)
         for name in world.surrounding():
@@ -216,7 +216,7 @@ class _Run:
         grinding = motion.stretch[move] in ON_WHEEL
         touching_down = grinding and motion.stretch[move - 1] is Stretch.APPROACH
         free = not grinding and motion.stretch[move] not in ALONG_LEAD
-        off_wheel = cell.pairs.clearances.get(frozenset((PART, WHEEL)), cell.clearance)
+        off_wheel = cell.pairs.required.get(frozenset((PART, WHEEL)), cell.required_clearance)
         needed = off_wheel if free else -cell.contact_allowance
         farthest = self._allowed_error + GAP_ACCURACY if grinding and not touching_down else np.inf
         gap = self._world.gap(farthest if farthest < np.inf else max(needed, 0.0))

@@ -123,13 +123,13 @@ class World:
         names = {pair.first.name, pair.second.name}
         if any(names == set(allowed) for allowed in self._cell.pairs.allowed):
             return None
-        for told, clearance in self._cell.pairs.clearances.items():
+        for told, clearance in self._cell.pairs.required.items():
             if names == set(told):
                 return replace(pair, clearance=clearance)
         return pair
 
     def _pairs(self) -> Iterator[Pair]:
-        links, clearance = self._links, self._cell.clearance
+        links, clearance = self._links, self._cell.required_clearance
         for k, link in enumerate(links):
             # neighbouring links share a bearing
             yield from (Pair(link, other, 0.0, 2.0 * LINK_ROUNDING) for other in links[k + 2 :])

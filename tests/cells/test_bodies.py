@@ -9,12 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from opl.cell.collision import CollisionScene
-from opl.cell.enclosure import enclosing_bodies, winding_number
-from opl.cell.pairs import PairRules
-from opl.cell.robot import forward
+from opl.cell.collision import CollisionScene, enclosing_bodies
+from opl.cell.robot import forward_kinematics
+from opl.cell.workcell import PairRules
 from opl.geometry.frames import pose
-from opl.geometry.mesh import TriangleMesh
+from opl.geometry.mesh import TriangleMesh, winding_number
 from opl.geometry.shapes import Body
 from opl.verification.meshes import is_inside
 from opl.verification.replay import replay
@@ -52,7 +51,7 @@ def meshed_cell():
     jaw = Body("jaw", c_shape(0.12, 0.02, 0.06), at(0.0, 0.0, 0.05))
     rules = PairRules(
         allowed=frozenset([pair("jaw", "belt run"), pair("R_link", "gate")]),
-        clearances={
+        required={
             pair("part", "gate"): 0.04,
             pair("jaw", "gate"): 0.0,
             pair("B_link", "floor"): 0.1,
@@ -131,7 +130,7 @@ def only_the_part_meets(name):
 
 def in_front_of(cell, part_to_body):
     """Return the pose of a body so far from the part at the zero posture."""
-    T_base_part = forward(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece
+    T_base_part = forward_kinematics(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece
     return pose(np.eye(3), T_base_part[:3, 3] + part_to_body)
 
 
@@ -210,11 +209,11 @@ def test_an_arm_inside_a_solid_is_told_though_no_surface_meets():
 def test_a_clearance_of_one_pair_is_proven():
     # a post in 30 to 60 mm from the part somewhere on its way
     cell, motion = tiny_problem().cell, tiny_motion()
-    T = forward(cell.robot, motion.q[1]) @ cell.T_flange_workpiece
+    T = forward_kinematics(cell.robot, motion.q[1]) @ cell.T_flange_workpiece
     away = cell.part.vertices.max(axis=0) + np.array([0.06, 0.0, 0.0])
     ready = with_obstacle(cell, (T @ [*away, 1.0])[:3])
     assert replay_tiny(cell=ready).verified is not None
-    strict = PairRules(clearances={pair("post", "part"): 0.08})
+    strict = PairRules(required={pair("post", "part"): 0.08})
     refused = replay_tiny(cell=replace(ready, pairs=strict))
     assert refused.verified is None
     told = [f.message for f in refused.findings if f.kind == "collision"]
@@ -229,14 +228,14 @@ def test_a_clearance_of_one_pair_is_proven():
 
 def test_the_wheel_keeps_a_clearance_of_its_own_on_free_moves():
     cell = tiny_problem().cell
-    far = PairRules(clearances={pair("part", "wheel"): 0.3})
+    far = PairRules(required={pair("part", "wheel"): 0.3})
     found = replay_tiny(cell=replace(cell, pairs=far))
     assert any("part and wheel" in f.message and "300 mm" in f.message for f in found.findings)
 
 
 def test_rules_widen_with_the_clearance():
     cell = meshed_cell().widened(0.01)
-    assert cell.clearance == pytest.approx(v_job().cell.clearance + 0.01)
-    assert cell.pairs.needed("gate", "part", 1.0) == pytest.approx(0.05)
-    assert cell.pairs.needed("R_link", "gate", 1.0) is None
-    assert cell.pairs.needed("T_link", "gate", 1.0) == 1.0
+    assert cell.required_clearance == pytest.approx(v_job().cell.required_clearance + 0.01)
+    assert cell.pairs.between("gate", "part", 1.0) == pytest.approx(0.05)
+    assert cell.pairs.between("R_link", "gate", 1.0) is None
+    assert cell.pairs.between("T_link", "gate", 1.0) == 1.0

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from opl.cell.clearance import part_tree
 from opl.cell.collision import CollisionScene
-from opl.cell.inverse import inverse
-from opl.cell.robot import forward
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import part_tree
 from opl.motion.check import RESOLUTION, densify, find_faults
 from opl.motion.motion import Stretch
 from tests.support.bare_cells import bare_cell, block, free_move, with_obstacle
@@ -59,7 +59,7 @@ def test_an_obstacle_between_two_free_postures_is_found():
     q[1, 0], q[2, 0] = 0.8, 1.6
     on_the_way = np.zeros(6)
     on_the_way[0] = 0.4
-    p = (forward(cell.robot, on_the_way) @ cell.T_flange_workpiece)[:3, 3]
+    p = (forward_kinematics(cell.robot, on_the_way) @ cell.T_flange_workpiece)[:3, 3]
     cell = with_obstacle(cell, p)
     assert not CollisionScene(cell).collides(q).any()
     (fault,) = faults_of(cell, free_move(q))
@@ -72,7 +72,7 @@ def test_a_posture_that_collides_is_told_from_a_way_that_does():
     cell = bare_cell(block((0.02, 0.02, 0.02)))
     q = np.zeros((3, 6))
     q[1, 0], q[2, 0] = 0.8, 1.6
-    p = (forward(cell.robot, q[1]) @ cell.T_flange_workpiece)[:3, 3]
+    p = (forward_kinematics(cell.robot, q[1]) @ cell.T_flange_workpiece)[:3, 3]
     first, second = faults_of(with_obstacle(cell, p), free_move(q))
     assert (first.move, first.at_end) == (1, True)
     assert (second.move, second.at_end) == (2, False)  # the way out of it
@@ -83,7 +83,9 @@ def test_a_fault_names_a_pair_that_collides_on_its_own_move():
     cell = bare_cell(block((0.02, 0.02, 0.02)))
     q = np.zeros((4, 6))
     q[:, 0] = [0.0, 0.8, 1.6, 2.4]
-    ahead = [(forward(cell.robot, q[k]) @ cell.T_flange_workpiece)[:3, 3] for k in (1, 3)]
+    ahead = [
+        (forward_kinematics(cell.robot, q[k]) @ cell.T_flange_workpiece)[:3, 3] for k in (1, 3)
+    ]
     cell = with_obstacle(cell, ahead[0], name="first")
     cell = with_obstacle(cell, ahead[1], name="second")
     faults = faults_of(cell, free_move(q))
@@ -97,11 +99,11 @@ def test_a_fault_names_a_pair_that_collides_on_its_own_move():
 def shifted_along_normal(motion, index, depth):
     """Return a motion with one posture moved towards the wheel by a depth."""
     cell = small_problem().cell
-    T_base_flange = forward(cell.robot, motion.q[index])
+    T_base_flange = forward_kinematics(cell.robot, motion.q[index])
     # only moved: the contact normal is that of the contact frame at this t
     into = cell.wheel.T_base_contact(motion.contact_position[index])[:3, 2]
     T_base_flange[:3, 3] += depth * into
-    found = inverse(cell.robot.arm, T_base_flange, motion.q[index])
+    found = inverse_kinematics(cell.robot.arm, T_base_flange, motion.q[index])
     found = found + 2 * np.pi * np.round((motion.q[index] - found) / (2 * np.pi))
     q = motion.q.copy()
     q[index] = found[np.nanargmin(np.abs(found - q[index]).max(axis=1))]
@@ -134,7 +136,7 @@ def test_a_free_move_keeps_the_clearance_from_the_wheel():
 def test_faults_are_those_an_independent_scene_finds():
     # a sweep through a narrow gap, asked at the same postures
     cell = bare_cell(block((0.05, 0.05, 0.05)))
-    p = (forward(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece)[:3, 3]
+    p = (forward_kinematics(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece)[:3, 3]
     cell = with_obstacle(cell, p + np.array([0.0, 0.3, 0.06]), (0.05, 0.05, 0.05))
     q = np.zeros((12, 6))
     q[:, 0] = np.linspace(-0.2, 0.7, 12)

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from opl.cell.collision import CollisionScene
-from opl.cell.robot import forward, load_robot
+from opl.cell.robot import forward_kinematics, load_robot
 from opl.geometry.frames import pose
 from opl.geometry.shapes import Body, Box, Cylinder
 from tests.support.bare_cells import bare_cell, block, random_postures, with_obstacle
@@ -34,7 +34,7 @@ def unordered(pairs):
 
 @pytest.mark.parametrize("clearance", [0.0, 0.005, 0.02])
 def test_an_independent_scene_finds_the_same_pairs(clearance):
-    cell = replace(v_job().cell, clearance=clearance)
+    cell = replace(v_job().cell, required_clearance=clearance)
     scene, other = CollisionScene(cell), FclScene(cell)
     postures = postures_of_interest(cell)
     collides = scene.collides(postures)
@@ -50,7 +50,7 @@ def test_an_independent_scene_finds_the_same_pairs(clearance):
 
 def test_the_broad_phase_misses_no_pair_however_large_the_clearance():
     # with 80 mm the boxes that the broad phase compares are apart long before the margins are
-    cell = replace(v_job().cell, clearance=0.08, fixture=())
+    cell = replace(v_job().cell, required_clearance=0.08, fixture=())
     lifted = cell.T_flange_workpiece.copy()
     lifted[2, 3] += 0.25  # else the part is always within 80 mm of the forearm
     cell = replace(cell, T_flange_workpiece=lifted)
@@ -63,7 +63,7 @@ def test_the_broad_phase_misses_no_pair_however_large_the_clearance():
 
 
 def test_asking_every_pair_agrees_with_the_broad_phase():
-    cell = replace(v_job().cell, clearance=0.03)
+    cell = replace(v_job().cell, required_clearance=0.03)
     scene = CollisionScene(cell)
     postures = postures_of_interest(cell, seed=2)
     one_by_one = [bool(scene.colliding_pairs(q)) for q in postures]
@@ -106,7 +106,7 @@ def test_the_first_link_keeps_the_clearance_from_obstacles(gap, hit):
 def test_a_far_link_keeps_the_clearance_from_obstacles(gap, hit):
     q = np.zeros(6)
     cell = bare_cell(SMALL)
-    T_base_flange = forward(MH24, q)
+    T_base_flange = forward_kinematics(MH24, q)
     # above the flange disc, radius 51 mm about the flange axis (x of the base at zero)
     p = T_base_flange[:3, 3] + np.array([-0.0065, 0.0, 0.051 + gap + 0.05])
     found = unordered(CollisionScene(with_obstacle(cell, p, (0.01, 0.1, 0.1))).colliding_pairs(q))
@@ -120,7 +120,7 @@ def test_the_foot_may_stand_on_what_does_not_move():
 
 def test_the_part_may_touch_the_wheel_but_the_fixture_may_not():
     cell = bare_cell(block((0.06, 0.06, 0.06)))
-    T_base_part = forward(MH24, np.zeros(6)) @ cell.T_flange_workpiece
+    T_base_part = forward_kinematics(MH24, np.zeros(6)) @ cell.T_flange_workpiece
     cell = replace(cell, wheel=replace(cell.wheel, T_base_contact0=T_base_part, radius=0.02))
     assert ("part", "wheel") not in unordered(CollisionScene(cell).colliding_pairs(np.zeros(6)))
     stem = Body("stem", Cylinder(0.01, 0.1), cell.T_flange_workpiece)
@@ -132,7 +132,7 @@ def test_the_part_may_touch_the_wheel_but_the_fixture_may_not():
 
 def test_the_part_hits_what_stands_around():
     cell = bare_cell(block((0.06, 0.06, 0.06)))
-    p = (forward(MH24, np.zeros(6)) @ cell.T_flange_workpiece)[:3, 3]
+    p = (forward_kinematics(MH24, np.zeros(6)) @ cell.T_flange_workpiece)[:3, 3]
     # the post is 30 mm wide
     near, far = (with_obstacle(cell, p + np.array([0, 0, 0.045 + gap])) for gap in (0.0049, 0.0051))
     assert CollisionScene(near).colliding_pairs(np.zeros(6)) == [("part", "post")]
@@ -175,7 +175,7 @@ def test_a_wide_part_meets_the_fork_when_the_wrist_is_bent_back():
 def test_margins_are_distances_not_box_overlaps():
     # two boxes corner to corner: their axis-aligned boxes overlap although they are 5.2 mm apart
     cell = bare_cell(block((0.04, 0.04, 0.04)))
-    T_base_part = forward(MH24, np.zeros(6)) @ cell.T_flange_workpiece
+    T_base_part = forward_kinematics(MH24, np.zeros(6)) @ cell.T_flange_workpiece
     turned = pin.SE3(pin.utils.rotate("x", np.pi / 4), np.zeros(3)).homogeneous
     apart = 0.02 + 0.02 * np.sqrt(2.0)
     for gap, hit in [(0.0048, True), (0.0052, False)]:

@@ -72,7 +72,7 @@ def test_the_ground_point_moves_away_from_the_wheel_all_the_way(length, turn, st
     fraction = np.linspace(0.0, 1.0, 8, endpoint=False)[:, None]
     on_the_way = [a + fraction * (b - a) for a, b in pairwise(corners)]
     way = np.concatenate([*on_the_way, corners[-1:]])
-    distance = wheel.clearance(transform(wheel.T_contact0_contact(t), way))
+    distance = wheel.signed_distance(transform(wheel.T_contact0_contact(t), way))
     assert distance[0] == pytest.approx(0.0, abs=1e-12)
     assert (np.diff(distance) > 0.0).all()
 

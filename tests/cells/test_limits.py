@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opl.cell.limits import Limit
+from opl.cell.joint_limits import JointLimit
 from opl.motion.air import UnreachableApproachError, whole_motion
 from opl.motion.motion import Stretch
 from opl.planning.filling import BrokenEdgeError, fill_in
@@ -29,7 +29,7 @@ EVERYWHERE = np.deg2rad(10000.0)
 
 
 def limit_of(name, coefficients, lower_deg, upper_deg):
-    return Limit(name, coefficients, np.deg2rad(lower_deg), np.deg2rad(upper_deg))
+    return JointLimit(name, coefficients, np.deg2rad(lower_deg), np.deg2rad(upper_deg))
 
 
 def with_limits(problem, *limits):
@@ -89,7 +89,7 @@ def test_the_replay_finds_what_breaks_a_limit():
     sums = motion.q[:, 3] + motion.q[:, 5]
     worst = int(sums.argmax())
     for upper, broken in ((sums[worst] + 1e-6, False), (sums[worst] - 1e-6, True)):
-        limited = replace(cell, limits=(Limit("R+T", R + T, -EVERYWHERE, upper),))
+        limited = replace(cell, limits=(JointLimit("R+T", R + T, -EVERYWHERE, upper),))
         found = replay_tiny(cell=limited)
         assert (found.verified is None) == broken
         assert {finding.kind for finding in found.findings} == ({"limit"} if broken else set())
@@ -115,7 +115,7 @@ def test_a_step_and_an_approach_beyond_a_limit_are_refused_by_name():
     leads = [k for k, s in enumerate(motion.stretch) if s is Stretch.RETRACT]
     lead = motion.q[leads[-1]]
     cell = replace(
-        problem.cell, limits=(Limit("U only", np.eye(6)[2], lead[2] + 1e-3, EVERYWHERE),)
+        problem.cell, limits=(JointLimit("U only", np.eye(6)[2], lead[2] + 1e-3, EVERYWHERE),)
     )
     with pytest.raises(UnreachableApproachError) as refused:
         whole_motion(cell, problem.points, path, problem.pace)
@@ -125,7 +125,7 @@ def test_a_step_and_an_approach_beyond_a_limit_are_refused_by_name():
     at_points = np.flatnonzero(path.cutter_point % 1.0 == 0.0)
     wanted = np.interp(path.contact_position[at_points], nodes.contact_position, np.arange(30))
     rows = np.round(wanted).astype(int)
-    shut = replace(problem.cell, limits=(Limit("T", T, EVERYWHERE, EVERYWHERE + 1.0),))
+    shut = replace(problem.cell, limits=(JointLimit("T", T, EVERYWHERE, EVERYWHERE + 1.0),))
     with pytest.raises(BrokenEdgeError) as broken:
         fill_in(shut, problem.points, nodes, rows, problem.interpolation)
     assert broken.value.cause == "limits of T"

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from opl.cell.clearance import part_tree
 from opl.cell.collision import CollisionScene
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import part_tree
 from opl.geometry.frames import pose, transform
 from opl.geometry.shapes import Body, Box
 from opl.motion.check import RESOLUTION, densify
@@ -42,7 +42,7 @@ def links_in(cell):
 
 
 def part_at(cell, q):
-    return (forward(cell.robot, q) @ cell.T_flange_workpiece)[:3, 3]
+    return (forward_kinematics(cell.robot, q) @ cell.T_flange_workpiece)[:3, 3]
 
 
 # straight moves
@@ -54,10 +54,12 @@ def test_nothing_moves_farther_than_the_levers_say():
     rng = np.random.default_rng(3)
     reach = np.zeros(6)
     for q in rng.uniform(cell.robot.lower, cell.robot.upper, (40, 6)):
-        corners = transform(forward(cell.robot, q) @ cell.T_flange_workpiece, cell.part.vertices)
+        corners = transform(
+            forward_kinematics(cell.robot, q) @ cell.T_flange_workpiece, cell.part.vertices
+        )
         for joint in range(6):
             turned = q + 1e-4 * np.eye(6)[joint]
-            T = forward(cell.robot, turned) @ cell.T_flange_workpiece
+            T = forward_kinematics(cell.robot, turned) @ cell.T_flange_workpiece
             way = np.linalg.norm(transform(T, cell.part.vertices) - corners, axis=1).max()
             reach[joint] = max(reach[joint], way / 1e-4)
     assert (reach <= levers).all()
@@ -80,7 +82,7 @@ def test_a_move_is_free_if_and_only_if_an_independent_scene_says_so(seed):
 
 def test_a_plate_thinner_than_the_way_between_two_looks_is_found():
     cell = open_cell()
-    cell = replace(cell, part=block((0.12, 0.002, 0.06)), clearance=0.0)
+    cell = replace(cell, part=block((0.12, 0.002, 0.06)), required_clearance=0.0)
     # the arm sweeps a thin plate over S, far out: by 14 mm from look to look
     swept = HOME + np.deg2rad([20.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     between = HOME + np.deg2rad([9.5, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -155,7 +157,7 @@ def test_an_end_that_is_too_near_is_named():
 
 def caged(cell, q):
     """Return a cell with six walls around the part at a posture; one is behind it."""
-    T = forward(cell.robot, q) @ cell.T_flange_workpiece
+    T = forward_kinematics(cell.robot, q) @ cell.T_flange_workpiece
     low, high, thick = np.array([-0.06, -0.08, -0.045]), np.array([0.06, 0.08, 0.06]), 0.01
     walls = []
     for axis in range(3):

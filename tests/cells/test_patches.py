@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import pose
 from opl.geometry.wheel import ContactWheel
 from opl.job.load import load
@@ -34,7 +34,7 @@ def test_the_drum_is_the_contact_wheel(p):
     p_contact0 = np.array([in_drum[2], in_drum[1], in_drum[0] + DRUM.radius])
     p_base = DRUM.T_base_drum[:3, :3] @ in_drum + DRUM.T_base_drum[:3, 3]
     distance, _ = DRUM.distances(p_base[None])
-    assert distance[0] == pytest.approx(wheel.clearance(p_contact0), abs=1e-12)
+    assert distance[0] == pytest.approx(wheel.signed_distance(p_contact0), abs=1e-12)
 
 
 @settings(max_examples=200, deadline=None, derandomize=True)
@@ -94,7 +94,7 @@ def test_patch_by_patch_is_the_distance_of_the_whole_mesh(part):
     random = np.random.default_rng(0)
     middle = cell.wheel.T_base_contact0[:3, 3]
     postures = random_postures(cell.robot, 6000)
-    parts = (forward(cell.robot, postures) @ cell.T_flange_workpiece)[:, :3, 3]
+    parts = (forward_kinematics(cell.robot, postures) @ cell.T_flange_workpiece)[:, :3, 3]
     postures = postures[np.linalg.norm(parts - middle, axis=1).argsort()[:80]]
     postures = postures + random.normal(scale=0.02, size=postures.shape)
     client, found = start(), []

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from opl.cell.inverse import inverse
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.geometry.frames import pose
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.path import GrindingPath
@@ -164,7 +164,7 @@ def two_points(p_first=None, p_second=None, t=(0.0, 3.0)):
     problem = small_problem()
     frames = problem.points.Ts_workpiece_cutter[30:32].copy()
     q = problem.cell.Ts_base_flange(np.array(t), frames)
-    q = inverse(problem.cell.robot.arm, q)[:, small_plan().path.ik_branch]
+    q = inverse_kinematics(problem.cell.robot.arm, q)[:, small_plan().path.ik_branch]
     for k, p in enumerate((p_first, p_second)):
         if p is not None:
             frames[k, :3, 3] = p

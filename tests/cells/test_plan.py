@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.errors import NoPathError
 from opl.motion.air import UnreachableApproachError, whole_motion
 from opl.motion.check import RESOLUTION, densify, find_faults
@@ -61,7 +61,7 @@ def test_with_the_contact_kept_the_joint_ranges_are_those_of_the_paper():
 
 def test_with_the_contact_kept_every_posture_grinds_at_the_middle():
     problem, fixed = v_problem(), keep_contact(v_problem())
-    Ts = forward(problem.cell.robot, fixed.q) @ problem.cell.T_flange_workpiece
+    Ts = forward_kinematics(problem.cell.robot, fixed.q) @ problem.cell.T_flange_workpiece
     Ts_base_cutter = Ts @ problem.points.Ts_workpiece_cutter
     middle = problem.cell.wheel.T_base_contact0
     np.testing.assert_allclose(Ts_base_cutter - middle, 0.0, atol=1e-9)
@@ -366,7 +366,7 @@ def test_approach_and_retract_run_along_the_contact_normal(problem, motion):
             lead = np.flatnonzero(on_pass & (stretch == kind))
             if kind == "approach":
                 lead = np.concatenate([[lead[0] - 1], lead])  # the air move ends at its start
-            Ts = forward(cell.robot, motion.q[np.append(lead, touch)])
+            Ts = forward_kinematics(cell.robot, motion.q[np.append(lead, touch)])
             into = cell.wheel.T_base_contact(motion.contact_position[touch])[:3, 2]
             away = Ts[-1, :3, 3] - Ts[:, :3, 3]
             np.testing.assert_allclose(away - np.outer(away @ into, into), 0.0, atol=1e-9)
@@ -430,7 +430,7 @@ def test_free_moves_run_at_their_share_of_the_joint_speeds(problem, motion):
 @MOTIONS
 def test_leads_run_at_the_approach_speed(problem, motion):
     motion, pace = motion(), problem().pace
-    Ts = forward(problem().cell.robot, motion.q)
+    Ts = forward_kinematics(problem().cell.robot, motion.q)
     for k, stretch in enumerate(motion.stretch):
         if stretch in (Stretch.APPROACH, Stretch.RETRACT):
             way = np.linalg.norm(Ts[k, :3, 3] - Ts[k - 1, :3, 3])

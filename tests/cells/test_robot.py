@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from opl.cell.robot import forward, known_robots, load_robot
+from opl.cell.robot import forward_kinematics, known_robots, load_robot
 from opl.errors import InputError
 from opl.resources import folder
 
@@ -63,19 +63,23 @@ def spoil(path: Path, old: str, new: str):
 
 def test_zero_posture_has_the_flange_ahead_facing_forward_with_x_up():
     expected = [[0, 0, 1, 1.045], [0, -1, 0, 0], [1, 0, 0, 0.960], [0, 0, 0, 1]]
-    np.testing.assert_allclose(forward(MH24, np.zeros(6)), expected, atol=1e-12)
+    np.testing.assert_allclose(forward_kinematics(MH24, np.zeros(6)), expected, atol=1e-12)
 
 
 def test_forward_agrees_with_denavit_hartenberg():
     q = random_postures(200)
-    np.testing.assert_allclose(forward(MH24, q), [dh_forward(row) for row in q], atol=1e-12)
+    np.testing.assert_allclose(
+        forward_kinematics(MH24, q), [dh_forward(row) for row in q], atol=1e-12
+    )
 
 
 def test_forward_keeps_the_shape_of_the_stack():
     q = random_postures(6).reshape(2, 3, 6)
-    assert forward(MH24, q).shape == (2, 3, 4, 4)
-    np.testing.assert_array_equal(forward(MH24, q)[1, 2], forward(MH24, q[1, 2]))
-    assert forward(MH24, q[:0]).shape == (0, 3, 4, 4)
+    assert forward_kinematics(MH24, q).shape == (2, 3, 4, 4)
+    np.testing.assert_array_equal(
+        forward_kinematics(MH24, q)[1, 2], forward_kinematics(MH24, q[1, 2])
+    )
+    assert forward_kinematics(MH24, q[:0]).shape == (0, 3, 4, 4)
 
 
 @pytest.mark.parametrize(
@@ -85,7 +89,7 @@ def test_forward_keeps_the_shape_of_the_stack():
 def test_positive_joints_move_the_flange_as_the_pendant_does(joint, coordinate, sense):
     q = np.zeros(6)
     q[MH24.joint_names.index(joint)] = 0.1
-    moved = forward(MH24, q) - forward(MH24, np.zeros(6))
+    moved = forward_kinematics(MH24, q) - forward_kinematics(MH24, np.zeros(6))
     assert sense * moved[coordinate, 3] > 0.005
 
 
@@ -93,7 +97,7 @@ def test_positive_joints_move_the_flange_as_the_pendant_does(joint, coordinate, 
 def test_positive_roll_turns_counter_clockwise_seen_from_behind(joint):
     q = np.zeros(6)
     q[MH24.joint_names.index(joint)] = 0.1
-    x_tool = forward(MH24, q)[:3, 0]
+    x_tool = forward_kinematics(MH24, q)[:3, 0]
     np.testing.assert_allclose(x_tool, [0, np.sin(0.1), np.cos(0.1)], atol=1e-12)
 
 

@@ -10,9 +10,9 @@ import trimesh
 
 from opl.cell.collision import CollisionScene
 from opl.cell.drawing import drawn_arm
-from opl.cell.recognise import recognise
-from opl.cell.robot import controller_poses, forward, known_robots, load_robot
+from opl.cell.robot import controller_poses, forward_kinematics, known_robots, load_robot
 from opl.cell.robot_file import read_robot_file
+from opl.cell.urdf_arm import arm_of_urdf
 from opl.cell.urdf_import import import_urdf
 from opl.errors import InputError
 from opl.job.load import load
@@ -40,7 +40,7 @@ def wrist_origin(dx, dy):
 @pytest.mark.parametrize("name", known_robots())
 def test_our_own_robots_are_recognised(name, tmp_path):
     robot = load_robot(name)
-    found = recognise(robot.urdf)
+    found = arm_of_urdf(robot.urdf)
     assert type(found.arm) is type(robot.arm)
     known = asdict(replace(robot.arm, c1=robot.base_height))
     for key, value in asdict(found.arm).items():
@@ -49,7 +49,7 @@ def test_our_own_robots_are_recognised(name, tmp_path):
     assert made.closure < 1e-11
     mine = load_robot("mine", tmp_path)
     q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (20, 6))
-    np.testing.assert_allclose(forward(mine, q), forward(robot, q), atol=1e-9)
+    np.testing.assert_allclose(forward_kinematics(mine, q), forward_kinematics(robot, q), atol=1e-9)
     np.testing.assert_allclose(mine.upper, robot.upper, atol=1e-9)
     np.testing.assert_allclose(mine.max_speed, robot.max_speed, atol=1e-9)
     assert mine.missing_pulses == robot.joint_names and mine.payload is None
@@ -86,7 +86,9 @@ def test_an_arm_with_parallel_axes_is_recognised_as_its_maker_describes_it(tmp_p
     ours = load_robot("ur10e")
     assert made.closure < 1e-11 and made.cautions == ()
     q = np.random.default_rng(0).uniform(ours.lower, ours.upper, (20, 6))
-    np.testing.assert_allclose(forward(made.robot, q), forward(ours, q), atol=1e-9)
+    np.testing.assert_allclose(
+        forward_kinematics(made.robot, q), forward_kinematics(ours, q), atol=1e-9
+    )
     # the pendant counts from the mounting face, turned by half a turn
     np.testing.assert_allclose(made.robot.T_controller_base, ours.T_controller_base, atol=1e-8)
     assert made.robot.controller_base_turn == pytest.approx(np.pi)
@@ -122,7 +124,7 @@ def test_rounded_right_angles_are_no_obstacle(tmp_path):
 def test_the_base_frame_goes_where_it_is_asked_for(tmp_path):
     floor = import_urdf(MH24.urdf, "mine", tmp_path / "floor", base_at_floor=True).robot
     assert floor.base_height == 0.0 and floor.arm.c1 == pytest.approx(0.505)
-    assert forward(floor, np.zeros(6))[2, 3] == pytest.approx(1.465)
+    assert forward_kinematics(floor, np.zeros(6))[2, 3] == pytest.approx(1.465)
     # the frame base of the URDF is where the controller counts from
     assert floor.controller_base_height == pytest.approx(0.505)
     assert controller_poses(floor, np.zeros(6))[2, 3] == pytest.approx(0.960)
@@ -132,7 +134,9 @@ def test_a_urdf_without_base_gets_one(tmp_path):
     path = changed(tmp_path, ('link="base"', 'link="other"'), ('name="base"', 'name="other"'))
     made = import_urdf(path, "mine", tmp_path / "mine").robot
     assert made.base_height == made.controller_base_height == pytest.approx(0.505)
-    np.testing.assert_allclose(forward(made, np.zeros(6)), forward(MH24, np.zeros(6)), atol=1e-12)
+    np.testing.assert_allclose(
+        forward_kinematics(made, np.zeros(6)), forward_kinematics(MH24, np.zeros(6)), atol=1e-12
+    )
 
 
 def test_meshes_come_along_and_are_found(tmp_path):
@@ -244,7 +248,7 @@ def test_shapes_on_fixed_joints_come_to_the_link_that_carries_them(tmp_path):
     np.testing.assert_allclose(block.placement.translation, [0, 0.3, 0.12], atol=1e-12)
     np.testing.assert_allclose(block.placement.rotation[:, 0], [0, 1, 0], atol=1e-12)
     q = np.ones((1, 6))
-    np.testing.assert_allclose(forward(made, q), forward(MH24, q), atol=1e-9)
+    np.testing.assert_allclose(forward_kinematics(made, q), forward_kinematics(MH24, q), atol=1e-9)
 
 
 def test_what_hangs_on_a_frame_base_stays_where_it_is(tmp_path):
@@ -252,9 +256,9 @@ def test_what_hangs_on_a_frame_base_stays_where_it_is(tmp_path):
     on_base = '<parent link="base"/><child link="S_link"/><origin xyz="0 0 -0.505"/>'
     path = changed(tmp_path, (on_foot, on_base))
     made = import_urdf(path, "mine", tmp_path / "mine", base_at_floor=True).robot
-    expected = forward(MH24, np.ones(6))
+    expected = forward_kinematics(MH24, np.ones(6))
     expected[2, 3] += 0.505
-    np.testing.assert_allclose(forward(made, np.ones(6)), expected, atol=1e-9)
+    np.testing.assert_allclose(forward_kinematics(made, np.ones(6)), expected, atol=1e-9)
 
 
 def test_placeholders_are_told(tmp_path):
@@ -313,7 +317,9 @@ def test_a_xacro_is_expanded_and_its_meshes_are_found(tmp_path):
     ended = opl("robots", "import-urdf", source, "--name", "mine", "--out", out)
     assert ended.status == 0, ended.err
     mine = load_robot(str(out))
-    np.testing.assert_allclose(forward(mine, np.ones(6)), forward(MH24, np.ones(6)), atol=1e-9)
+    np.testing.assert_allclose(
+        forward_kinematics(mine, np.ones(6)), forward_kinematics(MH24, np.ones(6)), atol=1e-9
+    )
     assert (out / "meshes" / "foot.stl").is_file()
     assert "source: arm.urdf.xacro" in (out / "robot.yaml").read_text(encoding="utf-8")
 

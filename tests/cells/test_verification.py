@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import opl
-from opl.cell.inverse import inverse
-from opl.cell.robot import forward
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import forward_kinematics
 from opl.findings import Level
 from opl.geometry.frames import pose
 from opl.geometry.shapes import Body, Cylinder
@@ -72,7 +72,7 @@ def test_bullets_link_poses_agree_with_forward_kinematics():
     postures = random_postures(cell.robot, 200)
     with World(cell) as world:
         found = np.array([world.move_to(q) for q in postures])
-    wanted = forward(cell.robot, postures) @ cell.T_flange_workpiece
+    wanted = forward_kinematics(cell.robot, postures) @ cell.T_flange_workpiece
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-6)
 
 
@@ -122,7 +122,7 @@ def test_every_pair_is_asked_that_the_rules_name():
 def test_round_links_are_round():
     # a thin rod held against the flange disc, all round it: no facets
     robot = v_job().cell.robot
-    T_base_flange = forward(robot, np.zeros(6))
+    T_base_flange = forward_kinematics(robot, np.zeros(6))
     distances = []
     for angle in np.linspace(0.0, 2.0 * np.pi, 33):
         # 20 mm off the rim, half-way along the disc
@@ -147,7 +147,7 @@ def test_round_links_are_round():
 def test_a_concave_part_does_not_collide_in_its_hollow(hollow):
     part = c_shape(width=0.2, wall=0.03, depth=0.1)
     cell = bare_cell(part if hollow else convex_hull(part))
-    p = (forward(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece)[:3, 3]
+    p = (forward_kinematics(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece)[:3, 3]
     # a post that reaches into the C through its opening, which looks up
     cell = with_obstacle(cell, p + np.array([0.0, 0.0, 0.08]), (0.04, 0.04, 0.2))
     turn_a_little = np.zeros((2, 6))
@@ -164,7 +164,7 @@ def test_a_concave_part_does_not_collide_in_its_hollow(hollow):
 
 def test_a_concave_part_collides_with_its_walls():
     cell = bare_cell(c_shape(width=0.2, wall=0.03, depth=0.1))
-    T_base_part = forward(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece
+    T_base_part = forward_kinematics(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece
     p = T_base_part[:3, 3] - 0.085 * T_base_part[:3, 0]  # in the back of the C
     cell = with_obstacle(cell, p, (0.05, 0.05, 0.05))
     q = np.zeros((2, 6))
@@ -176,7 +176,7 @@ def test_what_gets_inside_the_part_is_caught_on_its_way_in():
     # a mesh is a surface: what lies wholly within touches nothing, so the way in must be seen
     cell = bare_cell(block((0.1, 0.1, 0.1)), clearance=0.0)
     inside = np.zeros(6)
-    p = (forward(cell.robot, inside) @ cell.T_flange_workpiece)[:3, 3]
+    p = (forward_kinematics(cell.robot, inside) @ cell.T_flange_workpiece)[:3, 3]
     cell = with_obstacle(cell, p, (0.002, 0.002, 0.002))
     q = np.zeros((2, 6))
     q[0, 0] = -0.3
@@ -193,7 +193,7 @@ def test_the_v_motion_is_proven():
     assert verification.limit_violations == 0
     assert isinstance(verification.verified, VerifiedMotion)
     assert verification.max_contact_error <= v_job().search.max_contact_error
-    assert verification.min_clearance >= v_job().cell.clearance
+    assert verification.min_clearance >= v_job().cell.required_clearance
     assert verification.engine.startswith("PyBullet ")
 
 
@@ -211,7 +211,7 @@ def test_the_replay_is_dense():
     # no joint turns by more than half a degree between two poses, so there are at least so many
     turned = np.abs(np.diff(v_motion().q, axis=0)).max(axis=1)
     assert v_verification().poses >= np.ceil(turned / TURN).sum()
-    Ts = forward(v_job().cell.robot, v_motion().q) @ v_job().cell.T_flange_workpiece
+    Ts = forward_kinematics(v_job().cell.robot, v_motion().q) @ v_job().cell.T_flange_workpiece
     way = np.linalg.norm(np.diff(Ts[:, :3, 3], axis=0), axis=1)
     assert v_verification().poses >= way.sum() / STEP
 
@@ -244,10 +244,10 @@ def test_progress_is_told():
 def moved_into_wheel(motion, index, depth):
     """Return a motion with one posture moved towards the wheel."""
     cell = tiny_problem().cell
-    T_base_flange = forward(cell.robot, motion.q[index])
+    T_base_flange = forward_kinematics(cell.robot, motion.q[index])
     into = cell.wheel.T_base_contact(motion.contact_position[index])[:3, 2]
     T_base_flange[:3, 3] += depth * into
-    found = inverse(cell.robot.arm, T_base_flange, motion.q[index])
+    found = inverse_kinematics(cell.robot.arm, T_base_flange, motion.q[index])
     found = found + 2 * np.pi * np.round((motion.q[index] - found) / (2 * np.pi))
     q = motion.q.copy()
     q[index] = found[np.nanargmin(np.abs(found - q[index]).max(axis=1))]
@@ -286,7 +286,7 @@ def test_an_obstacle_on_a_free_move_is_caught(stretch):
     motion, problem = tiny_motion(), tiny_problem()
     move = indices(motion, stretch)[1 if stretch is Stretch.HOME else 0]
     middle = (motion.q[move - 1] + motion.q[move]) / 2.0
-    p = (forward(problem.cell.robot, middle) @ problem.cell.T_flange_workpiece)[:3, 3]
+    p = (forward_kinematics(problem.cell.robot, middle) @ problem.cell.T_flange_workpiece)[:3, 3]
     cell = with_obstacle(problem.cell, p, (0.01, 0.01, 0.01))
     verification = replay_tiny(cell=cell)
     assert refuses(verification, "collision", "post")
@@ -298,7 +298,7 @@ def test_a_collision_that_exists_only_between_two_postures_is_caught():
     ends = small_motion().q[:2]  # from home to the first pass, a long way
     middle = ends.mean(axis=0)
     cell = v_job().cell
-    p = (forward(cell.robot, middle) @ cell.T_flange_workpiece)[:3, 3]
+    p = (forward_kinematics(cell.robot, middle) @ cell.T_flange_workpiece)[:3, 3]
     cell = with_obstacle(cell, p, (0.02, 0.02, 0.02))
     scene = FclScene(cell)
     assert all(min(scene.clearances(q).values()) > 0.0 for q in ends)
@@ -313,7 +313,7 @@ def test_an_obstacle_thinner_than_a_large_step_is_caught():
     q = np.zeros((2, 6))
     q[1, 0] = 1.6
     middle = np.array([0.83, 0, 0, 0, 0, 0])
-    p = (forward(cell.robot, middle) @ cell.T_flange_workpiece)[:3, 3]
+    p = (forward_kinematics(cell.robot, middle) @ cell.T_flange_workpiece)[:3, 3]
     cell = with_obstacle(cell, p, (0.001, 0.001, 0.001))
     verification = replay(cell, NO_POINTS, free_move(q), 1e-4)
     assert refuses(verification, "collision", "part and post")
@@ -414,7 +414,7 @@ def test_a_free_move_too_near_the_wheel_is_caught():
 @pytest.mark.parametrize("clearance", [0.005, 0.02])
 def test_too_near_is_a_collision(clearance):
     cell = bare_cell(block((0.06, 0.06, 0.06)), clearance=clearance)
-    p = (forward(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece)[:3, 3]
+    p = (forward_kinematics(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece)[:3, 3]
     for gap, hit in [(0.9 * clearance, True), (1.1 * clearance, False)]:
         near = with_obstacle(cell, p + np.array([0.0, 0.0, 0.045 + gap]))
         verification = replay(near, NO_POINTS, free_move(np.zeros((2, 6))), 1e-4)
@@ -438,7 +438,7 @@ def test_skipping_pairs_leaves_out_nothing(seed, monkeypatch):
         problem.cell.robot.lower,
         problem.cell.robot.upper,
     )
-    p = forward(problem.cell.robot, q)[3, :3, 3] + random.uniform(-0.15, 0.15, 3)
+    p = forward_kinematics(problem.cell.robot, q)[3, :3, 3] + random.uniform(-0.15, 0.15, 3)
     cell = with_obstacle(problem.cell, p, (0.02, 0.02, 0.02))
     skipping = replay(cell, NO_POINTS, free_move(q), 1e-4)
     monkeypatch.setattr(World, "levers", lambda self: np.full(6, 1e12))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from opl.cell.drawing import drawn_arm, wrist_reach
-from opl.cell.inverse import inverse
-from opl.cell.robot import forward, known_robots, load_robot
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import forward_kinematics, known_robots, load_robot
 from opl.report.arm_view import arm_view
 from tests.support.jobs import opl
 
@@ -33,7 +33,9 @@ def test_the_picture_shows_dimensions_axes_and_limits_and_repeats_to_the_byte(na
 def test_what_is_drawn_is_the_arm_at_zero(name):
     robot = load_robot(name)
     arm = drawn_arm(robot)
-    np.testing.assert_allclose(arm.flange, forward(robot, np.zeros(6))[:3, 3], atol=1e-12)
+    np.testing.assert_allclose(
+        arm.flange, forward_kinematics(robot, np.zeros(6))[:3, 3], atol=1e-12
+    )
     np.testing.assert_allclose(np.abs(arm.axes[1]), [0, 1, 0], atol=1e-12)
     np.testing.assert_allclose(arm.axis_points[1], [robot.arm.a1, 0, robot.arm.c1], atol=1e-12)
     corners = np.concatenate([points for _, points in arm.outlines])
@@ -49,7 +51,7 @@ def test_the_reach_is_where_joints_2_and_3_can_bring_the_wrist(name):
     Ts = np.tile(np.eye(4), (400, 1, 1))
     Ts[:, :3, 2], Ts[:, :3, 0], Ts[:, :3, 1] = [0, 1, 0], [1, 0, 0], [0, 0, -1]
     Ts[:, :3, 3] = np.column_stack([x, np.full(400, robot.arm.c4), z])
-    found = inverse(robot.arm, Ts)
+    found = inverse_kinematics(robot.arm, Ts)
     at_zero = np.abs(np.remainder(found[..., 0] + 1.0, 2.0 * np.pi) - 1.0) < 1e-9
     q = found[..., 1:3]
     turned = np.stack([q - 2.0 * np.pi, q, q + 2.0 * np.pi], axis=2)

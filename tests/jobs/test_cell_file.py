@@ -95,8 +95,8 @@ def test_the_cell_that_comes_with_opl_is_in_the_base_frame():
     assert [limit.name for limit in cell.limits] == ["R", "R+T"]
     assert cell.limits[1].coefficients.tolist() == [0, 0, 0, 1, 0, 1]
     rules = cell.said.rules("belt grinder", ())
-    assert rules.clearances[frozenset(["B_link", "machine frame"])] == pytest.approx(0.02)
-    assert rules.clearances[frozenset(["T_link", "fence left"])] == pytest.approx(0.05)
+    assert rules.required[frozenset(["B_link", "machine frame"])] == pytest.approx(0.02)
+    assert rules.required[frozenset(["T_link", "fence left"])] == pytest.approx(0.05)
     assert rules.allowed == {frozenset(["gripper", "part"])}
 
 
@@ -104,7 +104,8 @@ def test_a_job_in_a_cell_without_frills_is_the_job_that_says_it_all_itself(tmp_p
     own = load(write_job(tmp_path / "own", {"obstacles": PLAIN["obstacles"]}, quick=False)).cell
     shared = load(write_both(tmp_path / "shared")).cell
     np.testing.assert_array_equal(own.wheel.T_base_contact0, shared.wheel.T_base_contact0)
-    assert (own.clearance, own.contact_allowance) == (shared.clearance, shared.contact_allowance)
+    assert own.required_clearance == shared.required_clearance
+    assert own.contact_allowance == shared.contact_allowance
     for mine, theirs in zip(
         (*own.obstacles, *own.fixture), (*shared.obstacles, *shared.fixture), strict=True
     ):
@@ -218,7 +219,7 @@ def test_a_job_picks_a_wheel_and_keeps_away_from_the_others(tmp_path):
         job = load(write_both(tmp_path, two, {"wheel_name": picked}))
         assert [body.name for body in job.cell.obstacles] == ["post", other]
         named = other if picked == "coarse" else "wheel"
-        assert job.cell.pairs.clearances == {frozenset(["part", named]): pytest.approx(0.03)}
+        assert job.cell.pairs.required == {frozenset(["part", named]): pytest.approx(0.03)}
         cylinder = job.cell.obstacles[1]
         assert (cylinder.shape.radius, cylinder.shape.length) == (0.15, 0.05)
         middle = {wheel["name"]: wheel for wheel in wheels}[other]["T_base_contact0_mm"]
@@ -246,7 +247,7 @@ def test_a_pair_of_one_link_goes_before_all_links(tmp_path):
     pairs = load(write_both(tmp_path, said, {"fixture.bodies": held})).cell.pairs
     of_post = {
         name: round(1e3 * distance)
-        for both, distance in pairs.clearances.items()
+        for both, distance in pairs.required.items()
         for name in both - {"post"}
     }
     links = link_names(load_robot("mh24"))

@@ -17,8 +17,8 @@ from scipy.spatial import KDTree
 
 from opl import pipeline
 from opl.cell.collision import CollisionScene
-from opl.cell.inverse import inverse
-from opl.cell.robot import forward
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.toolpath import CutterPoints
@@ -189,7 +189,7 @@ def test_a_swapped_wrist_in_the_middle_is_found(written):
     text, point = Text(written), written.middle
     number, robot = written.moves[point], written.job.cell.robot
     q = text.angles(number)
-    slots = inverse(robot.arm, forward(robot, q), q)
+    slots = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)
     here = int(np.abs(np.remainder(slots - q + np.pi, 2 * np.pi) - np.pi).max(axis=1).argmin())
     other = slots[(here + 4) % 8]  # the same pose, the wrist flipped
     proof = proof_of(written, text.put(number, text.scale.to_pulses(other)))
@@ -312,7 +312,7 @@ def test_a_collision_only_between_two_postures_is_found(written):
     q = np.array([text.angles(number) for number in range(written.last + 1)])
 
     def corners(postures):
-        Ts = forward(cell.robot, postures) @ cell.T_flange_workpiece
+        Ts = forward_kinematics(cell.robot, postures) @ cell.T_flange_workpiece
         return transform(Ts[:, None], cell.part.vertices)
 
     # the corner that, half-way, is farthest from all corners at the written postures

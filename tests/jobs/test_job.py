@@ -216,9 +216,9 @@ def test_a_home_in_collision_is_refused_with_the_pairs(tmp_path):
 
 def test_a_home_with_the_part_in_the_wheel_is_refused(tmp_path):
     at_home = load(write_job(tmp_path)).cell  # the wheel is put where the part is at home
-    from opl.cell.robot import forward
+    from opl.cell.robot import forward_kinematics
 
-    T = forward(at_home.robot, np.deg2rad(document()["process"]["home_deg"]))
+    T = forward_kinematics(at_home.robot, np.deg2rad(document()["process"]["home_deg"]))
     pose = T @ at_home.T_flange_workpiece
     pose[:3, 3] = 1e3 * (pose @ [0, -0.0246, 0.09, 1.0])[:3]
     changes = {"wheel.T_base_contact0_mm": pose.tolist(), "fixture.bodies": []}

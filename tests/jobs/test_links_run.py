@@ -12,7 +12,7 @@ from tempfile import mkdtemp
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from opl.cell.robot import forward, load_robot
+from opl.cell.robot import forward_kinematics, load_robot
 from opl.deliver import deliver
 from opl.job.load import load
 from opl.pipeline import cutter_points, pose_problem, run
@@ -112,7 +112,7 @@ def test_another_process_finds_the_same_ways():
 def cage():
     """Return walls around the part at home, the one behind it open for the stem only."""
     cell = load_robot("mh24")
-    T_base_flange = forward(cell, np.deg2rad(np.array(SIDEWAYS, dtype=float)))
+    T_base_flange = forward_kinematics(cell, np.deg2rad(np.array(SIDEWAYS, dtype=float)))
     low, high, hole, wall = [-130, -130, 40], [130, 150, 240], 35, 10
     (x0, y0, z0), (x1, y1, z1) = low, high
     spans = {

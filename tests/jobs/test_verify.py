@@ -15,8 +15,8 @@ import trimesh
 import yaml
 
 from opl import pipeline
-from opl.cell.inverse import inverse
-from opl.cell.robot import forward
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import forward_kinematics
 from opl.job.load import load
 from opl.program.inform.files import load_jobs
 from opl.program.inform.playback import play
@@ -207,7 +207,7 @@ def test_a_swapped_branch_in_the_middle_is_found(tmp_path):
     robot = load(planned() / "job.yaml").cell.robot
     scale = PulseScale.of(robot)
     q = scale.to_angles(np.array(text.pulses(number)))
-    slots = inverse(robot.arm, forward(robot, q), q)
+    slots = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)
     here = int(np.abs(np.remainder(slots - q + np.pi, 2 * np.pi) - np.pi).max(axis=1).argmin())
     other = slots[(here + 4) % 8]  # the same pose, the wrist flipped
     ended = verify(tmp_path, text.put(number, scale.to_pulses(other)))
@@ -319,7 +319,7 @@ def test_a_collision_only_between_two_points_is_found(tmp_path):
     cell = load(planned() / "job.yaml").cell
     scale = PulseScale.of(cell.robot)
     q = [scale.to_angles(np.array(Text().pulses(k))) for k in (0, 1)]
-    middle = forward(cell.robot, (q[0] + q[1]) / 2.0) @ cell.T_flange_workpiece
+    middle = forward_kinematics(cell.robot, (q[0] + q[1]) / 2.0) @ cell.T_flange_workpiece
     at = (middle[:3, :3] @ cell.part.vertices.mean(axis=0) + middle[:3, 3]) * 1e3
     plate = {"name": "plate", "box_mm": [2, 60, 2], "at_mm": at.round(1).tolist()}
     ended = verify(tmp_path, Text(), {"obstacles": [plate]})

@@ -6,6 +6,7 @@ import pytest
 from opl.geometry.frames import rotation_angle
 from opl.geometry.surface_grid import sample_grid
 from tests.support.solids import ORIGINS, Closed, cone, cylinder, lay, plane, sphere, torus
+from tests.support.surfaces import principal_curvatures
 
 X, Y, Z = np.eye(3)
 SOLIDS = [plane(), cylinder(), cone(), sphere(), torus()]
@@ -25,7 +26,9 @@ def test_points_normals_and_curvatures_are_those_of_the_closed_form(solid: Close
     # where both are equal they part by the square root of a rounding error
     loose = 1e-6 if solid.name == "sphere" else 1e-9
     size = np.abs(expected).max() or 1.0
-    np.testing.assert_allclose(surface.principal_curvatures(uv) / size, expected / size, atol=loose)
+    np.testing.assert_allclose(
+        principal_curvatures(surface, uv) / size, expected / size, atol=loose
+    )
 
 
 @pytest.mark.parametrize("solid", SOLIDS, ids=lambda solid: solid.name)

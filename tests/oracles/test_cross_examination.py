@@ -9,10 +9,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from opl.cell.clearance import part_tree, wheel_clearance
 from opl.cell.collision import CollisionScene
-from opl.cell.inverse import inverse
-from opl.cell.robot import forward
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import part_tree, signed_wheel_distance
 from opl.job.load import load
 from opl.pipeline import cutter_points
 from opl.resources import folder
@@ -57,7 +57,9 @@ def postures_of_interest(job, points, count):
     column = random.integers(len(points), size=20 * count)
     t = random.uniform(-1.0, 1.0, len(column)) * job.cell.wheel.last_position
     Ts = job.cell.Ts_base_flange(t, points.Ts_workpiece_cutter[column])
-    slots = inverse(robot.arm, Ts)[np.arange(len(column)), random.integers(8, size=len(column))]
+    slots = inverse_kinematics(robot.arm, Ts)[
+        np.arange(len(column)), random.integers(8, size=len(column))
+    ]
     within = ((slots >= robot.lower) & (slots <= robot.upper)).all(axis=1)
     on_wheel = slots[within][: count - n]
     # some stay within hundredths of a millimetre of the wheel, some come near to other things
@@ -72,8 +74,8 @@ def examined(part, count=COUNT):
     job = load(folder("workpieces") / part / "job.yaml")
     cell = job.cell
     postures = postures_of_interest(job, cutter_points(job), count)
-    Ts = cell.Ts_contact0_workpiece(forward(cell.robot, postures))
-    exact = wheel_clearance(part_tree(cell.part), cell.wheel, Ts, 0.02)
+    Ts = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, postures))
+    exact = signed_wheel_distance(part_tree(cell.part), cell.wheel, Ts, 0.02)
     fcl_scene = FclScene(cell)
     by_fcl = [min(fcl_scene.clearances(q).values(), default=np.inf) for q in postures]
     by_bullet, as_held_to, gap = [], [], []

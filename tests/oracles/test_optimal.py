@@ -9,7 +9,7 @@ import pytest
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.motion.check import RESOLUTION, densify
 from opl.motion.figures import figures_of_path
 from opl.motion.timing import timed
@@ -364,7 +364,7 @@ def test_a_tube_holds_the_path_and_only_postures_that_grind_near_it():
         assert np.abs(near - t).max() <= REACH * np.diff(finer).max() + 1e-9
         assert len(near) > 1
     columns, rows = np.nonzero(free)
-    Ts = forward(problem.cell.robot, nodes.q[free]) @ problem.cell.T_flange_workpiece
+    Ts = forward_kinematics(problem.cell.robot, nodes.q[free]) @ problem.cell.T_flange_workpiece
     Ts_base_cutter = Ts @ problem.points.Ts_workpiece_cutter[columns]
     on_wheel = problem.cell.wheel.T_base_contact(nodes.contact_position[rows])
     np.testing.assert_allclose(Ts_base_cutter - on_wheel, 0.0, atol=1e-9)

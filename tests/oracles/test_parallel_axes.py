@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from opl.cell.inverse import inverse
+from opl.cell.inverse_kinematics import inverse_kinematics, singularity_margins
 from opl.cell.parallel_axes import ParallelAxesArm
-from opl.cell.robot import controller_poses, forward, known_robots, load_robot
-from opl.cell.singularity import singularity_margins
+from opl.cell.robot import controller_poses, forward_kinematics, known_robots, load_robot
 from opl.planning.nodes import _lift
 from tests.support.closed_forms import difference
 
@@ -68,7 +67,7 @@ def assert_reached(arm, found, T, atol=1e-9):
 @settings(max_examples=80, deadline=None)
 def test_every_posture_found_reaches_the_pose_and_the_original_is_among_them(arm, q):
     T = drawn(arm, q)
-    found = inverse(arm, T, q)
+    found = inverse_kinematics(arm, T, q)
     assert_reached(arm, found, T, atol=1e-8)
     if singularity_margins(arm, q).min() > 1e-3:
         assert difference(found, q).min() < 1e-8
@@ -76,7 +75,9 @@ def test_every_posture_found_reaches_the_pose_and_the_original_is_among_them(arm
 
 def test_the_drawing_is_the_urdf():
     q = np.random.default_rng(0).uniform(UR10E.lower, UR10E.upper, (50, 6))
-    np.testing.assert_allclose(forward(UR10E, q), [drawn(UR10E.arm, row) for row in q], atol=1e-12)
+    np.testing.assert_allclose(
+        forward_kinematics(UR10E, q), [drawn(UR10E.arm, row) for row in q], atol=1e-12
+    )
 
 
 def test_eaik_finds_the_same_postures():
@@ -89,7 +90,9 @@ def test_eaik_finds_the_same_postures():
     assert eaik.getKinematicFamily() == "6R-THREE_INNER_PARALLEL"
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (300, 6))
     Ts = controller_poses(UR10E, q)
-    for T, found in zip(Ts, inverse(UR10E.arm, forward(UR10E, q)), strict=True):
+    for T, found in zip(
+        Ts, inverse_kinematics(UR10E.arm, forward_kinematics(UR10E, q)), strict=True
+    ):
         theirs = eaik.IK(T)
         exact = np.array(theirs.Q)[~np.array(theirs.is_LS)]
         ours = found[~np.isnan(found[:, 0])]
@@ -105,7 +108,9 @@ def test_eaik_on_the_urdf_agrees_about_every_robot_that_comes_with_opl(name):
     eaik = UrdfRobot(str(robot.urdf), [])
     q = np.random.default_rng(2).uniform(robot.lower, robot.upper, (40, 6))
     q = q[singularity_margins(robot.arm, q).min(axis=-1) > 0.02]
-    for row, found in zip(q, inverse(robot.arm, forward(robot, q)), strict=True):
+    for row, found in zip(
+        q, inverse_kinematics(robot.arm, forward_kinematics(robot, q)), strict=True
+    ):
         theirs = eaik.IK(eaik.fwdKin(row))
         exact = np.array(theirs.Q)[~np.array(theirs.is_LS)]
         ours = found[~np.isnan(found[:, 0])]
@@ -132,30 +137,30 @@ def test_the_determinant_of_the_jacobian_is_the_product_of_the_margins():
 @pytest.mark.parametrize("q6", [0.0, 0.7, -3.0])
 def test_a_straight_wrist_keeps_joint_6(arm, straight, q6):
     q = np.array([0.3, -0.9, 1.1, 0.4, (straight + arm.offsets[4]) * arm.signs[4], q6])
-    found = inverse(arm, drawn(arm, q), q)
+    found = inverse_kinematics(arm, drawn(arm, q), q)
     assert_reached(arm, found, drawn(arm, q))
     assert difference(found, q).min() < 1e-7
-    assert_reached(arm, inverse(arm, drawn(arm, q)), drawn(arm, q))
+    assert_reached(arm, inverse_kinematics(arm, drawn(arm, q)), drawn(arm, q))
 
 
 @pytest.mark.parametrize("exponent", range(-16, -2))
 def test_a_nearly_straight_wrist_closes_as_well(exponent):
     q = np.array([0.3, -0.9, 1.1, 0.4, 10.0**exponent, -0.5])
     T = drawn(UR10E.arm, q)
-    assert_reached(UR10E.arm, inverse(UR10E.arm, T, q), T, atol=1e-10)
+    assert_reached(UR10E.arm, inverse_kinematics(UR10E.arm, T, q), T, atol=1e-10)
 
 
 @pytest.mark.parametrize("elbow", [0.0, np.pi])
 def test_an_arm_in_line_is_reached(elbow):
     q = np.array([0.3, -0.9, elbow, 0.4, 0.8, -0.5])
-    T = forward(UR10E, q)
-    assert_reached(UR10E.arm, inverse(UR10E.arm, T), T, atol=1e-8)
+    T = forward_kinematics(UR10E, q)
+    assert_reached(UR10E.arm, inverse_kinematics(UR10E.arm, T), T, atol=1e-8)
 
 
 def test_out_of_reach_is_nan_in_all_joints():
-    Ts = forward(UR10E, np.random.default_rng(0).uniform(-np.pi, np.pi, (300, 6)))
+    Ts = forward_kinematics(UR10E, np.random.default_rng(0).uniform(-np.pi, np.pi, (300, 6)))
     Ts[:, :3, 3] *= 1.3
-    missing = np.isnan(inverse(UR10E.arm, Ts))
+    missing = np.isnan(inverse_kinematics(UR10E.arm, Ts))
     assert missing.any() and not missing.all()
     np.testing.assert_array_equal(missing.any(axis=-1), missing.all(axis=-1))
 
@@ -166,7 +171,9 @@ def test_a_slot_is_left_only_through_a_singularity(arm):
     start, end = random.uniform(-np.pi, np.pi, (2, 60, 1, 6))
     path = start + np.linspace(0, 1, 20)[:, None] * (end - start)
     Ts = np.array([[drawn(arm, q) for q in way] for way in path])
-    slots = np.nan_to_num(difference(inverse(arm, Ts), path[:, :, None]), nan=9.0).argmin(axis=-1)
+    slots = np.nan_to_num(
+        difference(inverse_kinematics(arm, Ts), path[:, :, None]), nan=9.0
+    ).argmin(axis=-1)
     theta = path * np.array(arm.signs) - np.array(arm.offsets)
     tilt = np.cumsum(theta[..., 1:4], axis=-1)
     signs = [
@@ -180,6 +187,8 @@ def test_a_slot_is_left_only_through_a_singularity(arm):
 
 
 def test_full_turns_of_nearly_every_joint_do_not_multiply_the_work():
-    q = inverse(UR10E.arm, forward(UR10E, np.array([[[0.1, -1.5, 1.2, 0.3, -1.4, 0.2]]])))
+    q = inverse_kinematics(
+        UR10E.arm, forward_kinematics(UR10E, np.array([[[0.1, -1.5, 1.2, 0.3, -1.4, 0.2]]]))
+    )
     _, sheets, copies = _lift(q[:, :, 0], UR10E.lower, UR10E.upper)
     assert len(sheets) == len(copies) == 1

@@ -8,8 +8,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from opl.cell.inverse import inverse, turns
-from opl.cell.robot import controller_poses, forward, known_robots, load_robot, robot_path
+from opl.cell.full_turns import full_turns
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import (
+    controller_poses,
+    forward_kinematics,
+    known_robots,
+    load_robot,
+    robot_path,
+)
 from opl.cell.robot_file import read_robot_file
 from opl.cell.urdf_import import closure_error
 from opl.documents import read
@@ -115,7 +122,7 @@ def test_the_zero_posture_of_the_ur10e_is_the_makers():
 @every_spherical_wrist
 def test_the_zero_posture_is_the_makers(robot):
     ahead, high, x_up, reach = AT_ZERO[robot.name]
-    T = forward(robot, np.zeros(6))
+    T = forward_kinematics(robot, np.zeros(6))
     x = [0.0, 0.0, 1.0 if x_up else -1.0]
     np.testing.assert_allclose(T[:3, :3].T, [x, np.cross([1, 0, 0], x), [1, 0, 0]], atol=1e-12)
     floor = robot.base_height
@@ -127,22 +134,26 @@ def test_the_zero_posture_is_the_makers(robot):
 def test_forward_agrees_with_denavit_hartenberg(robot):
     q = random_postures(robot, 100)
     expected = [dh_forward(robot.name, row) for row in q]
-    np.testing.assert_allclose(forward(robot, q), expected, atol=1e-12)
+    np.testing.assert_allclose(forward_kinematics(robot, q), expected, atol=1e-12)
 
 
 @every_robot
 def test_every_posture_found_reaches_the_pose_and_the_original_is_among_them(robot):
     assert closure_error(robot) < 1e-11
     q = random_postures(robot, 300, seed=1)
-    found = inverse(robot.arm, forward(robot, q))[:, :, None] + turns(robot.lower, robot.upper)
+    found = inverse_kinematics(robot.arm, forward_kinematics(robot, q))[:, :, None] + full_turns(
+        robot.lower, robot.upper
+    )
     distance = np.abs(found - q[:, None, None]).max(axis=-1)
     assert np.nanmin(distance.reshape(len(q), -1), axis=1).max() < 1e-8
 
 
 @every_spherical_wrist
 def test_an_independent_package_finds_the_same_postures(robot):
-    Ts = forward(robot, random_postures(robot, 60, seed=2))
-    for q, q_opw in zip(inverse(robot.arm, Ts), opw_solutions(robot.arm, Ts), strict=True):
+    Ts = forward_kinematics(robot, random_postures(robot, 60, seed=2))
+    for q, q_opw in zip(
+        inverse_kinematics(robot.arm, Ts), opw_solutions(robot.arm, Ts), strict=True
+    ):
         q = q[~np.isnan(q).any(axis=-1)]
         assert len(q) == len(q_opw) > 0
         apart = np.abs(np.remainder(q[:, None] - q_opw[None] + np.pi, 2 * np.pi) - np.pi)

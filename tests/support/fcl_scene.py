@@ -7,7 +7,7 @@ import fcl
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Box
@@ -96,18 +96,18 @@ class FclScene:
             elif a in place and b in held:
                 if place[a] < len(chain) - 1:
                     near = place[a] == len(chain) - 2
-                    pairs.append((one, other, 0.0 if near else cell.clearance))
+                    pairs.append((one, other, 0.0 if near else cell.required_clearance))
             elif (a, b) == ("part", "wheel") or place.get(a) == 0:
                 continue
             elif a in place or (a in held and b not in held):
-                pairs.append((one, other, cell.clearance))
+                pairs.append((one, other, cell.required_clearance))
         return list(self._as_said(pairs, cell.pairs))
 
     def _as_said(self, pairs, rules):
         for one, other, needed in pairs:
             names = frozenset([self.pieces[one][0], self.pieces[other][0]])
             if names not in rules.allowed:
-                yield one, other, rules.clearances.get(names, needed)
+                yield one, other, rules.required.get(names, needed)
 
     @staticmethod
     def _rank(place, held):
@@ -193,7 +193,7 @@ def margin_along(cell, q, step=0.4):
     least = np.inf
     for posture in dense:
         least = min(least, *scene.clearances(posture).values(), np.inf)
-        T = cell.Ts_contact0_workpiece(forward(cell.robot, posture))
-        gap = cell.wheel.clearance(transform(T, corners)).min()
+        T = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, posture))
+        gap = cell.wheel.signed_distance(transform(T, corners)).min()
         least = min(least, gap - cell.part_from_wheel)
     return least

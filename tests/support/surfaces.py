@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from opl.geometry.nurbs import NurbsSurface
+from opl.geometry.surface_file import load_faces
 
 CLAMPED = {degree: np.repeat([0.0, 1.0], degree + 1) for degree in (1, 2, 3)}
 
@@ -71,6 +72,18 @@ def parameters(surface, n=200, seed=0):
     inside = np.random.default_rng(seed).uniform(lower, upper, (n, 2))
     corners = [[u, v] for u in (lower[0], upper[0]) for v in (lower[1], upper[1])]
     return np.vstack([inside, corners])
+
+
+def load_surface(path):
+    """Return the NURBS surface of a file with a single face."""
+    return load_faces(path)[0].surface
+
+
+def principal_curvatures(surface, uv):
+    """Return the smallest and the largest normal curvature in [1/m], shape (..., 2)."""
+    du, normal = surface.derivatives(uv, 1)[..., 1, 0, :], surface.normal(uv)
+    x = du / np.linalg.norm(du, axis=-1, keepdims=True)
+    return np.linalg.eigvalsh(surface.curvature_tensor(uv, x, np.cross(normal, x)))
 
 
 def profile_distance(points):

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.errors import InputError, UnsafeError
 from opl.geometry.frames import from_roll_pitch_yaw, pose
 from opl.program.inform import parse, write_jobs
@@ -37,7 +37,7 @@ def test_a_posture_is_among_those_its_pose_and_configuration_name(shares):
     q = ROBOT.lower + np.array(shares) * (ROBOT.upper - ROBOT.lower)
     if abs(q[4]) < 0.05 or min(abs(abs(q[[0, 3, 5]]) - np.pi)) < 0.01:
         return
-    found = postures(ROBOT, forward(ROBOT, q), configuration(ROBOT, q))
+    found = postures(ROBOT, forward_kinematics(ROBOT, q), configuration(ROBOT, q))
     assert np.abs(found - q).max(axis=1).min() < 1e-6
 
 
@@ -68,7 +68,7 @@ def test_cartesian_job_leads_to_the_postures_it_was_made_of(form, profile):
     np.testing.assert_allclose(seen, q, atol=4e-4 if profile is NX100 else 4e-6)
     written = T_base_frame @ pose_of(job.positions[3].values)
     np.testing.assert_allclose(
-        written[:3, 3], (forward(ROBOT, q[3]) @ T_FLANGE_TOOL)[:3, 3], atol=1e-6
+        written[:3, 3], (forward_kinematics(ROBOT, q[3]) @ T_FLANGE_TOOL)[:3, 3], atol=1e-6
     )
 
 

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import rotation_angle
 from opl.program.inform import parse, write_jobs
 from opl.program.inform.times import job_postures
@@ -38,7 +38,7 @@ def test_moves_that_stray_too_far_stay_joint_moves():
 def test_stray_is_what_the_two_paths_are_apart_half_way():
     q = np.deg2rad([[0, 0, 0, 0, -60, 0], [20, 0, 0, 0, -60, 0]])
     wrist = np.zeros((1, 3))
-    radius = np.hypot(*forward(ROBOT, q[0])[:2, 3])
+    radius = np.hypot(*forward_kinematics(ROBOT, q[0])[:2, 3])
     sagitta = radius * (1.0 - np.cos(np.deg2rad(10.0)))
     assert stray(ROBOT, q, T_FLANGE_TOOL, wrist)[0] == pytest.approx(sagitta)
     assert stray(ROBOT, q[[0, 0]], T_FLANGE_TOOL, CORNERS)[0] == pytest.approx(0.0)
@@ -50,7 +50,7 @@ def test_speed_of_straight_moves_gives_each_its_wanted_time():
     (text,) = written.files.values()
     job = parse(text)
     q = job_postures(job, ROBOT, np.eye(4), T_FLANGE_TOOL)
-    p = forward(ROBOT, q)[:, :3, 3] * 1e3
+    p = forward_kinematics(ROBOT, q)[:, :3, 3] * 1e3
     lines = [k for k, move in enumerate(job.moves) if move.word == "MOVL"]
     assert len(lines) > 70
     for k in lines:
@@ -72,4 +72,4 @@ def test_tool_point_that_only_turns_gets_its_speed_in_degrees():
     (text,) = write_jobs(program, ROBOT, ProgramSettings(), DX200, DATE).files.values()
     move = parse(text).moves[1]
     assert (move.word, move.tag("V"), move.tag("VR")) == ("MOVL", None, "3.0")
-    assert rotation_angle(*forward(ROBOT, q)) == pytest.approx(np.deg2rad(6.0))
+    assert rotation_angle(*forward_kinematics(ROBOT, q)) == pytest.approx(np.deg2rad(6.0))

@@ -4,9 +4,8 @@ import trimesh
 
 from opl.errors import InputError
 from opl.geometry.mesh import TriangleMesh, load_mesh
-from opl.geometry.surface_file import load_surface
 from opl.resources import folder
-from tests.support.surfaces import profile_distance
+from tests.support.surfaces import load_surface, profile_distance
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [30.0, 0.0, 0.0], [0.0, 20.0, 0.0], [0.0, 0.0, 10.0]])
 TETRAHEDRON = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from opl.cell.robot import forward
+from opl.cell.robot import forward_kinematics
 from opl.cli.commands import main
 from opl.errors import InputError, OplError
 from opl.motion.motion import VerifiedMotion
@@ -218,7 +218,7 @@ def test_straight_moves_of_rapid_and_krl_lead_to_the_pose_of_the_tool():
     changes = {"motion": MotionForm.STRAIGHT, "T_flange_tool": T_flange_tool, "tool": 2}
     program, files = write("RAPID", **changes)
     q = [move.q for move in program.moves if move.straight]
-    wanted = (forward(ROBOT, np.array(q)) @ T_flange_tool)[:, :3, 3] * 1e3
+    wanted = (forward_kinematics(ROBOT, np.array(q)) @ T_flange_tool)[:, :3, 3] * 1e3
     rapid = re.findall(r"MoveL \[\[([^]]*)\]", files["SAMPLE.mod"])
     krl = re.findall(r"LIN \{X (\S+),Y (\S+),Z (\S+),A", write("KRL", **changes)[1]["SAMPLE.src"])
     np.testing.assert_allclose([eval(f"[{p}]") for p in rapid], wanted, atol=1e-3)

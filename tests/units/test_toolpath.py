@@ -5,10 +5,9 @@ from opl.geometry.frames import inverse, rotation_angle
 from opl.geometry.nurbs import DegenerateNormalError, NurbsSurface
 from opl.geometry.passes import Order, Passes, lay_passes
 from opl.geometry.patchwork import Face, Patchwork
-from opl.geometry.surface_file import load_surface
 from opl.geometry.toolpath import CutterPoints
 from opl.resources import folder
-from tests.support.surfaces import cylinder_patch, graph, plane_patch, sphere_patch
+from tests.support.surfaces import cylinder_patch, graph, load_surface, plane_patch, sphere_patch
 
 X, Y, Z = np.eye(3)
 ORIGINS = np.s_[:, :3, 3]

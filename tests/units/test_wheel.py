@@ -1,4 +1,4 @@
-"""The belt wheel: contact frames against the paper's table, clearance against other geometry."""
+"""The belt wheel: contact frames against the paper's table, distance against other geometry."""
 
 import numpy as np
 import pytest
@@ -60,7 +60,7 @@ def test_the_contact_point_lies_on_the_rim_line(t):
     x, y, z = WHEEL.T_contact0_contact(t)[:3, 3]
     assert abs(x) <= WIDTH / 2
     assert (y, z) == (0.0, 0.0)
-    assert WHEEL.clearance(np.array([x, y, z])) == pytest.approx(0.0, abs=1e-15)
+    assert WHEEL.signed_distance(np.array([x, y, z])) == pytest.approx(0.0, abs=1e-15)
 
 
 @given(st.floats(25.0, 70.0), st.sampled_from([-1.0, 1.0]))
@@ -69,7 +69,7 @@ def test_a_rolled_flat_part_touches_only_the_edge(t, side):
     T = WHEEL.T_contact0_contact(side * t)
     flat = np.stack(np.meshgrid(np.linspace(-0.1, 0.1, 21), np.linspace(-0.1, 0.1, 21)), -1)
     flat = np.concatenate([flat, np.zeros((21, 21, 1))], axis=-1).reshape(-1, 3)
-    assert WHEEL.clearance(flat @ T[:3, :3].T + T[:3, 3]).min() > -1e-15
+    assert WHEEL.signed_distance(flat @ T[:3, :3].T + T[:3, 3]).min() > -1e-15
 
 
 def test_contact_positions_run_evenly_from_end_to_end():
@@ -97,7 +97,7 @@ def test_the_pose_is_a_read_only_copy():
         wheel.T_base_contact0[0, 3] = 1.0
 
 
-# clearance
+# distance
 
 
 def brute_force_distance(p):
@@ -118,7 +118,7 @@ def brute_force_distance(p):
 def test_clearance_is_the_distance_to_the_nearest_point_of_the_surface():
     random = np.random.default_rng(0)
     for p in random.uniform([-0.06, -0.2, -0.05], [0.06, 0.2, 0.35], (40, 3)):
-        assert abs(WHEEL.clearance(p)) == pytest.approx(brute_force_distance(p), abs=1e-3)
+        assert abs(WHEEL.signed_distance(p)) == pytest.approx(brute_force_distance(p), abs=1e-3)
 
 
 def test_clearance_agrees_with_a_fine_mesh():
@@ -130,20 +130,20 @@ def test_clearance_agrees_with_a_fine_mesh():
     nearest, _, _ = trimesh.proximity.closest_point_naive(cylinder, p)
     sagitta = RADIUS * (1.0 - np.cos(np.pi / 512))
     distance = np.linalg.norm(nearest - p, axis=1)
-    np.testing.assert_allclose(np.abs(WHEEL.clearance(p)), distance, atol=sagitta + 1e-9)
+    np.testing.assert_allclose(np.abs(WHEEL.signed_distance(p)), distance, atol=sagitta + 1e-9)
 
 
 @given(points)
 def test_the_sign_says_inside_or_outside(p):
     inside = abs(p[0]) < WIDTH / 2 and np.hypot(p[1], p[2] - RADIUS) < RADIUS
-    clearance = WHEEL.clearance(p)
-    assert clearance < 0.0 if inside else clearance >= 0.0
+    distance = WHEEL.signed_distance(p)
+    assert distance < 0.0 if inside else distance >= 0.0
 
 
 @settings(max_examples=300)
 @given(points, points)
 def test_clearance_changes_no_faster_than_the_point_moves(p, other):
-    difference = abs(WHEEL.clearance(p) - WHEEL.clearance(other))
+    difference = abs(WHEEL.signed_distance(p) - WHEEL.signed_distance(other))
     assert difference <= np.linalg.norm(p - other) * (1 + 1e-12) + 1e-15
 
 
@@ -159,4 +159,4 @@ def test_clearance_changes_no_faster_than_the_point_moves(p, other):
     ],
 )
 def test_clearance_at_places_that_are_known(p, wanted):
-    assert WHEEL.clearance(np.array(p)) == pytest.approx(wanted, abs=1e-15)
+    assert WHEEL.signed_distance(np.array(p)) == pytest.approx(wanted, abs=1e-15)

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.cell.inverse import inverse as postures_of
-from opl.cell.robot import Robot, forward
+from opl.cell.full_turns import FULL_TURN, angular_distance
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import Robot, forward_kinematics
 from opl.errors import UnsafeError
 from opl.geometry.frames import from_roll_pitch_yaw, inverse, roll_pitch_yaw
 from opl.program.controller import ControllerProfile
@@ -55,8 +56,8 @@ def pose_of(values: tuple[float, ...]) -> Array:
 
 def configuration(robot: Robot, q: Array) -> tuple[int, ...]:
     """Return the six meaningful numbers of RCONF for a posture, shape (6,)."""
-    slots = postures_of(robot.arm, forward(robot, q), q)
-    apart = np.abs(np.remainder(slots - q + np.pi, 2.0 * np.pi) - np.pi).max(axis=-1)
+    slots = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)
+    apart = angular_distance(slots, q).max(axis=-1)
     slot = int(np.nanargmin(apart))
     flip, back, elbow = slot // 4, slot // 2 % 2, slot % 2
     beyond = (int(abs(q[joint]) > np.pi) for joint in _HALF_TURN_JOINTS)
@@ -82,12 +83,12 @@ def postures(
         return np.empty((0, 6))
     no_flip, lower, back, *beyond = numbers[:6]
     slot = 4 * (1 - no_flip) + 2 * back + int(lower != back)
-    q = postures_of(robot.arm, T_base_flange, near)[slot]
+    q = inverse_kinematics(robot.arm, T_base_flange, near)[slot]
     if np.isnan(q).any():
         return np.empty((0, 6))
     found = [q]
     for joint, is_beyond in zip(_HALF_TURN_JOINTS, beyond, strict=True):
-        turns = 2.0 * np.pi * np.array([-1.0, 1.0]) if is_beyond else np.zeros(1)
+        turns = FULL_TURN * np.array([-1.0, 1.0]) if is_beyond else np.zeros(1)
         found = [p + turn * np.eye(6)[joint] for p in found for turn in turns]
     stack = np.array(found)
     slack = 1e-6  # a posture at its limit, rounded

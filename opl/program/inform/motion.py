@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.cell.robot import Robot, forward
+from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import inverse, rotation_angle
 from opl.program.controller import ControllerProfile
 from opl.program.inform.cartesian import configuration, frame_pose, rectan, require_read_back
@@ -54,7 +54,7 @@ def write_positions(
         texts = tuple(",".join(map(str, row)) for row in pulses.tolist())
         return WrittenPositions(texts, (None,) * len(q), scale.to_angles(pulses))
     T_base_frame, T_flange_tool = frame_pose(settings), settings.T_flange_tool
-    values = rectan(inverse(T_base_frame) @ forward(robot, q) @ T_flange_tool, profile)
+    values = rectan(inverse(T_base_frame) @ forward_kinematics(robot, q) @ T_flange_tool, profile)
     numbers = [configuration(robot, posture) for posture in q]
     read_back = [
         require_read_back(robot, posture, value, number, T_base_frame, T_flange_tool)
@@ -79,7 +79,7 @@ def write_speeds(
     """
     if not program.moves:
         return []
-    Ts_base_tool = forward(robot, q) @ T_flange_tool
+    Ts_base_tool = forward_kinematics(robot, q) @ T_flange_tool
     percent = 100.0 * (np.abs(np.diff(q, axis=0)) / robot.max_speed).max(axis=1)
     lengths = np.linalg.norm(np.diff(Ts_base_tool[:, :3, 3], axis=0), axis=1) * 1e3
     turns = np.rad2deg(rotation_angle(Ts_base_tool[:-1], Ts_base_tool[1:]))

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from opl.cell.inverse import inverse as postures_of
-from opl.cell.robot import Robot, forward
+from opl.cell.full_turns import nearest_turn
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import Robot, forward_kinematics
 from opl.errors import InputError
 from opl.findings import Finding, Level
 from opl.geometry.frames import inverse, pose, rotation_angle
@@ -89,7 +90,7 @@ def play(
 def _played(
     order: list[Visit], q: Array, robot: Robot, T_flange_tool: Array
 ) -> tuple[Playback | None, list[Finding]]:
-    Ts_base_tool = forward(robot, q) @ T_flange_tool
+    Ts_base_tool = forward_kinematics(robot, q) @ T_flange_tool
     way = np.linalg.norm(np.diff(Ts_base_tool[:, :3, 3], axis=0), axis=1)
     turn = rotation_angle(Ts_base_tool[:-1], Ts_base_tool[1:])
     at_top_speed = (np.abs(np.diff(q, axis=0)) / robot.max_speed).max(axis=1)
@@ -127,7 +128,7 @@ def line(robot: Robot, start: Array, end: Array, T_flange_tool: Array) -> Array 
         Joint positions in [rad], shape (k, 6); None if the line leaves the reach, passes through a
         singularity, or ends in another posture.
     """
-    T_start, T_end = forward(robot, np.stack([start, end])) @ T_flange_tool
+    T_start, T_end = forward_kinematics(robot, np.stack([start, end])) @ T_flange_tool
     first = Rotation.from_matrix(T_start[:3, :3])
     turn = (first.inv() * Rotation.from_matrix(T_end[:3, :3])).as_rotvec()
     way = T_end[:3, 3] - T_start[:3, 3]
@@ -142,10 +143,10 @@ def line(robot: Robot, start: Array, end: Array, T_flange_tool: Array) -> Array 
         (first * Rotation.from_rotvec(s * turn)).as_matrix(), T_start[:3, 3] + s * way
     )
     guess = start + s * (end - start)
-    slots = postures_of(robot.arm, Ts_base_tool @ inverse(T_flange_tool), guess)
+    slots = inverse_kinematics(robot.arm, Ts_base_tool @ inverse(T_flange_tool), guess)
     found, q = [], start
     for candidates in slots:
-        turned = candidates + 2.0 * np.pi * np.round((q - candidates) / (2.0 * np.pi))
+        turned = nearest_turn(candidates, q)
         apart = np.abs(turned - q).max(axis=1)
         if np.isnan(apart).all() or np.nanmin(apart) > _FURTHEST_TURN:
             return None

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from opl.cell.robot import Robot, forward
+from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import roll_pitch_yaw
 from opl.program.inform.job import POSITION_KINDS, InformJob, Instruction, Position
 from opl.program.inform.times import job_postures
@@ -85,7 +85,7 @@ def _where(position: Position, q: np.ndarray, robot: Robot) -> Iterator[str]:
         names = zip(robot.joint_names, np.rad2deg(q), strict=True)
         yield f"{label} angles " + " ".join(f"{name} {angle:.3f}" for name, angle in names)
         if pulses:
-            T_base_flange = forward(robot, q)
+            T_base_flange = forward_kinematics(robot, q)
             yield f"{label} flange " + _pose(
                 (*T_base_flange[:3, 3] * 1e3, *np.rad2deg(roll_pitch_yaw(T_base_flange)))
             )

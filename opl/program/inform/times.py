@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.cell.robot import Robot, forward
+from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import inverse, rotation_angle
 from opl.program.inform.cartesian import pose_of, postures
 from opl.program.inform.job import InformJob
@@ -50,7 +50,7 @@ def move_times(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool:
         T_flange_tool: Its tool.
     """
     q = job_postures(job, robot, T_base_frame, T_flange_tool)
-    Ts_base_tool = forward(robot, q) @ T_flange_tool
+    Ts_base_tool = forward_kinematics(robot, q) @ T_flange_tool
     times = np.full(len(q), np.nan)
     for k, move in enumerate(job.moves[1:], start=1):
         if percent := move.tag("VJ"):

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from opl.cell.inverse import N_BRANCHES, branch_name, inverse, turns
-from opl.cell.robot import forward, load_robot
+from opl.cell.full_turns import full_turns
+from opl.cell.inverse_kinematics import N_IK_BRANCHES, ik_branch_name, inverse_kinematics
+from opl.cell.robot import forward_kinematics, load_robot
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.geometry.frames import pose
 from tests.support.closed_forms import difference, opw_solutions
@@ -41,23 +42,25 @@ def assert_reaches(q, T_base_flange, atol=1e-11):
     """Assert that every posture there is, and there is one, has the flange at the pose."""
     found = q[~np.isnan(q).any(axis=-1)]
     assert len(found)
-    np.testing.assert_allclose(forward(MH24, found) - T_base_flange, 0, atol=atol)
+    np.testing.assert_allclose(forward_kinematics(MH24, found) - T_base_flange, 0, atol=atol)
 
 
 # closing the circle
 
 
 def test_every_posture_found_reaches_the_pose():
-    Ts = forward(MH24, random_postures(2000))
-    q = inverse(ARM, Ts)
+    Ts = forward_kinematics(MH24, random_postures(2000))
+    q = inverse_kinematics(ARM, Ts)
     found = ~np.isnan(q).any(axis=-1)
-    wanted = np.broadcast_to(Ts[:, None], (2000, N_BRANCHES, 4, 4))[found]
-    np.testing.assert_allclose(forward(MH24, q[found]), wanted, atol=1e-11)
+    wanted = np.broadcast_to(Ts[:, None], (2000, N_IK_BRANCHES, 4, 4))[found]
+    np.testing.assert_allclose(forward_kinematics(MH24, q[found]), wanted, atol=1e-11)
 
 
 def test_the_original_posture_is_among_slots_and_turns():
     q = random_postures(2000)
-    candidates = inverse(ARM, forward(MH24, q))[:, :, None] + turns(MH24.lower, MH24.upper)
+    candidates = inverse_kinematics(ARM, forward_kinematics(MH24, q))[:, :, None] + full_turns(
+        MH24.lower, MH24.upper
+    )
     distance = np.abs(candidates - q[:, None, None]).max(axis=-1)
     assert np.nanmin(distance.reshape(2000, -1), axis=1).max() < 1e-8
 
@@ -68,16 +71,16 @@ whole_degrees = arrays(np.int64, 6, elements=st.integers(-180, 180))
 @settings(deadline=None, max_examples=200)
 @given(whole_degrees)
 def test_whole_degrees_come_back_however_singular_they_are(degrees):
-    T = forward(MH24, np.radians(degrees))
-    assert_reaches(inverse(ARM, T), T)
+    T = forward_kinematics(MH24, np.radians(degrees))
+    assert_reaches(inverse_kinematics(ARM, T), T)
 
 
 def test_single_poses_and_stacks_agree():
-    Ts = forward(MH24, random_postures(6)).reshape(2, 3, 4, 4)
-    q = inverse(ARM, Ts)
+    Ts = forward_kinematics(MH24, random_postures(6)).reshape(2, 3, 4, 4)
+    q = inverse_kinematics(ARM, Ts)
     assert q.shape == (2, 3, 8, 6)
-    assert inverse(ARM, Ts[:0]).shape == (0, 3, 8, 6)
-    np.testing.assert_allclose(inverse(ARM, Ts[1, 2]), q[1, 2], atol=1e-12)
+    assert inverse_kinematics(ARM, Ts[:0]).shape == (0, 3, 8, 6)
+    np.testing.assert_allclose(inverse_kinematics(ARM, Ts[1, 2]), q[1, 2], atol=1e-12)
 
 
 @pytest.mark.parametrize("wrist", [None, 0.0, np.pi], ids=["random", "zero", "half a turn"])
@@ -85,14 +88,14 @@ def test_angles_are_principal_to_the_last_digit(wrist):
     q = random_postures(2000)
     if wrist is not None:
         q[:, [3, 5]] = wrist  # the flipped slot, or this one, has joints 4 and 6 at the seam
-    q = inverse(ARM, forward(MH24, q))
+    q = inverse_kinematics(ARM, forward_kinematics(MH24, q))
     assert np.nanmin(q) > -np.pi
     assert np.nanmax(q) <= np.pi
 
 
 def test_a_pose_straight_behind_stays_within_the_limits_of_s():
     q = np.array([np.pi, 0.2, 0.3, 0.4, 0.5, 0.6])
-    q1 = inverse(ARM, forward(MH24, q))[:, 0]
+    q1 = inverse_kinematics(ARM, forward_kinematics(MH24, q))[:, 0]
     assert np.nanmax(q1) <= MH24.upper[0]
     assert np.nanmin(q1) >= MH24.lower[0]
     assert np.nanmin(np.abs(np.abs(q1) - np.pi)) < 1e-15
@@ -107,7 +110,7 @@ def test_an_independent_package_finds_the_same_postures(arm):
     p = random.uniform([-1, -1, -0.3], [1, 1, 1.2], (300, 3))
     Ts = pose(Rotation.random(300, random_state=1).as_matrix(), p)
     n_found = 0
-    for q, q_opw in zip(inverse(arm, Ts), opw_solutions(arm, Ts), strict=True):
+    for q, q_opw in zip(inverse_kinematics(arm, Ts), opw_solutions(arm, Ts), strict=True):
         q = q[~np.isnan(q).any(axis=-1)]
         assert len(q) == len(q_opw)
         if len(q):
@@ -128,8 +131,8 @@ def with_joint_4(angle):
 @pytest.mark.parametrize("straight", [0.0, np.pi, -np.pi])
 @pytest.mark.parametrize("q4", [0.0, 0.7, -3.0, np.pi])
 def test_a_straight_wrist_takes_joint_4_from_the_argument(straight, q4):
-    T = forward(MH24, np.array([0.3, 0.2, -0.1, 0.9, straight, -0.5]))
-    q = inverse(ARM, T, with_joint_4(q4))
+    T = forward_kinematics(MH24, np.array([0.3, 0.2, -0.1, 0.9, straight, -0.5]))
+    q = inverse_kinematics(ARM, T, with_joint_4(q4))
     assert_reaches(q, T)
     found = q[~np.isnan(q[:, 0])]
     singular = np.abs(np.sin(found[:, 4])) < 1e-9
@@ -139,24 +142,24 @@ def test_a_straight_wrist_takes_joint_4_from_the_argument(straight, q4):
 
 def test_each_pose_may_have_its_own_joint_4():
     q = np.array([[0.3, 0.2, -0.1, 0.9, 0.0, -0.5], [0.3, 0.2, -0.1, 0.9, 0.4, -0.5]])
-    found = inverse(ARM, forward(MH24, q), q)
+    found = inverse_kinematics(ARM, forward_kinematics(MH24, q), q)
     assert (difference(found, q[:, None]).min(axis=1) < 1e-11).all()
 
 
 @pytest.mark.parametrize("exponent", range(-16, -2))
 def test_a_nearly_straight_wrist_closes_as_well(exponent):
     q = np.array([0.3, 0.2, -0.1, 0.9, 10.0**exponent, -0.5])
-    T = forward(MH24, q)
-    assert_reaches(inverse(ARM, T), T)
-    assert_reaches(inverse(ARM, T, with_joint_4(-2.0)), T)
+    T = forward_kinematics(MH24, q)
+    assert_reaches(inverse_kinematics(ARM, T), T)
+    assert_reaches(inverse_kinematics(ARM, T, with_joint_4(-2.0)), T)
 
 
 @pytest.mark.parametrize("elbow", [STRETCHED_U, STRETCHED_U + np.pi], ids=["stretched", "folded"])
 @pytest.mark.parametrize("shoulder", np.radians([-100, -37, 0, 41, 90]))
 def test_an_arm_in_line_is_reached(elbow, shoulder):
     q = np.array([0.3, shoulder, elbow, 0.4, 0.5, 0.6])
-    T = forward(MH24, q)
-    found = inverse(ARM, T)
+    T = forward_kinematics(MH24, q)
+    found = inverse_kinematics(ARM, T)
     assert_reaches(found, T, atol=1e-9)
     assert difference(found, q).min() < 1e-6  # the cosine of an angle near 0 knows half its digits
 
@@ -164,20 +167,21 @@ def test_an_arm_in_line_is_reached(elbow, shoulder):
 def flange_ahead_of_axis_2(distance):
     """Return a pose facing forward whose wrist centre lies so far ahead of axis 2."""
     return pose(
-        forward(MH24, np.zeros(6))[:3, :3], np.array([ARM.a1 + distance + ARM.c4, 0.0, ARM.c1])
+        forward_kinematics(MH24, np.zeros(6))[:3, :3],
+        np.array([ARM.a1 + distance + ARM.c4, 0.0, ARM.c1]),
     )
 
 
 def test_reach_ends_where_the_arm_is_straight():
-    assert not np.isnan(inverse(ARM, flange_ahead_of_axis_2(REACH - 1e-9))[:2]).any()
-    assert not np.isnan(inverse(ARM, flange_ahead_of_axis_2(REACH + 1e-10))[:2]).any()
-    assert np.isnan(inverse(ARM, flange_ahead_of_axis_2(REACH + 1e-7))).all()
+    assert not np.isnan(inverse_kinematics(ARM, flange_ahead_of_axis_2(REACH - 1e-9))[:2]).any()
+    assert not np.isnan(inverse_kinematics(ARM, flange_ahead_of_axis_2(REACH + 1e-10))[:2]).any()
+    assert np.isnan(inverse_kinematics(ARM, flange_ahead_of_axis_2(REACH + 1e-7))).all()
 
 
 def test_out_of_reach_is_nan_in_all_joints():
-    Ts = forward(MH24, random_postures(500))
+    Ts = forward_kinematics(MH24, random_postures(500))
     Ts[:, :3, 3] *= 1.3
-    missing = np.isnan(inverse(ARM, Ts))
+    missing = np.isnan(inverse_kinematics(ARM, Ts))
     assert missing.any()
     assert not missing.all()
     np.testing.assert_array_equal(missing.any(axis=-1), missing.all(axis=-1))
@@ -185,49 +189,35 @@ def test_out_of_reach_is_nan_in_all_joints():
 
 def test_a_wrist_centre_beside_an_offset_arm_is_out_of_reach():
     near_axis_1 = pose(np.eye(3), np.array([0.5 * ODD_ARM.b, 0.0, 1.0]))
-    assert np.isnan(inverse(ODD_ARM, near_axis_1)).all()
+    assert np.isnan(inverse_kinematics(ODD_ARM, near_axis_1)).all()
 
 
 def test_a_wrist_centre_on_axis_1_is_reached():
-    T = forward(MH24, np.zeros(6))
+    T = forward_kinematics(MH24, np.zeros(6))
     T[:3, 3] = [ARM.c4, 0.0, 0.9]  # facing forward
-    q = inverse(ARM, T)
+    q = inverse_kinematics(ARM, T)
     assert_reaches(q, T)
     assert not np.isnan(q).any()
 
 
-# slots, turns, names
+# slots, names
 
 
 def test_a_posture_keeps_its_slot_along_a_path():
     start = np.array([-0.4, -0.5, 0.3, -1.0, -1.2, 0.0])
     end = np.array([0.6, 0.5, -0.4, 1.0, -0.3, 2.0])
     path = start + np.linspace(0, 1, 200)[:, None] * (end - start)
-    slots = difference(inverse(ARM, forward(MH24, path)), path[:, None]).argmin(axis=1)
+    slots = difference(
+        inverse_kinematics(ARM, forward_kinematics(MH24, path)), path[:, None]
+    ).argmin(axis=1)
     assert set(slots) == {0}
-
-
-def test_only_r_and_t_of_the_mh24_have_turns():
-    found = turns(MH24.lower, MH24.upper) / (2 * np.pi)
-    assert found.shape == (9, 6)
-    np.testing.assert_array_equal(found[0], np.zeros(6))
-    np.testing.assert_array_equal(found[:, [0, 1, 2, 4]], np.zeros((9, 4)))
-    assert {(r, t) for r, t in found[:, [3, 5]]} == {(r, t) for r in (-1, 0, 1) for t in (-1, 0, 1)}
-    n_turns = np.abs(found).sum(axis=1)
-    np.testing.assert_array_equal(n_turns, np.sort(n_turns))
-
-
-def test_turns_cover_limits_on_one_side():
-    lower, upper = np.zeros(6), np.full(6, np.pi / 2)
-    lower[5], upper[5] = np.radians([200, 400])  # principal angles -160..180 or -180..40, turned
-    np.testing.assert_allclose(turns(lower, upper), [[0, 0, 0, 0, 0, 2 * np.pi]])
 
 
 def test_names_say_how_the_arm_stands():
     model = pin.buildModelFromUrdf(str(MH24.urdf))
     data = model.createData()
     seen = set()
-    for q in inverse(ARM, forward(MH24, random_postures(100))):
+    for q in inverse_kinematics(ARM, forward_kinematics(MH24, random_postures(100))):
         for slot in np.flatnonzero(~np.isnan(q[:, 0])):
             pin.forwardKinematics(model, data, q[slot])
             axis_2, axis_3, wrist = (data.oMi[joint].translation for joint in (2, 3, 5))
@@ -242,6 +232,6 @@ def test_names_say_how_the_arm_stands():
                 "elbow up" if height > 0 else "elbow down",
                 "no flip" if q[slot, 4] < 0 else "flip",
             ]
-            assert branch_name(slot) == ", ".join(name)
+            assert ik_branch_name(slot) == ", ".join(name)
             seen.add(slot)
-    assert seen == set(range(N_BRANCHES))
+    assert seen == set(range(N_IK_BRANCHES))

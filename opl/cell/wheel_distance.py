@@ -1,10 +1,10 @@
 """How far the held part is from the wheel, exactly, for any number of poses.
 
-Part against wheel depends on cutter point and contact position only, not on the robot or its
-branch, so one layer of clearances serves every branch. The signed distance to the wheel, a
-cylinder, is a convex function, so planes below it bound it on a whole triangle. Triangles whose
-bound is no better than the best point known are skipped, the others are halved until the rest
-cannot matter. Bounding spheres around groups of triangles skip most of the mesh at once.
+The distance depends on cutter point and contact position only, not on the robot or its ik_branch,
+so one layer of distances serves every ik_branch. The signed distance to the wheel, a cylinder, is a
+convex function, so planes below it bound it on a whole triangle. Triangles whose bound is no better
+than the best point known are skipped, the others are halved until the rest cannot matter. Bounding
+spheres around groups of triangles skip most of the mesh at once.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from opl.geometry.mesh import TriangleMesh
 from opl.geometry.wheel import ContactWheel
 
 FEW = 64  # poses that are not worth more than one thread
-TOLERANCE = 2e-5  # [m] clearances told are at most this much too large
+TOLERANCE = 2e-5  # [m] distances returned are at most this much too large
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def part_tree(mesh: TriangleMesh) -> PartTree:
     )
 
 
-def wheel_clearance(
+def signed_wheel_distance(
     part: PartTree, wheel: ContactWheel, Ts_contact0_workpiece: Array, needed: Array | float
 ) -> Array:
     """Return the smallest signed distance of the part to the wheel in [m], where it is too small.
@@ -82,27 +82,27 @@ def wheel_clearance(
         part: The part.
         wheel: The wheel; its pose does not matter here.
         Ts_contact0_workpiece: Poses of the part in contact frame 0, shape (..., 4, 4).
-        needed: Clearance needed in [m]: a part that keeps it is not measured further, shape (...)
-            or one for all.
+        needed: Smallest distance allowed in [m]: a part that keeps it is not measured further,
+            shape (...) or one for all.
 
     Returns:
-        Clearance per pose, negative where the part cuts into the wheel, shape (...). Less than
-        needed exactly where the part is too near, and then too large by `TOLERANCE` at most; else
-        the distance of some point of the part.
+        Distance per pose, negative where the part cuts into the wheel, shape (...). Less than
+        ``needed`` exactly where the part is too near, and then too large by `TOLERANCE` at most;
+        otherwise the distance of some point of the part.
     """
     shape = Ts_contact0_workpiece.shape[:-2]
     needs = np.array(np.broadcast_to(needed, shape), dtype=float).reshape(-1)
     flat = np.ascontiguousarray(Ts_contact0_workpiece.reshape(-1, 4, 4))
-    clearance = np.empty(len(flat))
+    distances = np.empty(len(flat))
     # to call threads costs as much as dozens of poses, and many times that on a busy machine
-    kernel = _few_clearances if len(flat) <= FEW else _clearances
+    kernel = _few_distances if len(flat) <= FEW else _distances
     tree = part.triangles, part.spheres, part.first, part.child
-    kernel(flat, *tree, wheel.width / 2.0, wheel.radius, needs, clearance)
-    return clearance.reshape(shape)
+    kernel(flat, *tree, wheel.width / 2.0, wheel.radius, needs, distances)
+    return distances.reshape(shape)
 
 
 def use_threads(count: int) -> None:
-    """Limit the threads that clearances are computed in, where processes share the cores."""
+    """Limit the threads that distances are computed in, where processes share the cores."""
     set_num_threads(count)
 
 
@@ -111,7 +111,7 @@ DEEPEST = 96  # pieces that wait at once; halving to a micrometre needs far fewe
 
 @njit("UniTuple(float64,4)(float64,float64,float64,float64,float64)", cache=True)
 def _distance(x, y, z, half_width, radius):  # type: ignore[no-untyped-def]
-    """Signed distance to the wheel as in `ContactWheel.clearance`, and its gradient."""
+    """Signed distance to the wheel as in `ContactWheel.signed_distance`, and its gradient."""
     away = np.sqrt(y * y + (z - radius) ** 2)
     beside = abs(x) - half_width
     beyond = away - radius
@@ -239,10 +239,10 @@ def _sphere_bound(T, spheres, index, half_width, radius):  # type: ignore[no-unt
     "float64)",
     cache=True,
 )
-def _clearance(  # type: ignore[no-untyped-def]
+def _part_distance(  # type: ignore[no-untyped-def]
     T, triangles, spheres, first, child, half_width, radius, needed
 ):
-    """Clearance of the part in one pose, as `wheel_clearance` says."""
+    """Distance of the part in one pose; see `signed_wheel_distance`."""
     room = np.empty((DEEPEST + 1, 9))
     waiting = np.empty(64, dtype=np.int64)  # deeper than any halving of an array can go
     bounds = np.empty(64)
@@ -280,20 +280,20 @@ _POSES = (
 
 
 @njit(_POSES, cache=True, parallel=True)
-def _clearances(  # type: ignore[no-untyped-def]
-    poses, triangles, spheres, first, child, half_width, radius, needs, clearance
+def _distances(  # type: ignore[no-untyped-def]
+    poses, triangles, spheres, first, child, half_width, radius, needs, distances
 ):
     for k in prange(len(poses)):
-        clearance[k] = _clearance(
+        distances[k] = _part_distance(
             poses[k], triangles, spheres, first, child, half_width, radius, needs[k]
         )
 
 
 @njit(_POSES, cache=True)
-def _few_clearances(  # type: ignore[no-untyped-def]
-    poses, triangles, spheres, first, child, half_width, radius, needs, clearance
+def _few_distances(  # type: ignore[no-untyped-def]
+    poses, triangles, spheres, first, child, half_width, radius, needs, distances
 ):
     for k in range(len(poses)):
-        clearance[k] = _clearance(
+        distances[k] = _part_distance(
             poses[k], triangles, spheres, first, child, half_width, radius, needs[k]
         )

@@ -1,15 +1,22 @@
-"""Whether surface and solid can be one part that a robot holds: the test for wrong units."""
+"""Whether a surface and the solid behind it can be one part: sizes, places and their outsides."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.geometry.mesh import TriangleMesh
-from opl.geometry.passes import MachinedSurface
+from opl.geometry.mesh import TriangleMesh, winding_number
+from opl.geometry.passes import MachinedSurface, bounding_box
 
-SMALLEST, LARGEST = 1e-3, 5.0  # [m]
+SMALLEST, LARGEST = 1e-3, 5.0  # [m] size of a part
 _FACTOR = 50.0  # between surface and solid; units differ by 1000 or 25.4
+
+# places looked at, and how far in front of the surface and behind it [m]
+_LOOKS = 24
+_DEPTH = 1e-3
+
+# the surface is sampled about this often across its longest side, to choose the places from
+_SAMPLES = 12
 
 
 def check_sizes(surface: MachinedSurface, part: TriangleMesh) -> None:
@@ -19,7 +26,7 @@ def check_sizes(surface: MachinedSurface, part: TriangleMesh) -> None:
         ValueError: If something is too small, too large, or elsewhere; the message begins with
             ``part`` or ``surface``.
     """
-    own = np.array([surface.extent_along(axis) for axis in np.eye(3)]).T
+    own = bounding_box(surface)
     solid = np.array([part.vertices.min(axis=0), part.vertices.max(axis=0)])
     for name, box in (("part", solid), ("surface", own)):
         size = _size(box)
@@ -40,6 +47,23 @@ def check_sizes(surface: MachinedSurface, part: TriangleMesh) -> None:
             f"surface: lies {1e3 * gap:.4g} mm away from the solid in the mesh; both must be in "
             "the workpiece frame"
         )
+
+
+def facing_inward(surface: MachinedSurface, part: TriangleMesh) -> float:
+    """Return the part of a surface whose normals point into the solid, 0 to 1.
+
+    Places where the solid lies on both sides of the surface or on neither tell nothing: it is
+    thinner there than the looks are deep, or stands off the surface.
+    """
+    samples = surface.area_samples(_size(bounding_box(surface)) / _SAMPLES)
+    some = np.linspace(0, len(samples.points) - 1, _LOOKS).astype(int)
+    points, normals = samples.points[some], samples.normals[some]
+    ahead, behind = (
+        np.array([winding_number(part, p) for p in points + side * _DEPTH * normals]) > 0.5
+        for side in (1.0, -1.0)
+    )
+    decided = np.count_nonzero(ahead != behind)
+    return np.count_nonzero(ahead & ~behind) / decided if decided else 0.0
 
 
 def _size(box: Array) -> float:

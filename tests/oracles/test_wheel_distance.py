@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from opl.cell.clearance import TOLERANCE, part_tree, wheel_clearance
+from opl.cell.wheel_distance import TOLERANCE, part_tree, signed_wheel_distance
 from opl.geometry.frames import pose
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.wheel import ContactWheel
@@ -73,7 +73,7 @@ def test_the_distance_is_that_of_the_nearest_point_of_any_triangle(n, seed, widt
     mesh = random_mesh(random, n, scale)
     wheel = wheel_of(width, radius)
     Ts = random_poses(random, 8, reach=0.4)
-    found = wheel_clearance(part_tree(mesh), wheel, Ts, EXACT)
+    found = signed_wheel_distance(part_tree(mesh), wheel, Ts, EXACT)
     points, spacing = samples_of(mesh, 24)
     sampled = by_brute_force(points, wheel, Ts)
     assert (found <= sampled + TOLERANCE + 1e-12).all()
@@ -85,7 +85,7 @@ def test_dense_samples_come_as_near_as_the_exact_distance():
     mesh, wheel = random_mesh(random, 6, 0.05), wheel_of(0.05, 0.15)
     Ts = random_poses(random, 6, reach=0.2)
     points, _ = samples_of(mesh, 700)
-    found = wheel_clearance(part_tree(mesh), wheel, Ts, EXACT)
+    found = signed_wheel_distance(part_tree(mesh), wheel, Ts, EXACT)
     np.testing.assert_allclose(found, by_brute_force(points, wheel, Ts), atol=2e-4)
     assert (found <= by_brute_force(points, wheel, Ts) + TOLERANCE).all()
 
@@ -96,8 +96,8 @@ def test_it_is_less_than_needed_exactly_where_the_part_is_too_near(seed, needed)
     random = np.random.default_rng(seed)
     part, wheel = part_tree(random_mesh(random, 20, 0.1)), wheel_of(0.05, 0.15)
     Ts = random_poses(random, 20, reach=0.4)
-    exact = wheel_clearance(part, wheel, Ts, EXACT)
-    found = wheel_clearance(part, wheel, Ts, needed)
+    exact = signed_wheel_distance(part, wheel, Ts, EXACT)
+    found = signed_wheel_distance(part, wheel, Ts, needed)
     sure = np.abs(exact - needed) > 2 * TOLERANCE
     np.testing.assert_array_equal((found < needed)[sure], (exact < needed)[sure])
     near = sure & (exact < needed)
@@ -114,7 +114,7 @@ def test_an_edge_of_the_wheel_that_sinks_into_a_flat_face_is_seen():
     depth = 0.0004
     normal = tilted[:3, 2]
     tilted[:3, 3] = corner + depth * normal
-    found = wheel_clearance(part_tree(face), wheel, tilted, EXACT)
+    found = signed_wheel_distance(part_tree(face), wheel, tilted, EXACT)
     points, _ = samples_of(face, 60)
     assert by_brute_force(points, wheel, tilted[None])[0] > 0.0  # samples miss it
     # the deepest point of the face is as far from the wheel's side as from its rim
@@ -129,7 +129,7 @@ def test_a_part_that_encloses_the_wheel_is_far_from_its_surface_but_not_inside()
         [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
     ]  # fmt: skip
     part = part_tree(TriangleMesh(box, np.array(faces)))
-    found = wheel_clearance(part, wheel_of(0.05, 0.15), np.eye(4), EXACT)
+    found = signed_wheel_distance(part, wheel_of(0.05, 0.15), np.eye(4), EXACT)
     assert found == pytest.approx(1.0 - 0.3, abs=2 * TOLERANCE)  # the face at z = 1 m
 
 
@@ -155,12 +155,12 @@ def test_stacks_keep_their_shape():
     part = part_tree(random_mesh(np.random.default_rng(0), 50, 0.3))
     wheel = wheel_of(0.05, 0.15)
     Ts = random_poses(np.random.default_rng(1), 24, 0.3).reshape(2, 3, 4, 4, 4)
-    found = wheel_clearance(part, wheel, Ts, EXACT)
+    found = signed_wheel_distance(part, wheel, Ts, EXACT)
     assert found.shape == (2, 3, 4)
-    assert wheel_clearance(part, wheel, Ts[0, 0, 0], EXACT) == found[0, 0, 0]
-    assert wheel_clearance(part, wheel, Ts[:0], EXACT).shape == (0, 3, 4)
+    assert signed_wheel_distance(part, wheel, Ts[0, 0, 0], EXACT) == found[0, 0, 0]
+    assert signed_wheel_distance(part, wheel, Ts[:0], EXACT).shape == (0, 3, 4)
     needs = np.where(np.arange(4) % 2, EXACT, 0.01)  # one for each pose
-    mixed = wheel_clearance(part, wheel, Ts, np.broadcast_to(needs, (2, 3, 4)))
+    mixed = signed_wheel_distance(part, wheel, Ts, np.broadcast_to(needs, (2, 3, 4)))
     np.testing.assert_array_equal(mixed[..., 1::2], found[..., 1::2])
 
 
@@ -168,10 +168,10 @@ def test_poses_need_not_be_contiguous():
     part = part_tree(random_mesh(np.random.default_rng(0), 50, 0.3))
     wheel = wheel_of(0.05, 0.15)
     Ts = random_poses(np.random.default_rng(1), 24, 0.3)
-    expected = wheel_clearance(part, wheel, Ts, EXACT)
+    expected = signed_wheel_distance(part, wheel, Ts, EXACT)
     fortran = np.asfortranarray(Ts)
-    np.testing.assert_array_equal(wheel_clearance(part, wheel, fortran, EXACT), expected)
-    np.testing.assert_array_equal(wheel_clearance(part, wheel, Ts[::2], EXACT), expected[::2])
+    np.testing.assert_array_equal(signed_wheel_distance(part, wheel, fortran, EXACT), expected)
+    np.testing.assert_array_equal(signed_wheel_distance(part, wheel, Ts[::2], EXACT), expected[::2])
 
 
 def test_every_sphere_holds_its_triangles_and_every_triangle_is_there():
@@ -191,6 +191,6 @@ def test_the_wheels_own_pose_does_not_matter():
     Ts = random_poses(np.random.default_rng(1), 5, 0.3)
     elsewhere = ContactWheel(0.05, 0.15, 1.0, random_poses(np.random.default_rng(2), 1, 5.0)[0])
     np.testing.assert_array_equal(
-        wheel_clearance(part, elsewhere, Ts, EXACT),
-        wheel_clearance(part, wheel_of(0.05, 0.15), Ts, EXACT),
+        signed_wheel_distance(part, elsewhere, Ts, EXACT),
+        signed_wheel_distance(part, wheel_of(0.05, 0.15), Ts, EXACT),
     )

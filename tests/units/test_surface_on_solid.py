@@ -1,4 +1,4 @@
-"""Surfaces that face the wrong way, told by the solid behind them."""
+"""Surfaces that face the wrong way, recognised by the solid behind them."""
 
 import json
 
@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from opl.geometry.mesh import TriangleMesh
+from opl.geometry.mesh import TriangleMesh, winding_number
 from opl.geometry.mesh_surface import MeshSurface
-from opl.geometry.outside import facing_inward, winding_number
 from opl.geometry.patchwork import Face, Patchwork
+from opl.geometry.surface_on_solid import facing_inward
 from tests.support.jobs import opl, write_job
 from tests.support.solids import cylinder, sphere, tessellated
 

@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.inverse import Arm
+from opl.cell.full_turns import principal
+from opl.cell.inverse_kinematics import Arm
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot_file import N_JOINTS
 from opl.cell.spherical_wrist import SphericalWristArm
@@ -29,7 +30,7 @@ _ANGLE = 2e-5  # [rad]
 
 
 @dataclass(frozen=True, eq=False)
-class RecognisedArm:
+class UrdfArm:
     """An arm as its URDF has it.
 
     Attributes:
@@ -47,7 +48,7 @@ class RecognisedArm:
     max_speed: Array
 
 
-def recognise(urdf: Path, source: Path | None = None) -> RecognisedArm:
+def arm_of_urdf(urdf: Path, source: Path | None = None) -> UrdfArm:
     """Return the closed form of the arm in a URDF, made from ``source`` if that is given.
 
     Raises:
@@ -83,7 +84,7 @@ def recognise(urdf: Path, source: Path | None = None) -> RecognisedArm:
     read_off = _parallel_axes if _parallel(axes[1], axes[3]) else _spherical_wrist
     arm = read_off(where, axes, points, flange)
     lower, upper = model.lowerPositionLimit, model.upperPositionLimit
-    return RecognisedArm(names, arm, lower.copy(), upper.copy(), model.velocityLimit.copy())
+    return UrdfArm(names, arm, lower.copy(), upper.copy(), model.velocityLimit.copy())
 
 
 def _spherical_wrist(
@@ -128,7 +129,7 @@ def _spherical_wrist(
         c2=float(np.linalg.norm(upper_arm)),
         c3=float((wrist - points[2]) @ forearm),
         c4=float(from_wrist @ z_tool),
-        offsets=tuple(float(_principal(-zero)) for zero in zeros),
+        offsets=tuple(_rounded_principal(-zero) for zero in zeros),
         signs=tuple(_sign(value) for value in signs),
     )
 
@@ -167,7 +168,7 @@ def _parallel_axes(where: str, axes: Array, points: Array, T_root_flange: Array)
         c3=float(np.linalg.norm(forearm)),
         c4=float(hand @ e3),
         c5=float(from_wrist @ z_tool),
-        offsets=tuple(float(_principal(-zero)) for zero in zeros),
+        offsets=tuple(_rounded_principal(-zero) for zero in zeros),
         signs=tuple(_sign(value) for value in signs),
     )
 
@@ -234,7 +235,7 @@ def _sign(value: float) -> int:
     return 1 if value > 0.0 else -1
 
 
-def _principal(angle: float) -> float:
+def _rounded_principal(angle: float) -> float:
     """Return an angle in (-pi, pi], half a turn positive however it is rounded."""
-    turned = float(np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi)
+    turned = float(principal(np.asarray(angle)))
     return np.pi if turned < -np.pi + 1e-9 else turned

@@ -8,20 +8,19 @@ through a singularity.
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 
+from opl.cell.full_turns import principal
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.geometry.frames import Array
 
-N_BRANCHES = 8
+N_IK_BRANCHES = 8
 
 Arm = SphericalWristArm | ParallelAxesArm
 
 
-def inverse(arm: Arm, Ts_base_flange: Array, near: Array | None = None) -> Array:
+def inverse_kinematics(arm: Arm, Ts_base_flange: Array, near: Array | None = None) -> Array:
     """Return all postures that bring the flange to poses, limits not regarded.
 
     Args:
@@ -49,34 +48,30 @@ def inverse(arm: Arm, Ts_base_flange: Array, near: Array | None = None) -> Array
     q = np.empty((p.shape[1], 2, 2, 2, 6))  # pose, flip, back, elbow, joint
     poses_last = np.moveaxis(q, 0, -1)
     for joint, theta in enumerate(angles):
-        turned = _principal((theta + offsets[joint]) * signs[joint])
+        turned = principal((theta + offsets[joint]) * signs[joint])
         poses_last[..., joint, :] = np.where(missing, np.nan, turned)
-    return q.reshape(*shape, N_BRANCHES, 6)
+    return q.reshape(*shape, N_IK_BRANCHES, 6)
 
 
-def turns(lower: Array, upper: Array) -> Array:
-    """Return the full turns after which a principal angle can lie within the limits.
+def singularity_margins(arm: Arm, q: Array) -> Array:
+    """Return how far postures are from wrist, elbow and shoulder singularity.
 
-    A joint whose range only touches the end of a further turn (S at exactly +-180 degrees) does not
-    get that turn.
+    The Jacobian loses rank where one of the three is zero; its determinant is proportional to their
+    product.
 
     Args:
-        lower: Smallest joint positions in [rad], shape (6,).
-        upper: Largest joint positions in [rad], shape (6,).
+        arm: The arm.
+        q: Joint positions in [rad], shape (..., 6).
 
     Returns:
-        Multiples of 2 pi to add to q, in [rad], shape (k, 6): fewest turns first, so zero leads,
-        where it is among them; among equals in ascending order.
+        |sin theta5|; |sin| of the angle between upper arm and the line on to the wrist centre, or
+        to axis 4 of an arm with three parallel axes; how far the wrist centre, or the meeting of
+        axes 5 and 6, is ahead of or behind axis 1, as a fraction of the reach; shape (..., 3).
     """
-    touching = 1e-9  # [turns]
-    first = np.floor(lower / (2.0 * np.pi) + 0.5 + touching).astype(int)
-    last = np.ceil(upper / (2.0 * np.pi) - 0.5 - touching).astype(int)
-    ranges = [range(low, high + 1) for low, high in zip(first, last, strict=True)]
-    numbers = sorted(product(*ranges), key=lambda number: (sum(map(abs, number)), number))
-    return 2.0 * np.pi * np.array(numbers, dtype=float)
+    return arm.margins(q * np.array(arm.signs) - np.array(arm.offsets))
 
 
-def branch_name(slot: int) -> str:
+def ik_branch_name(slot: int) -> str:
     """Return what a slot means, in words.
 
     Front: the wrist centre lies ahead of axis 1, in the plane of the arm. Elbow up: axis 3 lies
@@ -93,10 +88,3 @@ def branch_name(slot: int) -> str:
             "flip" if flip else "no flip",
         ]
     )
-
-
-def _principal(angle: Array) -> Array:
-    """Return angles turned into (-pi, pi]."""
-    angle = angle - 2.0 * np.pi * np.ceil(angle / (2.0 * np.pi) - 0.5)
-    # round-off must not carry a joint past pi, which may be its limit
-    return np.minimum(angle, np.pi)
