@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.inverse import N_BRANCHES, Arm
+from opl.cell.inverse_kinematics import N_IK_BRANCHES, Arm
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.geometry.frames import Array
@@ -63,9 +63,9 @@ def joint_derivatives(arm: Arm, flange: FlangeJets) -> JointDerivatives:
         slots = _spherical_wrist(arm, flange)
     else:
         slots = _parallel_axes(arm, flange)
-    shape = (N_BRANCHES, 6, *np.shape(flange.p[0].value.middle))
+    shape = (N_IK_BRANCHES, 6, *np.shape(flange.p[0].value.middle))
     first, low, high = np.empty(shape), np.empty(shape), np.empty(shape)
-    none = np.empty((N_BRANCHES, *shape[2:]), dtype=bool)
+    none = np.empty((N_IK_BRANCHES, *shape[2:]), dtype=bool)
     for slot, (joints, out_of_reach) in enumerate(slots):
         none[slot] = out_of_reach
         for joint, (angle, sign) in enumerate(zip(joints, arm.signs, strict=True)):
@@ -106,7 +106,7 @@ def _spherical_wrist(arm: SphericalWristArm, flange: FlangeJets) -> list[Slot]:
             slots[slot] = (theta1, theta2, theta3, theta4, theta5, theta6), none
             flipped = (theta1, theta2, theta3, theta4, _negative(theta5), theta6)
             slots[slot + 4] = flipped, none
-    return [slots[slot] for slot in range(N_BRANCHES)]
+    return [slots[slot] for slot in range(N_IK_BRANCHES)]
 
 
 def _parallel_axes(arm: ParallelAxesArm, flange: FlangeJets) -> list[Slot]:
@@ -136,7 +136,7 @@ def _parallel_axes(arm: ParallelAxesArm, flange: FlangeJets) -> list[Slot]:
                 flipped = _negative(theta5) if flip else theta5
                 joints = (theta1, theta2, theta3, theta4, flipped, theta6)
                 slots[4 * flip + 2 * back + elbow] = joints, beside | beyond
-    return [slots[slot] for slot in range(N_BRANCHES)]
+    return [slots[slot] for slot in range(N_IK_BRANCHES)]
 
 
 def _moved(p: Axes, along: Axes, length: float) -> Axes:

@@ -13,7 +13,7 @@ from opl.cell.robot import Robot
 from opl.documents import Document
 from opl.geometry.frames import Array
 from opl.motion.timing import Pace
-from opl.planning.box_search import OptimalSettings
+from opl.planning.optimal import OptimalSettings
 from opl.planning.costs import CostWeights, ObjectiveWeights
 from opl.planning.filling import Interpolation
 from opl.planning.starts import Start
@@ -118,7 +118,6 @@ class SearchSection(Document):
                 max_contact_change=self.max_contact_change,
                 costs=costs,
                 seconds=self.seconds,
-                tolerance=self.refine_tolerance_percent / 100.0,
             ),
         )
 

@@ -18,7 +18,7 @@ from opl.planning.columns import Seams, wrist_flips
 from opl.planning.costs import CostWeights, track_cost
 from opl.planning.families import JUMP, Placement
 from opl.planning.filling import BrokenEdgeError, cutter_frames, fill_in
-from opl.planning.nodes import NodeField, NodeMatrix, solve
+from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
 from opl.planning.plan import Found, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem, wheel_layer
@@ -127,8 +127,8 @@ class _Sampled:
         if t is None or spacing is None:
             t, spacing = self._windows()
         self._t, self._spacing = t, spacing
-        q = self._placed(solve(problem.cell, self._points.Ts_workpiece_cutter[:, None], t))
-        q[~box.holds(np.nan_to_num(q, nan=np.inf))] = np.nan
+        q = self._placed(inverse_solutions(problem.cell, self._points.Ts_workpiece_cutter[:, None], t))
+        q[~_near(q, box)] = np.nan
         matrices = list(self._images(q))
         layer = wheel_layer(problem.scene, self._points, t, ~np.isnan(q[..., 0]))
         self.problem = replace(
@@ -213,14 +213,19 @@ class _Sampled:
         q = np.empty((len(self._places), len(positions), *problem.field.q.shape[2:]))
         q[whole] = problem.field.q
         between = self._points.Ts_workpiece_cutter[~whole]
-        q[~whole] = solve(problem.cell, between[:, None], positions)
-        enter, leave = _clipped(self._placed(q), self._box)
+        q[~whole] = inverse_solutions(problem.cell, between[:, None], positions)
+        placed = self._placed(q)
+        enter, leave = _clipped(placed, self._box)
         t, spacing = np.empty((len(q), SAMPLES)), np.empty(len(q))
         share = np.linspace(0.0, 1.0, SAMPLES)
         for column, (start, end) in enumerate(zip(enter, leave, strict=True)):
             hit = np.flatnonzero(end >= start)
             if not len(hit):
-                t[column], spacing[column] = 0.0, 0.0
+                # the curve passes the box by a hair
+                nearest = positions[int(np.argmin(_missing(placed[column], self._box)))]
+                step = positions[1] - positions[0]
+                t[column] = np.clip(nearest + (2.0 * share - 1.0) * step, positions[0], positions[-1])
+                spacing[column] = 2.0 * step / (SAMPLES - 1)
                 continue
             step = positions[hit + 1] - positions[hit]
             first, last = positions[hit] + start[hit] * step, positions[hit] + end[hit] * step
@@ -273,6 +278,19 @@ def _sweep(matrix: OpenMatrix, problem: GrindingProblem) -> None:
     columns, rows = np.nonzero(matrix.free)
     hit = problem.scene.collision.collides(matrix.nodes.q[columns, rows])
     matrix.free[columns[hit], rows[hit]] = False
+
+
+def _missing(q: Array, box: JointBox) -> Array:
+    """Return by how much a box must grow to hold postures, infinite for none, shape (...)."""
+    away = np.maximum(q - box.upper, 0.0) + np.maximum(box.lower - q, 0.0)
+    return np.asarray(np.nan_to_num(away.sum(axis=-1), nan=np.inf))
+
+
+def _near(q: Array, box: JointBox) -> np.ndarray:
+    """Return which postures are in a box, the nearest where a column has none, shape (n, m)."""
+    missing = _missing(q, box)
+    least = missing.min(axis=1, keepdims=True)
+    return np.asarray((missing <= np.maximum(least, 0.0) + 1e-12) & np.isfinite(missing))
 
 
 def _clipped(q: Array, box: JointBox) -> tuple[Array, Array]:

@@ -15,8 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
-from opl.cell.clearance import TOLERANCE, PartTree, wheel_clearance
-from opl.cell.inverse import Arm, inverse
+from opl.cell.wheel_distance import TOLERANCE, PartTree, signed_wheel_distance
+from opl.cell.inverse_kinematics import Arm, inverse_kinematics
 from opl.cell.inverse_jets import Axes, FlangeJets, joint_derivatives
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.cell.workcell import WorkCell
@@ -238,7 +238,7 @@ class ColumnWalls:
         )
         Ts_contact0_workpiece = wheel.T_contact0_contact(middle) @ T_cutter_workpiece
         allowed = -cell.planned_allowance
-        clearance = wheel_clearance(self._part, wheel, Ts_contact0_workpiece, allowed)
+        clearance = signed_wheel_distance(self._part, wheel, Ts_contact0_workpiece, allowed)
         return clearance + moved + TOLERANCE < allowed, clearance < allowed
 
     def _cells(self, Ts_workpiece_cutter: Array, grids: list[Array]) -> _Cells:
@@ -246,7 +246,7 @@ class ColumnWalls:
         arm = self._cell.robot.arm
         corners = np.concatenate(
             [
-                inverse(arm, self._cell.Ts_base_flange(t, T))
+                inverse_kinematics(arm, self._cell.Ts_base_flange(t, T))
                 for T, t in zip(Ts_workpiece_cutter, grids, strict=True)
             ]
         )

@@ -6,14 +6,18 @@ flipped. Which image a pass uses is its placement.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from opl.geometry.frames import Array
 from opl.planning.columns import ColumnWalls, Seams
+from opl.search.box import JointBox
 from opl.search.outside import outside
 
+MOST_GROWN = 200  # times that a box is grown for a column
+GROWN = 1e-7  # [rad] less need not be grown for
 JUMP = 0.5  # [rad] between neighbouring contact positions; more is no motion
 
 
@@ -83,6 +87,39 @@ class Families:
             free[free] = walls.within_limits(unrolled[free])
             if free.any():
                 self._unrolled[family] = unrolled, free
+
+    def grown(self, box: JointBox, placements: Sequence[Placement]) -> JointBox:
+        """Return a box grown until it holds a point of every column, the worst column first.
+
+        Args:
+            box: The box.
+            placements: The image that each pass uses.
+        """
+        low, high = box.lower.copy(), box.upper.copy()
+        passes = []
+        for index, placement in enumerate(placements):
+            columns = self._pass_index == index
+            unrolled, free = self._unrolled[placement.family]
+            q = np.ascontiguousarray(np.moveaxis(placement.of(unrolled[columns]), 1, 2))
+            passes.append((q, np.ascontiguousarray(free[columns])))
+        for _ in range(MOST_GROWN):
+            worst, point = 0.0, low
+            for q, free in passes:
+                missing, row = np.empty(len(q)), np.empty(len(q))
+                outside(q, free, low, high, JUMP, missing, row)
+                column = int(np.argmax(missing))
+                if worst < missing[column] < np.inf:
+                    worst = float(missing[column])
+                    here = int(row[column])
+                    there = min(here + 1, q.shape[2] - 1)
+                    x = row[column] - here
+                    point = q[column, :, here]
+                    if x > 0.0:
+                        point = (1.0 - x) * point + x * q[column, :, there]
+            if worst <= GROWN:
+                break
+            low, high = np.minimum(low, point), np.maximum(high, point)
+        return JointBox(low, high)
 
     def fits(self, index: int, low: Array, high: Array, reference: bool) -> list[Fit]:
         """Return how every image of every family of a pass fits into a box.

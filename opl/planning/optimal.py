@@ -1,28 +1,148 @@
-"""The least joint range sum, certified, and the smoothest motion that attains it.
+"""The least joint range sum, proven for every contact position, and the motion that attains it.
 
-First over the field: at its contact positions the least box is known, and how far the path that was
-found is from it. Then contact positions between these are taken in around the path, which may lead
-to less than is possible without them; if so, the bound is proven anew for all that were taken.
+The proof works on boxes of joint space and few walls; a box that it proposes is held against all
+cutter points, and one that no posture of some cutter point lies in makes that cutter point a wall.
+In a box that misses none the smoothest motion is sought. The proof ends when nothing is left that
+could be smaller than the best motion by more than the gap.
 """
 
 from __future__ import annotations
 
-import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opl.geometry.frames import Array
-from opl.planning.box_search import PROOF_GAP, REFINED_GAP, BoxSearch, OptimalSettings
-from opl.planning.finer_bound import finer_bound
-from opl.planning.plan import Found, Plan, Refinement
+from opl.planning.box_track import BoxTracks
+from opl.planning.columns import ColumnWalls, seams_of
+from opl.planning.costs import CostWeights
+from opl.planning.families import Families, Fit, Placement
+from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
-from opl.planning.refine import RefinedProblem
-from opl.planning.tube import halved, tube
+from opl.search.box import JointBox
+from opl.search.least_box import BoxProof, Candidate
 from opl.search.smooth import Travel
 
-MOST_ROUNDS = 3  # of halving the contact positions: eight times as many
-FINER_PROOF = 10.0  # [s] the bound of a finer field may take; what it is by then is told
+PROOF_SHARE = 0.9  # of the widening: how far the bound may stay below the path
+ROOM_SHARE = 0.4  # of the widening: how much larger than its box the path may be
+MISSED = 0.05  # of the widening: what a box may miss a cutter point by and still hold it
+MOST_SUBPROBLEMS = 4000
+MOST_ADDED = 3  # walls at once
+
+
+@dataclass(frozen=True)
+class OptimalSettings:
+    """What is wanted of the optimal method.
+
+    Attributes:
+        widen: Fraction by which the joint range sum may exceed the lower bound for the sake of a
+            smoother track.
+        max_contact_change: Largest change of t between neighbouring columns in belt units.
+        costs: What a track is charged for inside the box.
+    """
+
+    widen: float
+    max_contact_change: float
+    costs: CostWeights
+    seconds: float
+
+
+class OptimalSearch:
+    """The search, which can be stopped after any step.
+
+    Args:
+        problem: What is to be planned.
+        settings: What is wanted.
+        fallback: A motion that is known.
+    """
+
+    def __init__(
+        self, problem: GrindingProblem, settings: OptimalSettings, fallback: Plan
+    ) -> None:
+        self._points = problem.points
+        self._settings = settings
+        seams = seams_of(problem.field.q)
+        self._walls = ColumnWalls(problem.cell, problem.scene.part, problem.points, seams)
+        self._families = Families(
+            self._walls, seams, problem.field.q, problem.cuts, problem.points.pass_index
+        )
+        most = Travel(fallback.path.joint_travel, fallback.path.contact_travel)
+        self._tracks = BoxTracks(
+            problem, seams, settings.costs, settings.max_contact_change, most
+        )
+        self.plan = fallback
+        gap = PROOF_SHARE * settings.widen
+        self.proof = BoxProof(self._walls.images, fallback.path.joint_range_sum, gap)
+        self._places: set[float] = set()
+        n = len(problem.points)
+        self._add([0.0, float(n // 2), float(n - 1)])
+
+    @property
+    def finished(self) -> bool:
+        """Whether there is nothing left to do."""
+        return self.proof.closed or self.proof.subproblems >= MOST_SUBPROBLEMS
+
+    @property
+    def lower_bound(self) -> float:
+        """No motion has a smaller joint range sum, in [rad]."""
+        return min(self.proof.lower_bound, self.plan.path.joint_range_sum)
+
+    def step(self) -> None:
+        """Work on one subproblem."""
+        candidate = self.proof.take_next()
+        if candidate is None:
+            return
+        placements, missed = self._hold(candidate)
+        if missed:
+            self._add(missed)
+            self.proof.put_back()
+            return
+        self._try(candidate, placements)
+        if candidate.bound < self.proof.closing:
+            self.proof.give_up()
+
+    def _add(self, places: list[float]) -> None:
+        for wall in self._walls.walls(places):
+            self.proof.add(wall)
+            self._places.add(wall.place)
+
+    def _hold(self, candidate: Candidate) -> tuple[list[Placement], list[float]]:
+        """Return the image of each pass that fits into the box, and the cutter points it misses."""
+        allowed = MISSED * self._settings.widen * self.proof.threshold
+        reference = self.proof.walls[0].pass_index
+        placements, missed = [], []
+        for index in range(self._points.n_passes):
+            fits = self._families.fits(index, candidate.low, candidate.high, index == reference)
+            first = int(np.argmax(self._points.pass_index == index))
+            columns = range(first, first + len(fits[0].missing))
+            known = np.array([float(column) in self._places for column in columns])
+            # the image that the candidate has in mind: the walls of the pass fit into the box
+            best = min(fits, key=lambda fit: self._misfit(fit, known))
+            placements.append(best.placement)
+            missing = np.where(known, -1.0, best.missing)
+            worst = int(np.argmax(missing))
+            if missing[worst] > allowed:
+                missed.append((float(missing[worst]), float(first + worst)))
+        missed.sort(reverse=True)
+        places = list(dict.fromkeys(place for _, place in missed))
+        return placements, places[:MOST_ADDED]
+
+    @staticmethod
+    def _misfit(fit: Fit, known: np.ndarray) -> tuple[float, float]:
+        """Return what a box misses of the walls of a pass, and of all its columns."""
+        at_walls = float(fit.missing[known].max(initial=0.0))
+        return round(at_walls, 2), float(fit.missing.max())
+
+    def _try(self, candidate: Candidate, placements: list[Placement]) -> None:
+        """Look for a motion in a box."""
+        families = {(placement.family, id(placement.flip[0])) for placement in placements}
+        if len(families) > 1:
+            return  # a path keeps one posture
+        box = self._families.grown(JointBox(candidate.low, candidate.high), placements)
+        room = ROOM_SHARE * self._settings.widen * box.size
+        plan = self._tracks.plan(box, room, placements)
+        if plan is not None and plan.path.joint_range_sum < self.plan.path.joint_range_sum:
+            self.plan = plan
+            self.proof.threshold = plan.path.joint_range_sum
 
 
 def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: Plan) -> Plan:
@@ -31,78 +151,13 @@ def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: 
     Args:
         problem: What is to be planned.
         settings: What is wanted.
-        fallback: The motion to return if no better one is found in time. Joints and contact should
-            not travel further than along it.
+        fallback: The motion to return if no better one is found. Joints and contact should not
+            travel further than along it.
 
     Returns:
-        The plan with its lower bound, and what was gained between the positions of the field.
+        The plan with its lower bound.
     """
-    deadline = time.monotonic() + settings.seconds
-    most = _travel(fallback)
-    whole = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
-    search = BoxSearch(whole, settings, most, _range(fallback), deadline)
-    plan, refined = fallback, whole
-    outcome = search.run(PROOF_GAP)
-    if isinstance(outcome, Found) and _range(outcome.plan) <= _range(fallback):
-        plan, refined = outcome.plan, search.refined
-    plan = replace(plan, lower_bound=search.lower_bound(_range(plan)))
-    plan, positions = _between_positions(refined, plan, settings, most, deadline)
-    found, bound = _range(plan), plan.lower_bound
-    if bound is not None and plan.refinement is not None and found < bound:
-        # less than is possible without the finer positions: with them, a lower bound holds
-        until = min(deadline, time.monotonic() + FINER_PROOF)
-        bound = finer_bound(problem, positions, settings, found, until)
-        refinement = replace(plan.refinement, bound_positions=len(positions))
-        plan = replace(plan, lower_bound=bound, refinement=refinement)
-    return plan
-
-
-def _between_positions(
-    refined: RefinedProblem, plan: Plan, settings: OptimalSettings, most: Travel, deadline: float
-) -> tuple[Plan, Array]:
-    """Return a plan with its contact positions refined as long as that is worth it, and these.
-
-    Where joints or contact still move further than wanted, what was gained may be spent on that.
-    """
-    start = plan
-    positions = finer = refined.problem.field.contact_positions
-    n_positions = len(positions)
-    gain = np.inf
-    rounds = 0
-    while rounds < MOST_ROUNDS and time.monotonic() < deadline:
-        if gain < settings.tolerance and _travel(plan).within(most):
-            break
-        finer = halved(finer)
-        search = BoxSearch(tube(refined, plan.path, finer), settings, most, _range(plan), deadline)
-        outcome = search.run(REFINED_GAP)
-        if not isinstance(outcome, Found) or _range(outcome.plan) >= _range(plan):
-            break
-        gain = 1.0 - _range(outcome.plan) / _range(plan)
-        plan, refined = _added(plan, outcome.plan), search.refined
-        positions = finer
-        rounds += 1
-    if rounds and not _travel(plan).within(most):
-        room = _range(start)
-        around = tube(refined, plan.path, finer)
-        outcome = BoxSearch(around, settings, most, _range(plan), deadline, room).run(REFINED_GAP)
-        if isinstance(outcome, Found):
-            wider = outcome.plan
-            if _range(wider) <= room and _travel(wider).within(most):
-                plan, positions = _added(plan, wider), finer
-    gain = _range(start) - _range(plan)
-    bound = start.lower_bound
-    refinement = Refinement(_range(start), bound, gain, rounds, n_positions)
-    return replace(plan, lower_bound=bound, refinement=refinement), positions
-
-
-def _added(before: Plan, found: Plan) -> Plan:
-    """Return a plan that counts the motions checked for the one before as well."""
-    return replace(found, checks=before.checks + found.checks)
-
-
-def _range(plan: Plan) -> float:
-    return plan.path.joint_range_sum
-
-
-def _travel(plan: Plan) -> Travel:
-    return Travel(plan.path.joint_travel, plan.path.contact_travel)
+    search = OptimalSearch(problem, settings, fallback)
+    while not search.finished:
+        search.step()
+    return replace(search.plan, lower_bound=search.lower_bound)

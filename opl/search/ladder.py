@@ -40,7 +40,7 @@ class Ladder:
     @cached_property
     def t_of_nodes(self) -> Array:
         """Contact position of each node, shape (n_columns, n_rows)."""
-        return np.ascontiguousarray(np.broadcast_to(self.contact_position, self.q.shape[:2]))
+        return np.array(np.broadcast_to(self.contact_position, self.q.shape[:2]), order="C")
 
     @cached_property
     def contact_changes(self) -> Array:

@@ -195,6 +195,9 @@ class BoxProof:
             node.bound = max(node.bound, found.bound)
         if node.bound >= self.closing:
             return None
+        if self._open and node.bound > self._open[0].bound + 1e-9:
+            heapq.heappush(self._open, node)  # others are more promising now
+            return None
         low, high = (found.low, found.high) if found is not None else (node.low, node.high)
         branch = self._where_to_split(node, alone, found, low, high)
         if branch is not None:
@@ -282,28 +285,23 @@ class BoxProof:
     ) -> tuple[int, float] | None:
         """Return the wall to be split, and where along its span; None if that gains nothing."""
         settled = SETTLED * self._gap * self.threshold
-        best, wall, x = 0.0, -1, 0.5
-        for index, spans in enumerate(node.spans):
-            if len(spans) > 1:
-                grown = min(
-                    float(_grown(*self._bodies[index].box(span), low, high).min())
-                    for span in spans
-                )
-                missing = grown - float(np.maximum(high - low, 0.0).sum())
-                if missing > max(best, settled) or (wall < 0 and index == 0):
-                    best, wall = max(missing, settled), index
+        size = float(np.maximum(high - low, 0.0).sum())
+        score = np.zeros(len(node.spans))
+        for index, (body, spans) in enumerate(zip(self._bodies, node.spans, strict=True)):
+            grown = min(float(_grown(*body.box(span), low, high).min()) for span in spans)
+            score[index] = grown - size
+        at = np.full(len(node.spans), 0.5)
+        lost = np.zeros(len(node.spans))
         if found is not None:
-            lost = np.array(
-                [
-                    loss if node.spans[k][0].end - node.spans[k][0].first > 1 else 0.0
-                    for k, loss in zip(alone, found.lost, strict=True)
-                ]
-            )
-            if lost.sum() > settled:
-                worst = int(np.argmax(lost))
-                if lost[worst] > best:
-                    return alone[worst], float(found.x[worst])
-        return (wall, x) if wall >= 0 else None
+            lost[alone], at[alone] = found.lost, found.x
+        cells = np.array([sum(span.end - span.first for span in spans) for spans in node.spans])
+        if lost[cells > 1].sum() > settled:
+            score = np.maximum(score, lost)
+        score[cells == 1] = 0.0
+        wall = int(np.argmax(score))
+        if score[wall] > settled or lost[cells > 1].sum() > settled:
+            return wall, float(at[wall])
+        return (0, 0.5) if len(node.spans[0]) > 1 else None
 
     def _split(self, node: Subproblem, index: int, x: float) -> None:
         spans = node.spans[index]
