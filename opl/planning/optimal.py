@@ -93,6 +93,9 @@ class OptimalSearch:
             return
         placements, missed = self._hold(candidate)
         if missed:
+            box = self._families.grown(JointBox(candidate.low, candidate.high), placements)
+            hoped = box.size * (1.0 + self._settings.widen)
+            self.proof.threshold = min(self.proof.threshold, hoped)
             self._add(missed)
             self.proof.put_back()
             return

@@ -14,12 +14,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 
 from opl.geometry.frames import Array
 from opl.search.relaxation import Relaxation, least_box_of
 from opl.search.walls import Image, Piece, Wall, relaxed
 
 SETTLED = 0.1  # of the gap wanted: what the bend of the spans may lose where no wall is split further
+STILL = 1e-6  # [rad] a core that grows by less in a round has stopped growing
 MOST_ROUNDS = 12  # of cutting spans off; more would cut little
 
 
@@ -57,6 +59,7 @@ class Subproblem:
     spans: list[list[Span]] = field(compare=False)
     low: Array = field(compare=False)
     high: Array = field(compare=False)
+    found: Relaxation | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
@@ -110,12 +113,17 @@ class _Body:
             self._moved[at] = self.images(piece.family)[span.image].of(piece)
         return self._moved[at]
 
-    def box(self, span: Span) -> tuple[Array, Array]:
+    def whole_box(self, span: Span) -> tuple[Array, Array]:
+        """Return the boxes of all cells of the piece of a span."""
         at = (span.piece, span.image)
         if at not in self._boxes:
             piece = self.moved(span)
-            self._boxes[at] = piece.low, piece.high
-        low, high = self._boxes[at]
+            self._boxes[at] = np.ascontiguousarray(piece.low), np.ascontiguousarray(piece.high)
+        return self._boxes[at]
+
+    def box(self, span: Span) -> tuple[Array, Array]:
+        """Return the boxes of the cells of a span."""
+        low, high = self.whole_box(span)
         return low[span.first : span.end], high[span.first : span.end]
 
 
@@ -176,38 +184,41 @@ class BoxProof:
         node = heapq.heappop(self._open)
         self.subproblems += 1
         known = len(node.spans)
+        if node.found is None or known < len(self._bodies):
+            if not self._bound(node, known):
+                return None
+            if self._open and node.bound > self._open[0].bound + 1e-9:
+                heapq.heappush(self._open, node)  # others are more promising now
+                return None
+        branch = self._where_to_split(node)
+        if branch is not None:
+            self._split(node, *branch)
+            return None
+        self._kept = node
+        found, alone = node.found, self._alone(node)
+        held_by = {k: found.prices[i] for i, k in enumerate(alone) if found.prices[i].any()}
+        return Candidate(node.bound, found.low, found.high, held_by)
+
+    @staticmethod
+    def _alone(node: Subproblem) -> list[int]:
+        """Return the walls of which one span is left."""
+        return [k for k, spans in enumerate(node.spans) if len(spans) == 1]
+
+    def _bound(self, node: Subproblem, known: int) -> bool:
+        """Bound a subproblem; return whether it is still of interest."""
         node.spans = list(node.spans)
         for index in range(known, len(self._bodies)):
             node.spans.append(self._spans_of_new(node, index))
         sizes = self._tighten(node)
         if sizes is None:
-            return None
-        node.bound = max(node.bound, max(sizes, default=0.0))
-        alone = [k for k, spans in enumerate(node.spans) if len(spans) == 1]
-        found: Relaxation | None = None
-        if alone:
-            segments = []
-            for k in alone:
-                (span,) = node.spans[k]
-                segments.append(relaxed(self._bodies[k].moved(span), span.first, span.end))
-            found = least_box_of(segments, node.low, node.high)
-        if found is not None:
-            node.bound = max(node.bound, found.bound)
-        if node.bound >= self.closing:
-            return None
-        if self._open and node.bound > self._open[0].bound + 1e-9:
-            heapq.heappush(self._open, node)  # others are more promising now
-            return None
-        low, high = (found.low, found.high) if found is not None else (node.low, node.high)
-        branch = self._where_to_split(node, alone, found, low, high)
-        if branch is not None:
-            self._split(node, *branch)
-            return None
-        held_by = {}
-        if found is not None:
-            held_by = {k: found.prices[i] for i, k in enumerate(alone) if found.prices[i].any()}
-        self._kept = node
-        return Candidate(node.bound, low, high, held_by)
+            return False
+        segments = []
+        for k in self._alone(node):
+            (span,) = node.spans[k]
+            segments.append(relaxed(self._bodies[k].moved(span), span.first, span.end))
+        node.found = least_box_of(segments, node.low, node.high)
+        node.bound = max(node.bound, node.found.bound, *sizes)
+        return node.bound < self.closing
 
     def put_back(self) -> None:
         """Leave the subproblem of the last candidate open."""
@@ -236,7 +247,7 @@ class BoxProof:
 
     def _tighten(self, node: Subproblem) -> list[float] | None:
         """Cut off what no box below the threshold can hold; the least growth for each wall."""
-        low, high = node.low.copy(), node.high.copy()
+        low, high, closing = node.low.copy(), node.high.copy(), self.closing
         for _ in range(MOST_ROUNDS):
             before = low.copy(), high.copy()
             sizes = []
@@ -244,16 +255,13 @@ class BoxProof:
                 kept, least, most = [], np.full(6, np.inf), np.full(6, -np.inf)
                 smallest = np.inf
                 for span in node.spans[index]:
-                    cell_low, cell_high = body.box(span)
-                    grown = _grown(cell_low, cell_high, low, high)
-                    fits = np.flatnonzero(grown < self.closing)
-                    if not len(fits):
+                    first, end, grown = _fitting(
+                        *body.whole_box(span), span.first, span.end, low, high, closing, least, most
+                    )
+                    if first == end:
                         continue
-                    first, end = int(fits[0]), int(fits[-1]) + 1
-                    kept.append(Span(span.piece, span.image, span.first + first, span.first + end))
-                    least = np.minimum(least, cell_low[first:end].min(axis=0))
-                    most = np.maximum(most, cell_high[first:end].max(axis=0))
-                    smallest = min(smallest, float(grown[fits].min()))
+                    kept.append(Span(span.piece, span.image, first, end))
+                    smallest = min(smallest, grown)
                 if not kept:
                     return None
                 node.spans[index] = kept
@@ -261,7 +269,7 @@ class BoxProof:
                 sizes.append(smallest)
             if not self._link(node):
                 return None
-            if np.allclose(before[0], low, atol=1e-9) and np.allclose(before[1], high, atol=1e-9):
+            if max(np.abs(before[0] - low).max(), np.abs(before[1] - high).max()) < STILL:
                 break
         node.low, node.high = low, high
         return sizes
@@ -280,10 +288,10 @@ class BoxProof:
                 return False
         return True
 
-    def _where_to_split(
-        self, node: Subproblem, alone: list[int], found: Relaxation | None, low: Array, high: Array
-    ) -> tuple[int, float] | None:
+    def _where_to_split(self, node: Subproblem) -> tuple[int, float] | None:
         """Return the wall to be split, and where along its span; None if that gains nothing."""
+        found, alone = node.found, self._alone(node)
+        low, high = found.low, found.high
         settled = SETTLED * self._gap * self.threshold
         size = float(np.maximum(high - low, 0.0).sum())
         score = np.zeros(len(node.spans))
@@ -292,8 +300,7 @@ class BoxProof:
             score[index] = grown - size
         at = np.full(len(node.spans), 0.5)
         lost = np.zeros(len(node.spans))
-        if found is not None:
-            lost[alone], at[alone] = found.lost, found.x
+        lost[alone], at[alone] = found.lost, found.x
         cells = np.array([sum(span.end - span.first for span in spans) for spans in node.spans])
         if lost[cells > 1].sum() > settled:
             score = np.maximum(score, lost)
@@ -328,3 +335,42 @@ def _grown(cell_low: Array, cell_high: Array, low: Array, high: Array) -> Array:
     """Return the size of a core with a point of each cell taken in, in [rad], shape (n,)."""
     edges = np.maximum(cell_low, high) - np.minimum(cell_high, low)
     return np.asarray(np.maximum(edges, 0.0).sum(axis=-1))
+
+
+@njit(
+    "Tuple((int64,int64,float64))(float64[:,::1],float64[:,::1],int64,int64,float64[::1],"
+    "float64[::1],float64,float64[::1],float64[::1])",
+    cache=True,
+)
+def _fitting(  # type: ignore[no-untyped-def]
+    cell_low, cell_high, first, end, low, high, closing, least, most
+):
+    """Return first and end of the cells of a run that a small box can hold, and the least size.
+
+    Args:
+        cell_low: Lower faces of the cells in [rad], shape (n, 6).
+        cell_high: Upper faces.
+        first: First cell.
+        end: After the last.
+        low: Lower faces of the core in [rad], shape (6,).
+        high: Upper faces.
+        closing: Boxes of this size or more are not small, in [rad].
+        least: Lowered to the least lower faces of these cells, shape (6,).
+        most: Raised to the greatest upper faces, shape (6,).
+    """
+    begin, stop, smallest = end, end, np.inf
+    for cell in range(first, end):
+        size = 0.0
+        for joint in range(6):
+            edge = max(cell_low[cell, joint], high[joint]) - min(cell_high[cell, joint], low[joint])
+            size += max(edge, 0.0)
+        if size < closing:
+            if begin == end:
+                begin = cell
+            stop = cell + 1
+            smallest = min(smallest, size)
+    for cell in range(begin, stop):
+        for joint in range(6):
+            least[joint] = min(least[joint], cell_low[cell, joint])
+            most[joint] = max(most[joint], cell_high[cell, joint])
+    return begin, stop, smallest

@@ -1,7 +1,9 @@
 """The smallest box that holds a point of each of some segments, by linear programming.
 
-The bound does not rest on the solver: from any prices of the constraints a lower bound follows by
-duality, and it is computed here anew from those that the solver returns.
+How far each face must move out of a core, and where on its segment each point lies, are the
+variables; that every face lies beyond every point are the constraints. The dual of this starts
+from prices of nothing, and a simplex method in a small table raises them. The bound does not rest
+on the method: from any prices a lower bound follows, and it is computed anew from those found.
 """
 
 from __future__ import annotations
@@ -9,14 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linprog
-from scipy.sparse import csr_array
+from numba import njit
 
 from opl.geometry.frames import Array
 from opl.search.walls import Segment
 
 ROUND_OFF = 1e-9  # [rad] of the sums that make a bound
-FARTHEST = 100.0  # [rad] from a core that any face can be
 
 
 @dataclass(frozen=True)
@@ -24,13 +24,13 @@ class Relaxation:
     """The least box of some segments.
 
     Attributes:
-        bound: No box that holds a point of each is smaller, in [rad].
+        bound: No box that holds the core and a point of each is smaller, in [rad].
         low: Lower faces of the box found, shape (6,).
         high: Upper faces.
         x: Where on each segment, 0 to 1, shape (k,).
         lost: How much larger it could be if each segment had no pads, in [rad], shape (k,).
-        prices: Of each segment and joint: how hard it presses on the upper face of the box, and on
-            the lower one, shape (k, 6, 2).
+        prices: How hard each segment presses on each upper face of the box, and on each lower one,
+            from 0 to 1, shape (k, 6, 2).
     """
 
     bound: float
@@ -41,64 +41,106 @@ class Relaxation:
     prices: Array
 
 
-def least_box_of(
-    segments: list[Segment], low: Array, high: Array
-) -> Relaxation | None:
+def least_box_of(segments: list[Segment], low: Array, high: Array) -> Relaxation:
     """Return the least box that holds a core and a point of each segment.
 
     Args:
-        segments: At least one.
+        segments: The segments.
         low: The lower faces are not above these, in [rad], shape (6,).
         high: The upper faces are not below these.
-
-    Returns:
-        None if the solver gives up, which proves nothing.
     """
     k = len(segments)
-    start = np.array([segment.start for segment in segments])
-    along = np.array([segment.along for segment in segments])
-    pad_low = np.array([segment.pad_low for segment in segments])
-    pad_high = np.array([segment.pad_high for segment in segments])
-    # variables: lower faces, upper faces, x; every upper face at or above its point of a segment,
-    # every lower one at or below
-    least, most = start + np.minimum(along, 0.0), start + np.maximum(along, 0.0)
-    up_w, up_j = np.nonzero(most + pad_low > high)
-    down_w, down_j = np.nonzero(least + pad_high < low)
-    n_up, n_down = len(up_w), len(down_w)
-    n_rows = n_up + n_down
-    rows = np.arange(n_rows)
-    face = np.concatenate([6 + up_j, down_j])
-    face_sign = np.concatenate([-np.ones(n_up), np.ones(n_down)])
-    slope = np.concatenate([along[up_w, up_j], -along[down_w, down_j]])
-    limit = np.concatenate(
-        [-(start + pad_low)[up_w, up_j], (start + pad_high)[down_w, down_j]]
+    start = np.array([segment.start for segment in segments]).reshape(k, 6)
+    along = np.array([segment.along for segment in segments]).reshape(k, 6)
+    pad_low = np.array([segment.pad_low for segment in segments]).reshape(k, 6)
+    pad_high = np.array([segment.pad_high for segment in segments]).reshape(k, 6)
+    # upper faces in columns 0 to 5, lower ones mirrored in 6 to 11: out >= reach + slope * x
+    reach = np.concatenate([start + pad_low - high, low - start - pad_high], axis=1)
+    slope = np.concatenate([along, -along], axis=1)
+    wall, face = (
+        np.ascontiguousarray(index)
+        for index in np.nonzero(reach + np.maximum(slope, 0.0) > 0.0)
     )
-    matrix = csr_array(
-        (
-            np.concatenate([face_sign, slope]),
-            (np.concatenate([rows, rows]), np.concatenate([face, 12 + up_w, 12 + down_w])),
-        ),
-        shape=(n_rows, 12 + k),
-    )
-    lower = np.concatenate([high - FARTHEST, high, np.zeros(k)])
-    upper = np.concatenate([low, low + FARTHEST, np.ones(k)])
-    cost = np.concatenate([-np.ones(6), np.ones(6), np.zeros(k)])
-    if n_rows:
-        found = linprog(
-            cost, matrix, limit, bounds=np.stack([lower, upper], axis=1), method="highs-ds"
-        )
-        if found.status != 0:
-            return None
-        price, solution = np.maximum(-found.ineqlin.marginals, 0.0), found.x
-    else:
-        price, solution = np.zeros(0), np.where(cost > 0.0, lower, upper)
-        solution[12:] = 0.5
-    reduced = cost + matrix.T @ price
-    bound = float(np.minimum(reduced * lower, reduced * upper).sum() - price @ limit)
-    prices = np.zeros((k, 6, 2))
-    prices[up_w, up_j, 0] = price[:n_up]
-    prices[down_w, down_j, 1] = price[n_up:]
-    lost = (prices[..., 1] * pad_high - prices[..., 0] * pad_low).sum(axis=1)
-    return Relaxation(
-        bound - ROUND_OFF, solution[:6], solution[6:12], solution[12:], lost, prices
-    )
+    bound = float((high - low).sum())
+    prices, out, x = np.zeros((k, 12)), np.zeros(12), np.full(k, 0.5)
+    if len(wall):
+        price = np.empty(len(wall))
+        _raise_prices(reach[wall, face], slope[wall, face], wall, face, k, price, out, x)
+        prices[wall, face] = price
+        prices /= np.maximum(prices.sum(axis=0), 1.0)
+        # the least over every place on each segment
+        bound += float((prices * reach).sum() + np.minimum((prices * slope).sum(axis=1), 0.0).sum())
+    out = np.maximum((reach + slope * x[:, None]).max(axis=0, initial=0.0), 0.0)
+    lost = (prices[:, 6:] * pad_high - prices[:, :6] * pad_low).sum(axis=1)
+    by_face = np.stack([prices[:, :6], prices[:, 6:]], axis=-1)
+    return Relaxation(bound - ROUND_OFF, low - out[6:], high + out[:6], x, lost, by_face)
+
+
+MOST_PIVOTS = 2000
+ENTERS = 1e-10  # [rad] gain below which a price is not raised
+PIVOT = 1e-9  # smallest that is divided by
+
+
+@njit(
+    "void(float64[::1],float64[::1],int64[::1],int64[::1],int64,float64[::1],float64[::1],"
+    "float64[::1])",
+    cache=True,
+)
+def _raise_prices(reach, slope, wall, face, n_walls, price, out, x):  # type: ignore[no-untyped-def]
+    """Maximise reach . y - sum(z), the y of a face together at most 1, -slope . y <= z.
+
+    Args:
+        reach: Of each constraint in [rad], shape (n,).
+        slope: In [rad], shape (n,).
+        wall: Its segment, shape (n,).
+        face: Its face, 0 to 11, shape (n,).
+        n_walls: How many segments.
+        price: Filled with y, shape (n,).
+        out: Filled with how far each face moves out, shape (12,).
+        x: Filled with the place on each segment, shape (n_walls,).
+    """
+    n = len(reach)
+    n_rows = 12 + n_walls
+    n_columns = n + n_walls + n_rows  # prices, z, slacks
+    table = np.zeros((n_rows + 1, n_columns + 1))
+    basis = np.empty(n_rows, dtype=np.int64)
+    for j in range(n):
+        table[face[j], j] = 1.0
+        table[12 + wall[j], j] = -slope[j]
+        table[n_rows, j] = reach[j]
+    for w in range(n_walls):
+        table[12 + w, n + w] = -1.0
+        table[n_rows, n + w] = -1.0
+    for row in range(n_rows):
+        table[row, n + n_walls + row] = 1.0
+        basis[row] = n + n_walls + row
+        # a little more than 0, different for each, so that no step is for nothing
+        table[row, n_columns] = 1.0 if row < 12 else 1e-9 * (1.0 + (row * 7 % 13) / 13.0)
+    for _ in range(MOST_PIVOTS):
+        enter, best = -1, ENTERS
+        for j in range(n_columns):
+            if table[n_rows, j] > best:
+                enter, best = j, table[n_rows, j]
+        if enter < 0:
+            break
+        leave, least = -1, np.inf
+        for row in range(n_rows):
+            if table[row, enter] > PIVOT:
+                ratio = table[row, n_columns] / table[row, enter]
+                if ratio < least:
+                    leave, least = row, ratio
+        if leave < 0:
+            break
+        table[leave] /= table[leave, enter]
+        for row in range(n_rows + 1):
+            if row != leave and table[row, enter] != 0.0:
+                table[row] -= table[row, enter] * table[leave]
+        basis[leave] = enter
+    price[:] = 0.0
+    for row in range(n_rows):
+        if basis[row] < n:
+            price[basis[row]] = max(table[row, n_columns], 0.0)
+    for row in range(12):
+        out[row] = max(-table[n_rows, n + n_walls + row], 0.0)
+    for w in range(n_walls):
+        x[w] = min(max(-table[n_rows, n + n_walls + 12 + w], 0.0), 1.0)
