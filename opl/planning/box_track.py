@@ -8,7 +8,7 @@ the box between two places, more places are taken in.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,19 +19,21 @@ from opl.planning.costs import CostWeights, track_cost
 from opl.planning.families import JUMP, Placement
 from opl.planning.filling import BrokenEdgeError, cutter_frames, fill_in
 from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
-from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
+from opl.planning.open_matrix import Track, open_matrices
 from opl.planning.plan import Found, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem, wheel_layer
 from opl.planning.refine import RefinedProblem
 from opl.planning.symmetry import twins
 from opl.search.box import JointBox
+from opl.search.outside import outside
 from opl.search.smooth import Travel, smoothest_within
 
 SAMPLES = 17  # contact positions of a place
 ROUNDS = 3  # of sampling closer around a track
 SUBDIVIDE = np.array([0.25, 0.5, 0.75])  # where an edge that bulges is given places
-SMALLEST_EDGE = 1.0 / 16.0  # of that between cutter points that is still given places
-MOST_BULGES = 4  # rounds of taking in places
+SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
+BEND = 2.0  # times the sagitta that second differences tell: how far postures stand off a chord
+BORDER = 1e-2  # belt units to look beyond what lies in the box
 MOST_CHECKS = 12  # of motions in one box
 
 
@@ -61,86 +63,156 @@ class BoxTracks:
         self._most = most
         self.checks = 0
 
-    def plan(self, box: JointBox, room: float, placements: Sequence[Placement]) -> Plan | None:
-        """Return the motion of the smoothest free track in a box, or None.
+    def columns(self, box: JointBox, placements: Sequence[Placement], places: Array) -> Columns:
+        """Sample the postures of places where they are near to a box.
 
         Args:
             box: The box.
-            room: By how much the motion may leave it, in [rad] of its size.
-            placements: The image that each pass uses, all of one family.
+            placements: The image that each pass uses.
+            places: Fractional cutter points, the cutter points among them, shape (n,).
         """
-        places = np.arange(len(self._problem.points), dtype=float)
+        problem = self._problem
+        before, points = places.astype(int), problem.points
+        there = CutterPoints(
+            cutter_frames(points, places),
+            points.pass_index[before],
+            np.interp(places, np.arange(len(points)), points.arc_length),
+        )
+        positions = problem.field.contact_positions
+        whole = places % 1.0 == 0.0
+        q = np.empty((len(places), len(positions), *problem.field.q.shape[2:]))
+        q[whole] = problem.field.q[before[whole]]
+        q[~whole] = inverse_solutions(
+            problem.cell, there.Ts_workpiece_cutter[~whole][:, None], positions
+        )
+        cuts = np.empty(q.shape[:2], dtype=bool)
+        cuts[whole] = problem.cuts[before[whole]]
+        if not whole.all():
+            between = CutterPoints(
+                there.Ts_workpiece_cutter[~whole], np.zeros(np.sum(~whole), dtype=int), places[~whole]
+            )
+            layer = wheel_layer(problem.scene, between, positions)
+            cuts[~whole] = layer < -problem.cell.planned_allowance
+        grid = np.broadcast_to(positions, q.shape[:2])
+        coarse = self._placed(there, q, placements)
+        free = ~cuts & ~np.isnan(coarse[..., 0])
+        t, _ = _sampled(grid, coarse, free, box, 2 * SAMPLES - 1, whole=True)
+        # where the part begins to cut is known to a hair only
+        last = problem.cell.wheel.last_position
+        t = np.clip(np.concatenate([t[:, :1] - BORDER, t, t[:, -1:] + BORDER], axis=1), -last, last)
+        return self._at(places, there, placements, t)
+
+    def _at(
+        self, places: Array, there: CutterPoints, placements: Sequence[Placement], t: Array
+    ) -> Columns:
+        """Return the postures of places at contact positions, shape (n, m)."""
+        problem = self._problem
+        q = inverse_solutions(problem.cell, there.Ts_workpiece_cutter[:, None], t)
+        layer = wheel_layer(problem.scene, there, t)
+        q = self._placed(there, q, placements)
+        free = ~np.isnan(q[..., 0]) & ~(layer < -problem.cell.planned_allowance)
+        return Columns(places, there, tuple(placements), t, q, free, layer)
+
+    def _placed(self, there: CutterPoints, q: Array, placements: Sequence[Placement]) -> Array:
+        """Return the placed postures of all inverse solutions, shape (n, m, 6)."""
+        placed = np.empty((*q.shape[:2], 6))
+        for index, placement in enumerate(placements):
+            own = there.pass_index == index
+            start = self._seams.start[placement.family]
+            unrolled = start + np.remainder(q[own][:, :, placement.family] - start, 2.0 * np.pi)
+            placed[own] = placement.of(unrolled)
+        return placed
+
+    def plan(self, columns: Columns, box: JointBox, room: float) -> Plan | Array | None:
+        """Return the motion of the smoothest free track in a box.
+
+        Args:
+            columns: Places, all with postures in the box.
+            box: The box.
+            room: By how much the motion may leave it, in [rad] of its size.
+
+        Returns:
+            The motion; or more places, between those where the track leaves the box; or None if
+            nothing is free.
+        """
         inner = box.widened(room / 2.0)
-        swept = False
-        for _ in range(MOST_BULGES):
-            sampled = _Sampled(self, places, placements, inner, swept)
-            if not sampled.matrices:
-                return None
-            track = sampled.smoothest()
-            if track is None:
-                return None
-            for _ in range(ROUNDS):
-                closer = sampled.closer(track)
-                finer = closer.smoothest()
-                if finer is None:
-                    break
-                sampled, track = closer, finer
-            bulges = sampled.bulges(track, box.widened(room))
-            if len(bulges):
-                ends = places[bulges], places[bulges + 1]
-                added = ends[0][:, None] + (ends[1] - ends[0])[:, None] * SUBDIVIDE
-                places = np.union1d(places, added)
-                continue
-            plan = sampled.check(track)
-            if plan is not None or swept:
-                return plan
-            swept = True
-        return sampled.check(track)
+        t, spacing = _sampled(columns.t, columns.q, columns.free, inner, SAMPLES)
+        sampled = _Sampled(self, self._at(columns.places, columns.points, columns.placements, t), inner)
+        track = sampled.smoothest()
+        if track is None:
+            return None
+        coarse = sampled
+        for _ in range(ROUNDS):
+            closer = sampled.closer(track, spacing)
+            finer = closer.smoothest()
+            if finer is None:
+                break
+            sampled, track, spacing = closer, finer, spacing * 2.0 / (SAMPLES - 1)
+        bulges = sampled.bulges(track, box.widened(room))
+        if len(bulges):
+            ends = columns.places[bulges], columns.places[bulges + 1]
+            return np.ravel(ends[0][:, None] + (ends[1] - ends[0])[:, None] * SUBDIVIDE)
+        plan = sampled.check(track)
+        if plan is None:
+            coarse.sweep()
+            around = coarse.smoothest()
+            plan = None if around is None else coarse.check(around)
+        return plan
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The postures of places near to a box.
+
+    Attributes:
+        places: Fractional cutter points, shape (n,).
+        points: The places as points of their own.
+        placements: The image that each pass uses.
+        t: Contact positions, shape (n, m).
+        q: Placed postures in [rad], NaN where there are none, shape (n, m, 6).
+        free: Which are within reach and do not cut into the wheel, shape (n, m).
+        wheel_clearance: Signed distance of the part to the wheel in [m], shape (n, m).
+    """
+
+    places: Array
+    points: CutterPoints
+    placements: tuple[Placement, ...]
+    t: Array
+    q: Array
+    free: np.ndarray
+    wheel_clearance: Array
+
+    def missing(self, box: JointBox) -> Array:
+        """Return by how much a box must grow for each place, in [rad], shape (n,)."""
+        missing, row = np.empty(len(self.q)), np.empty(len(self.q))
+        by_joint = np.ascontiguousarray(np.moveaxis(self.q, 1, 2))
+        outside(by_joint, self.free, box.lower, box.upper, JUMP, missing, row)
+        return missing
 
 
 class _Sampled:
     """The nodes of some places at contact positions of their own."""
 
-    def __init__(
-        self,
-        search: BoxTracks,
-        places: Array,
-        placements: Sequence[Placement],
-        box: JointBox,
-        swept: bool,
-        t: Array | None = None,
-        spacing: Array | None = None,
-    ) -> None:
+    def __init__(self, search: BoxTracks, columns: Columns, box: JointBox) -> None:
         self._search = search
-        self._places = places
-        self._placements = placements
+        self._columns = columns
         self._box = box
-        self._swept = swept
         problem = search._problem
-        columns = places.astype(int)
-        points = problem.points
-        self._points = CutterPoints(
-            cutter_frames(points, places),
-            points.pass_index[columns],
-            np.interp(places, np.arange(len(points)), points.arc_length),
-        )
-        if t is None or spacing is None:
-            t, spacing = self._windows()
-        self._t, self._spacing = t, spacing
-        q = self._placed(inverse_solutions(problem.cell, self._points.Ts_workpiece_cutter[:, None], t))
-        q[~_near(q, box)] = np.nan
-        matrices = list(self._images(q))
-        layer = wheel_layer(problem.scene, self._points, t, ~np.isnan(q[..., 0]))
+        q = np.where((columns.free & _near(columns.q, columns.free, box))[..., None], columns.q, np.nan)
         self.problem = replace(
             problem,
-            points=self._points,
-            field=NodeField(t[0], problem.field.q[:0], tuple(matrices)),
-            wheel_clearance=layer,
+            points=columns.points,
+            field=NodeField(columns.t[0], problem.field.q[:0], tuple(self._images(q))),
+            wheel_clearance=columns.wheel_clearance,
         )
         self.matrices = open_matrices(self.problem)
-        if swept:
-            for matrix in self.matrices:
-                _sweep(matrix, self.problem)
+
+    def sweep(self) -> None:
+        """Close every node that collides."""
+        for matrix in self.matrices:
+            columns, rows = np.nonzero(matrix.free)
+            hit = self.problem.scene.collision.collides(matrix.nodes.q[columns, rows])
+            matrix.free[columns[hit], rows[hit]] = False
 
     def smoothest(self) -> Track | None:
         """Return the smoothest track in the matrix that is farthest from the limits."""
@@ -158,16 +230,15 @@ class _Sampled:
                 return Track(index, found.rows)
         return None
 
-    def closer(self, track: Track) -> _Sampled:
+    def closer(self, track: Track, spacing: Array) -> _Sampled:
         """Return closer samples around a track, whose own nodes are among them."""
+        search, columns = self._search, self._columns
         own = self.matrices[track.matrix].nodes.t_along(track.rows)
         about = np.linspace(-1.0, 1.0, SAMPLES)
-        last = self._search._problem.cell.wheel.last_position
-        t = np.clip(own[:, None] + about * self._spacing[:, None], -last, last)
-        return _Sampled(
-            self._search, self._places, self._placements, self._box, self._swept,
-            t, self._spacing * 2.0 / (SAMPLES - 1),
-        )  # fmt: skip
+        last = search._problem.cell.wheel.last_position
+        t = np.clip(own[:, None] + about * spacing[:, None], -last, last)
+        around = search._at(columns.places, columns.points, columns.placements, t)
+        return _Sampled(search, around, self._box)
 
     def bulges(self, track: Track, box: JointBox) -> np.ndarray:
         """Return the places from which a track leaves the box on its way to the next."""
@@ -182,11 +253,11 @@ class _Sampled:
         bulging = np.unique(path.cutter_point[~outer.widened(room).holds(path.q)].astype(int))
         if not len(bulging) or np.ptp(path.q, axis=0).sum() <= box.size:
             return np.empty(0, dtype=int)
-        return np.asarray(bulging[np.diff(self._places)[bulging] > SMALLEST_EDGE])
+        return np.asarray(bulging[np.diff(self._columns.places)[bulging] > SMALLEST_EDGE])
 
     def check(self, track: Track) -> Plan | None:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free."""
-        search, found = self._search, RefinedProblem(self.problem, self._places)
+        search, found = self._search, RefinedProblem(self.problem, self._columns.places)
         for _ in range(MOST_CHECKS):
             proposals = twins(self.matrices, track, self.problem.cell.robot)
             outcome = propose_and_check(self.problem, self.matrices, proposals, search.checks)
@@ -205,54 +276,13 @@ class _Sampled:
             track = following
         return None
 
-    def _windows(self) -> tuple[Array, Array]:
-        """Return contact positions where the postures lie in the box, and how far apart."""
-        problem = self._search._problem
-        positions = problem.field.contact_positions
-        whole = self._places % 1.0 == 0.0
-        q = np.empty((len(self._places), len(positions), *problem.field.q.shape[2:]))
-        q[whole] = problem.field.q
-        between = self._points.Ts_workpiece_cutter[~whole]
-        q[~whole] = inverse_solutions(problem.cell, between[:, None], positions)
-        placed = self._placed(q)
-        enter, leave = _clipped(placed, self._box)
-        t, spacing = np.empty((len(q), SAMPLES)), np.empty(len(q))
-        share = np.linspace(0.0, 1.0, SAMPLES)
-        for column, (start, end) in enumerate(zip(enter, leave, strict=True)):
-            hit = np.flatnonzero(end >= start)
-            if not len(hit):
-                # the curve passes the box by a hair
-                nearest = positions[int(np.argmin(_missing(placed[column], self._box)))]
-                step = positions[1] - positions[0]
-                t[column] = np.clip(nearest + (2.0 * share - 1.0) * step, positions[0], positions[-1])
-                spacing[column] = 2.0 * step / (SAMPLES - 1)
-                continue
-            step = positions[hit + 1] - positions[hit]
-            first, last = positions[hit] + start[hit] * step, positions[hit] + end[hit] * step
-            length = np.concatenate([[0.0], np.cumsum(last - first)])
-            along = share * length[-1]
-            at = np.clip(np.searchsorted(length, along, side="right") - 1, 0, len(hit) - 1)
-            t[column] = first[at] + np.minimum(along - length[at], (last - first)[at])
-            spacing[column] = max(length[-1] / (SAMPLES - 1), 1e-3)
-        return t, spacing
-
-    def _placed(self, q: Array) -> Array:
-        """Return the placed postures of all inverse solutions, shape (n, m, 6)."""
-        placed = np.empty((*q.shape[:2], 6))
-        for index, placement in enumerate(self._placements):
-            columns = self._points.pass_index == index
-            start = self._search._seams.start[placement.family]
-            unrolled = start + np.remainder(q[columns][:, :, placement.family] - start, 2.0 * np.pi)
-            placed[columns] = placement.of(unrolled)
-        return placed
-
     def _images(self, q: Array) -> list[NodeMatrix]:
         """Return the matrices that make these postures elsewhere in joint space, best first."""
         problem = self._search._problem
         robot = problem.cell.robot
         flips = [(4 * k, *flip) for k, flip in enumerate(wrist_flips(robot.arm))]
         found = []
-        family = self._placements[0].family
+        family = self._columns.placements[0].family
         index = np.arange(q.shape[1])
         for slot, sign, shift in flips:
             moved = q * sign + shift
@@ -268,16 +298,49 @@ class _Sampled:
                 at = np.where(within[..., None], turned, np.nan)
                 margin = np.minimum(turned - robot.lower, robot.upper - turned)
                 near = float((1.0 / np.maximum(np.nanmin(margin, axis=(0, 1)), 1e-3)).sum())
-                nodes = NodeMatrix(family + slot, np.ascontiguousarray(at), self._t, index)
+                nodes = NodeMatrix(family + slot, np.ascontiguousarray(at), self._columns.t, index)
                 found.append((near, len(found), nodes))
         return [nodes for _, _, nodes in sorted(found, key=lambda entry: entry[:2])]
 
 
-def _sweep(matrix: OpenMatrix, problem: GrindingProblem) -> None:
-    """Close every node that collides."""
-    columns, rows = np.nonzero(matrix.free)
-    hit = problem.scene.collision.collides(matrix.nodes.q[columns, rows])
-    matrix.free[columns[hit], rows[hit]] = False
+def _sampled(
+    t: Array, q: Array, free: np.ndarray, box: JointBox, count: int, whole: bool = False
+) -> tuple[Array, Array]:
+    """Return contact positions where the chords between postures lie in a box.
+
+    Args:
+        t: Contact positions, increasing, shape (n, m).
+        q: The postures in [rad], shape (n, m, 6).
+        free: Which may be used: a chord with neither end free is left out, shape (n, m).
+        box: The box; around the posture nearest to it where a column does not meet it.
+        count: How many for each column.
+        whole: Whether whole chords are sampled, and those beside them, not what is in the box.
+
+    Returns:
+        They, shape (n, count), and how far they are apart, shape (n,).
+    """
+    enter, leave = _clipped(q, box)
+    leave = np.where(free[:, :-1] | free[:, 1:], leave, -1.0)
+    nearest = np.argmin(np.where(free, _missing(q, box), np.inf), axis=1)
+    found, spacing = np.empty((len(q), count)), np.empty(len(q))
+    share = np.linspace(0.0, 1.0, count)
+    for column, (start, end) in enumerate(zip(enter, leave, strict=True)):
+        own, hit = t[column], np.flatnonzero(end >= start)
+        if len(hit):
+            if whole:
+                hit = np.unique(np.clip(hit[:, None] + np.array([-1, 0, 1]), 0, len(own) - 2))
+                start, end = np.zeros_like(start), np.ones_like(end)
+            step = own[hit + 1] - own[hit]
+            first, last = own[hit] + start[hit] * step, own[hit] + end[hit] * step
+        else:  # the curve passes the box by a hair
+            first = own[[max(nearest[column] - 1, 0)]]
+            last = own[[min(nearest[column] + 1, len(own) - 1)]]
+        length = np.concatenate([[0.0], np.cumsum(last - first)])
+        along = share * length[-1]
+        at = np.clip(np.searchsorted(length, along, side="right") - 1, 0, len(first) - 1)
+        found[column] = first[at] + np.minimum(along - length[at], (last - first)[at])
+        spacing[column] = length[-1] / (count - 1)
+    return found, spacing
 
 
 def _missing(q: Array, box: JointBox) -> Array:
@@ -286,11 +349,11 @@ def _missing(q: Array, box: JointBox) -> Array:
     return np.asarray(np.nan_to_num(away.sum(axis=-1), nan=np.inf))
 
 
-def _near(q: Array, box: JointBox) -> np.ndarray:
-    """Return which postures are in a box, the nearest where a column has none, shape (n, m)."""
-    missing = _missing(q, box)
+def _near(q: Array, free: np.ndarray, box: JointBox) -> np.ndarray:
+    """Return which free postures are in a box, the nearest where a column has none, shape (n, m)."""
+    missing = np.where(free, _missing(q, box), np.inf)
     least = missing.min(axis=1, keepdims=True)
-    return np.asarray((missing <= np.maximum(least, 0.0) + 1e-12) & np.isfinite(missing))
+    return np.asarray((missing <= least + 1e-12) & np.isfinite(missing))
 
 
 def _clipped(q: Array, box: JointBox) -> tuple[Array, Array]:
@@ -299,9 +362,16 @@ def _clipped(q: Array, box: JointBox) -> tuple[Array, Array]:
     Shape (n, m - 1) each; one that does not meet the box leaves before it enters.
     """
     start, along = q[:, :-1], np.diff(q, axis=1)
+    bend = np.nan_to_num(np.abs(np.diff(q, n=2, axis=1)))
+    bend = np.where(bend < JUMP, bend, 0.0)
+    nothing = np.zeros_like(bend[:, :1])
+    bend = np.maximum(
+        np.concatenate([nothing, bend], axis=1), np.concatenate([bend, nothing], axis=1)
+    )
+    low, high = box.lower - BEND * bend / 8.0, box.upper + BEND * bend / 8.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        one, other = (box.lower - start) / along, (box.upper - start) / along
-    inside = (start >= box.lower) & (start <= box.upper)
+        one, other = (low - start) / along, (high - start) / along
+    inside = (start >= low) & (start <= high)
     still = np.abs(along) < 1e-12
     enter = np.where(still, np.where(inside, 0.0, 2.0), np.minimum(one, other)).max(axis=2)
     leave = np.where(still, np.where(inside, 1.0, -1.0), np.maximum(one, other)).min(axis=2)

@@ -32,6 +32,7 @@ from opl.search.walls import UNKNOWN, Image, Piece, Wall
 CELL = 1.0  # belt units that a cell covers at first
 MOST_HALVINGS = 5  # of a cell where the part begins to cut into the wheel
 MOST_PARTS = 32  # of a cell whose pads are large
+FINER = 8  # cells that one is cut into where a proof needs it
 COARSE = 5e-4  # [rad] sum of the pads that is small enough
 ROUND_OFF = 1e-9  # [rad] of inverse kinematics and enclosures
 
@@ -158,6 +159,13 @@ class ColumnWalls:
             Wall(int(passes[k]), float(place), tuple(self._pieces(cells, k)))
             for k, place in enumerate(places)
         ]
+
+    def finer(self, wall: Wall, piece: Piece, cell: int) -> tuple[Piece, ...]:
+        """Return one cell of a wall as pieces with smaller cells."""
+        T_workpiece_cutter = cutter_frames(self._points, np.array([wall.place]))
+        grid = np.linspace(piece.at[cell], piece.at[cell + 1], FINER + 1)
+        cells = self._cells(T_workpiece_cutter, [grid])
+        return tuple(found for found in self._pieces(cells, 0) if found.family == piece.family)
 
     def _pieces(self, cells: _Cells, wall: int) -> Iterator[Piece]:
         """Yield the pieces of one of several walls."""

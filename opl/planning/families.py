@@ -6,7 +6,6 @@ flipped. Which image a pass uses is its placement.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,6 +61,35 @@ class Fit:
     row: Array
 
 
+def grown(q: Array, free: np.ndarray, box: JointBox) -> JointBox | None:
+    """Return a box grown until it holds a point of every column, the worst column first.
+
+    None if some column has none.
+
+    Args:
+        q: Postures in [rad], shape (n, m, 6).
+        free: Which may be used, shape (n, m).
+        box: The box.
+    """
+    by_joint = np.ascontiguousarray(np.moveaxis(q, 1, 2))
+    low, high = box.lower.copy(), box.upper.copy()
+    missing, row = np.empty(len(q)), np.empty(len(q))
+    for _ in range(MOST_GROWN):
+        outside(by_joint, free, low, high, JUMP, missing, row)
+        column = int(np.argmax(missing))
+        if not np.isfinite(missing[column]):
+            return None
+        if missing[column] <= GROWN:
+            break
+        here = int(row[column])
+        x = row[column] - here
+        point = q[column, here]
+        if x > 0.0:
+            point = (1.0 - x) * point + x * q[column, here + 1]
+        low, high = np.minimum(low, point), np.maximum(high, point)
+    return JointBox(low, high)
+
+
 class Families:
     """The unrolled angles of every family at some places.
 
@@ -87,39 +115,6 @@ class Families:
             free[free] = walls.within_limits(unrolled[free])
             if free.any():
                 self._unrolled[family] = unrolled, free
-
-    def grown(self, box: JointBox, placements: Sequence[Placement]) -> JointBox:
-        """Return a box grown until it holds a point of every column, the worst column first.
-
-        Args:
-            box: The box.
-            placements: The image that each pass uses.
-        """
-        low, high = box.lower.copy(), box.upper.copy()
-        passes = []
-        for index, placement in enumerate(placements):
-            columns = self._pass_index == index
-            unrolled, free = self._unrolled[placement.family]
-            q = np.ascontiguousarray(np.moveaxis(placement.of(unrolled[columns]), 1, 2))
-            passes.append((q, np.ascontiguousarray(free[columns])))
-        for _ in range(MOST_GROWN):
-            worst, point = 0.0, low
-            for q, free in passes:
-                missing, row = np.empty(len(q)), np.empty(len(q))
-                outside(q, free, low, high, JUMP, missing, row)
-                column = int(np.argmax(missing))
-                if worst < missing[column] < np.inf:
-                    worst = float(missing[column])
-                    here = int(row[column])
-                    there = min(here + 1, q.shape[2] - 1)
-                    x = row[column] - here
-                    point = q[column, :, here]
-                    if x > 0.0:
-                        point = (1.0 - x) * point + x * q[column, :, there]
-            if worst <= GROWN:
-                break
-            low, high = np.minimum(low, point), np.maximum(high, point)
-        return JointBox(low, high)
 
     def fits(self, index: int, low: Array, high: Array, reference: bool) -> list[Fit]:
         """Return how every image of every family of a pass fits into a box.

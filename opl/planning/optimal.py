@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opl.planning.box_track import BoxTracks
+from opl.planning.box_track import BoxTracks, Columns
 from opl.planning.columns import ColumnWalls, seams_of
 from opl.planning.costs import CostWeights
-from opl.planning.families import Families, Fit, Placement
+from opl.planning.families import Families, Fit, Placement, grown
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
 from opl.search.box import JointBox
@@ -71,8 +71,10 @@ class OptimalSearch:
         )
         self.plan = fallback
         gap = PROOF_SHARE * settings.widen
-        self.proof = BoxProof(self._walls.images, fallback.path.joint_range_sum, gap)
+        self.proof = BoxProof(
+            self._walls.images, self._walls.finer, fallback.path.joint_range_sum, gap)
         self._places: set[float] = set()
+        self._columns = np.arange(len(problem.points), dtype=float)
         n = len(problem.points)
         self._add([0.0, float(n // 2), float(n - 1)])
 
@@ -91,17 +93,32 @@ class OptimalSearch:
         candidate = self.proof.take_next()
         if candidate is None:
             return
+        box = JointBox(candidate.low, candidate.high)
         placements, missed = self._hold(candidate)
+        columns = None
+        if len({(one.family, float(one.flip[0][4])) for one in placements}) == 1:
+            columns = self._tracks.columns(box, placements, self._columns)
+            inner = grown(columns.q, columns.free, box)
+            if inner is not None:
+                hoped = inner.size * (1.0 + self._settings.widen)
+                self.proof.threshold = min(self.proof.threshold, hoped)
+            missed = missed or self._missed(columns, box)
         if missed:
-            box = self._families.grown(JointBox(candidate.low, candidate.high), placements)
-            hoped = box.size * (1.0 + self._settings.widen)
-            self.proof.threshold = min(self.proof.threshold, hoped)
             self._add(missed)
             self.proof.put_back()
             return
-        self._try(candidate, placements)
-        if candidate.bound < self.proof.closing:
+        if columns is not None and inner is not None and self._try(columns, inner):
+            self.proof.put_back()
+        elif candidate.bound < self.proof.closing:
             self.proof.give_up()
+
+    def _missed(self, columns: Columns, box: JointBox) -> list[float]:
+        """Return the places that a box misses most, looked at closely."""
+        missing = columns.missing(box)
+        missing[np.isin(columns.places, list(self._places))] = 0.0
+        worst = np.argsort(-missing, kind="stable")[:MOST_ADDED]
+        allowed = MISSED * self._settings.widen * self.proof.threshold
+        return [float(columns.places[k]) for k in worst if missing[k] > allowed]
 
     def _add(self, places: list[float]) -> None:
         for wall in self._walls.walls(places):
@@ -135,17 +152,17 @@ class OptimalSearch:
         at_walls = float(fit.missing[known].max(initial=0.0))
         return round(at_walls, 2), float(fit.missing.max())
 
-    def _try(self, candidate: Candidate, placements: list[Placement]) -> None:
-        """Look for a motion in a box."""
-        families = {(placement.family, id(placement.flip[0])) for placement in placements}
-        if len(families) > 1:
-            return  # a path keeps one posture
-        box = self._families.grown(JointBox(candidate.low, candidate.high), placements)
+    def _try(self, columns: Columns, box: JointBox) -> bool:
+        """Look for a motion in a box; return whether more places were taken in first."""
         room = ROOM_SHARE * self._settings.widen * box.size
-        plan = self._tracks.plan(box, room, placements)
-        if plan is not None and plan.path.joint_range_sum < self.plan.path.joint_range_sum:
-            self.plan = plan
-            self.proof.threshold = plan.path.joint_range_sum
+        found = self._tracks.plan(columns, box, room)
+        if isinstance(found, np.ndarray):
+            self._columns = np.union1d(self._columns, found)
+            return True
+        if found is not None and found.path.joint_range_sum < self.plan.path.joint_range_sum:
+            self.plan = found
+            self.proof.threshold = min(self.proof.threshold, found.path.joint_range_sum)
+        return False
 
 
 def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: Plan) -> Plan:

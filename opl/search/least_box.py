@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 
 from opl.geometry.frames import Array
+from opl.search.outside import outside
 from opl.search.relaxation import Relaxation, least_box_of
 from opl.search.walls import Image, Piece, Wall, relaxed
 
@@ -85,7 +86,10 @@ class _Body:
     def __init__(self, wall: Wall, images: Callable[[int], Sequence[Image]]) -> None:
         self.wall = wall
         self.images = images
+        self.pieces = list(wall.pieces)
+        self._finer: dict[tuple[int, int], tuple[int, int]] = {}
         self._moved: dict[tuple[int, int], Piece] = {}
+        self._chords: dict[tuple[int, int], Array] = {}
         self._boxes: dict[tuple[int, int], tuple[Array, Array]] = {}
 
     @cached_property
@@ -103,15 +107,28 @@ class _Body:
 
     def key(self, span: Span) -> tuple[int, tuple[int, ...]]:
         """Return what all spans of a pass share."""
-        family = self.wall.pieces[span.piece].family
+        family = self.pieces[span.piece].family
         return family, self.images(family)[span.image].key
 
     def moved(self, span: Span) -> Piece:
         at = (span.piece, span.image)
         if at not in self._moved:
-            piece = self.wall.pieces[span.piece]
+            piece = self.pieces[span.piece]
             self._moved[at] = self.images(piece.family)[span.image].of(piece)
         return self._moved[at]
+
+    def finer(self, span: Span, cut: Callable[[Wall, Piece, int], Sequence[Piece]]) -> list[Span]:
+        """Return the spans of a single cell cut into smaller ones."""
+        at = (span.piece, span.first)
+        if at not in self._finer:
+            found = cut(self.wall, self.pieces[span.piece], span.first)
+            self._finer[at] = len(self.pieces), len(found)
+            self.pieces += found
+        first, count = self._finer[at]
+        return [
+            Span(piece, span.image, 0, len(self.pieces[piece].pad_low))
+            for piece in range(first, first + count)
+        ]
 
     def whole_box(self, span: Span) -> tuple[Array, Array]:
         """Return the boxes of all cells of the piece of a span."""
@@ -121,10 +138,15 @@ class _Body:
             self._boxes[at] = np.ascontiguousarray(piece.low), np.ascontiguousarray(piece.high)
         return self._boxes[at]
 
-    def box(self, span: Span) -> tuple[Array, Array]:
-        """Return the boxes of the cells of a span."""
-        low, high = self.whole_box(span)
-        return low[span.first : span.end], high[span.first : span.end]
+    def distance(self, span: Span, low: Array, high: Array) -> float:
+        """Return by how much a box misses the chords of a span, in [rad]."""
+        at = (span.piece, span.image)
+        if at not in self._chords:
+            self._chords[at] = np.ascontiguousarray(self.moved(span).corners.T)[None]
+        chords = np.ascontiguousarray(self._chords[at][:, :, span.first : span.end + 1])
+        missing, row = np.empty(1), np.empty(1)
+        outside(chords, np.ones((1, chords.shape[2]), dtype=bool), low, high, np.inf, missing, row)
+        return float(missing[0])
 
 
 class BoxProof:
@@ -132,14 +154,20 @@ class BoxProof:
 
     Args:
         images: The images of each family, the family itself first.
+        cut: Cuts a cell of a wall into smaller ones.
         threshold: Boxes of this size or more in [rad] are of no interest.
         gap: Fraction by which the bound may stay below the threshold.
     """
 
     def __init__(
-        self, images: Callable[[int], Sequence[Image]], threshold: float, gap: float
+        self,
+        images: Callable[[int], Sequence[Image]],
+        cut: Callable[[Wall, Piece, int], Sequence[Piece]],
+        threshold: float,
+        gap: float,
     ) -> None:
         self._images = images
+        self._cut = cut
         self._gap = gap
         self._bodies: list[_Body] = []
         self.threshold = threshold
@@ -293,20 +321,14 @@ class BoxProof:
         found, alone = node.found, self._alone(node)
         low, high = found.low, found.high
         settled = SETTLED * self._gap * self.threshold
-        size = float(np.maximum(high - low, 0.0).sum())
-        score = np.zeros(len(node.spans))
+        score, at = np.zeros(len(node.spans)), np.full(len(node.spans), 0.5)
         for index, (body, spans) in enumerate(zip(self._bodies, node.spans, strict=True)):
-            grown = min(float(_grown(*body.box(span), low, high).min()) for span in spans)
-            score[index] = grown - size
-        at = np.full(len(node.spans), 0.5)
-        lost = np.zeros(len(node.spans))
-        lost[alone], at[alone] = found.lost, found.x
-        cells = np.array([sum(span.end - span.first for span in spans) for spans in node.spans])
-        if lost[cells > 1].sum() > settled:
-            score = np.maximum(score, lost)
-        score[cells == 1] = 0.0
+            score[index] = min(body.distance(span, low, high) for span in spans)
+        # where the chords lie, and what their pads cost
+        score[alone] = np.maximum(score[alone], np.maximum(found.lost, found.missed))
+        at[alone] = found.x
         wall = int(np.argmax(score))
-        if score[wall] > settled or lost[cells > 1].sum() > settled:
+        if score[wall] > settled:
             return wall, float(at[wall])
         return (0, 0.5) if len(node.spans[0]) > 1 else None
 
@@ -316,7 +338,16 @@ class BoxProof:
             halves = [[span] for span in spans]
         else:
             (span,) = spans
-            at = self._bodies[index].wall.pieces[span.piece].at[span.first : span.end + 1]
+            body = self._bodies[index]
+            if span.end == span.first + 1:
+                finer = body.finer(span, self._cut)
+                if not finer:
+                    return
+                (span,) = finer[:1]
+                if len(finer) > 1:
+                    self._push(node.bound, [*node.spans[:index], finer, *node.spans[index + 1 :]], node.low, node.high)
+                    return
+            at = body.pieces[span.piece].at[span.first : span.end + 1]
             n = len(at) - 1
             least = max(n // 8, 1)
             place = int(np.searchsorted(at, at[0] + x * (at[-1] - at[0])))

@@ -29,6 +29,7 @@ class Relaxation:
         high: Upper faces.
         x: Where on each segment, 0 to 1, shape (k,).
         lost: How much larger it could be if each segment had no pads, in [rad], shape (k,).
+        missed: By how much the box misses each segment without its pads, in [rad], shape (k,).
         prices: How hard each segment presses on each upper face of the box, and on each lower one,
             from 0 to 1, shape (k, 6, 2).
     """
@@ -39,6 +40,7 @@ class Relaxation:
     x: Array
     lost: Array
     prices: Array
+    missed: Array
 
 
 def least_box_of(segments: list[Segment], low: Array, high: Array) -> Relaxation:
@@ -73,7 +75,12 @@ def least_box_of(segments: list[Segment], low: Array, high: Array) -> Relaxation
     out = np.maximum((reach + slope * x[:, None]).max(axis=0, initial=0.0), 0.0)
     lost = (prices[:, 6:] * pad_high - prices[:, :6] * pad_low).sum(axis=1)
     by_face = np.stack([prices[:, :6], prices[:, 6:]], axis=-1)
-    return Relaxation(bound - ROUND_OFF, low - out[6:], high + out[:6], x, lost, by_face)
+    found_low, found_high = low - out[6:], high + out[:6]
+    point = start + along * x[:, None]
+    away = np.maximum(point - found_high, 0.0) + np.maximum(found_low - point, 0.0)
+    return Relaxation(
+        bound - ROUND_OFF, found_low, found_high, x, lost, by_face, away.sum(axis=1)
+    )
 
 
 MOST_PIVOTS = 2000
