@@ -106,6 +106,15 @@ class Jet:
         """Return the multiple by an exact number."""
         return Jet(self.value.times(factor), self.first.times(factor), self.second.times(factor))
 
+    def scaled(self, factors: Array) -> Jet:
+        """Return the multiples by exact numbers, one for each cell."""
+        size = np.abs(factors)
+        value, first, second = (
+            Interval(factors * part.middle, size * part.radius)
+            for part in (self.value, self.first, self.second)
+        )
+        return Jet(value, first, second)
+
     def plus(self, number: Array | float) -> Jet:
         """Return the sum with an exact number."""
         value = Interval(self.value.middle + number, self.value.radius)

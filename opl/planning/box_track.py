@@ -16,7 +16,7 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.columns import Seams, wrist_flips
 from opl.planning.costs import CostWeights, track_cost
-from opl.planning.families import JUMP, Placement
+from opl.planning.families import GROWN, JUMP, Placement
 from opl.planning.filling import BrokenEdgeError, cutter_frames, fill_in
 from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
 from opl.planning.open_matrix import Track, open_matrices
@@ -34,6 +34,7 @@ SUBDIVIDE = np.array([0.25, 0.5, 0.75])  # where an edge that bulges is given pl
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 BEND = 2.0  # times the sagitta that second differences tell: how far postures stand off a chord
 BORDER = 1e-2  # belt units to look beyond what lies in the box
+SWEEP = 2.0  # belt units that the contact moves within one edge where a wall may lie across
 MOST_CHECKS = 12  # of motions in one box
 
 
@@ -123,7 +124,7 @@ class BoxTracks:
             placed[own] = placement.of(unrolled)
         return placed
 
-    def plan(self, columns: Columns, box: JointBox, room: float) -> Plan | Array | None:
+    def plan(self, columns: Columns, box: JointBox, room: float) -> Plan | Bulges | None:
         """Return the motion of the smoothest free track in a box.
 
         Args:
@@ -149,15 +150,28 @@ class BoxTracks:
                 break
             sampled, track, spacing = closer, finer, spacing * 2.0 / (SAMPLES - 1)
         bulges = sampled.bulges(track, box.widened(room))
-        if len(bulges):
-            ends = columns.places[bulges], columns.places[bulges + 1]
-            return np.ravel(ends[0][:, None] + (ends[1] - ends[0])[:, None] * SUBDIVIDE)
+        if bulges is not None:
+            return bulges
         plan = sampled.check(track)
         if plan is None:
             coarse.sweep()
             around = coarse.smoothest()
             plan = None if around is None else coarse.check(around)
         return plan
+
+
+@dataclass(frozen=True)
+class Bulges:
+    """Where a track leaves its box between two places.
+
+    Attributes:
+        places: More places there, shape (n,).
+        sweeps: Place and contact position, and whether that rises, where it leaves the box most
+            while the contact moves over the wheel.
+    """
+
+    places: Array
+    sweeps: tuple[tuple[float, float, bool], ...]
 
 
 @dataclass(frozen=True)
@@ -181,6 +195,31 @@ class Columns:
     q: Array
     free: np.ndarray
     wheel_clearance: Array
+
+    def without(
+        self, box: JointBox, place: float, t: float, back: bool, above: bool
+    ) -> float | None:
+        """Return the cutter point nearest to a place that has nothing in a box on one side of t.
+
+        Args:
+            box: The box.
+            place: The place.
+            t: The contact position.
+            back: Whether to look before the place, not after it.
+            above: Whether nothing is to lie in the box above t, not below it.
+        """
+        index = self.points.pass_index[int(np.searchsorted(self.places, place, side="right")) - 1]
+        own = np.flatnonzero(
+            (self.points.pass_index == index)
+            & (self.places % 1.0 == 0.0)
+            & ((self.places <= place) if back else (self.places >= place))
+        )
+        for column in own[::-1] if back else own:
+            side = self.t[column] > t if above else self.t[column] < t
+            inside = _missing(self.q[column], box) <= GROWN
+            if not (side & inside & self.free[column]).any():
+                return float(self.places[column])
+        return None
 
     def missing(self, box: JointBox) -> Array:
         """Return by how much a box must grow for each place, in [rad], shape (n,)."""
@@ -240,20 +279,36 @@ class _Sampled:
         around = search._at(columns.places, columns.points, columns.placements, t)
         return _Sampled(search, around, self._box)
 
-    def bulges(self, track: Track, box: JointBox) -> np.ndarray:
-        """Return the places from which a track leaves the box on its way to the next."""
+    def bulges(self, track: Track, box: JointBox) -> Bulges | None:
+        """Return where a track leaves the box on its way from place to place, None if nowhere."""
         problem, nodes = self.problem, self.matrices[track.matrix].nodes
         try:
             path = fill_in(problem.cell, problem.points, nodes, track.rows, problem.interpolation)
         except BrokenEdgeError:
-            return np.empty(0, dtype=int)  # the check finds and blocks it
+            return None  # the check finds and blocks it
+        if path.joint_range_sum <= box.size:
+            return None
         spanned = nodes.along(track.rows)
         outer = JointBox(spanned.min(axis=0), spanned.max(axis=0))
-        room = max(box.size - outer.size, 0.0)
-        bulging = np.unique(path.cutter_point[~outer.widened(room).holds(path.q)].astype(int))
-        if not len(bulging) or np.ptp(path.q, axis=0).sum() <= box.size:
-            return np.empty(0, dtype=int)
-        return np.asarray(bulging[np.diff(self._columns.places)[bulging] > SMALLEST_EDGE])
+        excess = _missing(path.q, outer.widened(max(box.size - outer.size, 0.0)))
+        edge = path.cutter_point.astype(int)
+        bulging = np.unique(edge[excess > 0.0])
+        places = self._columns.places
+        sweeps = []
+        for column in bulging:
+            on_edge = np.flatnonzero(edge == column)
+            worst = on_edge[np.argmax(excess[on_edge])]
+            t = path.contact_position
+            change = t[min(on_edge[-1] + 1, len(t) - 1)] - t[on_edge[0]]
+            if abs(change) > SWEEP:
+                place = np.interp(path.cutter_point[worst], np.arange(len(places)), places)
+                sweeps.append((float(place), float(t[worst]), bool(change > 0.0)))
+        wide = bulging[np.diff(places)[bulging] > SMALLEST_EDGE]
+        if not len(wide):
+            return None
+        ends = places[wide], places[wide + 1]
+        more = np.ravel(ends[0][:, None] + (ends[1] - ends[0])[:, None] * SUBDIVIDE)
+        return Bulges(more, tuple(sweeps))
 
     def check(self, track: Track) -> Plan | None:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free."""

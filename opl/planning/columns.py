@@ -22,18 +22,20 @@ from opl.cell.spherical_wrist import SphericalWristArm
 from opl.cell.workcell import WorkCell
 from opl.geometry import frames
 from opl.geometry.frames import Array
-from opl.geometry.jets import Interval, Jet, wave
+from opl.geometry.jets import Interval, Jet, constant, variable, wave
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import MM_PER_M, ContactWheel
 from opl.planning.filling import cutter_frames
 from opl.planning.nodes import SEAM_GAP
-from opl.search.walls import UNKNOWN, Image, Piece, Wall
+from opl.search.walls import UNKNOWN, Image, Line, Piece, Wall
 
 CELL = 1.0  # belt units that a cell covers at first
 MOST_HALVINGS = 5  # of a cell where the part begins to cut into the wheel
 MOST_PARTS = 32  # of a cell whose pads are large
+ROW_PARTS = 16  # cells between two places of a wall along a contact position
 FINER = 8  # cells that one is cut into where a proof needs it
 COARSE = 5e-4  # [rad] sum of the pads that is small enough
+TOUCHING = 1e-9  # [turns] a limit that is only touched counts
 ROUND_OFF = 1e-9  # [rad] of inverse kinematics and enclosures
 
 
@@ -43,11 +45,16 @@ class Seams:
 
     Attributes:
         start: Least angle in [rad] of each family and joint, shape (8, 6).
-        kept: Whether no pass changes the count: its angles leave a gap there, shape (8, 6).
+        kept: Whether no pass changes the count: its angles leave a gap there, and nowhere jump
+            towards it, shape (8, 6).
+        low: Least angle that occurs, less what may occur between nodes, in [rad], shape (8, 6).
+        high: Greatest angle that occurs, likewise.
     """
 
     start: Array
     kept: np.ndarray
+    low: Array
+    high: Array
 
 
 def seams_of(q: Array) -> Seams:
@@ -57,6 +64,10 @@ def seams_of(q: Array) -> Seams:
         q: Principal angles in [rad], NaN where there are none, shape (N, M, 8, 6).
     """
     start, kept = np.full((8, 6), -np.pi), np.zeros((8, 6), dtype=bool)
+    with np.errstate(invalid="ignore"):
+        jump = np.maximum(*(_largest_jump(np.diff(q, axis=axis)) for axis in (0, 1)))
+    margin = SEAM_GAP / 2.0
+    margins = np.zeros((8, 6))
     for family in range(8):
         for joint in range(6):
             angles = np.sort(q[:, :, family, joint], axis=None)
@@ -65,9 +76,18 @@ def seams_of(q: Array) -> Seams:
                 continue
             gaps = np.diff(angles, append=angles[0] + 2.0 * np.pi)
             widest = int(np.argmax(gaps))
-            kept[family, joint] = gaps[widest] > SEAM_GAP
+            kept[family, joint] = gaps[widest] > SEAM_GAP and jump[family, joint] < margin
             start[family, joint] = angles[widest] + gaps[widest] / 2.0
-    return Seams(start, kept)
+            if kept[family, joint]:
+                margins[family, joint] = gaps[widest] / 2.0 - margin
+    low, high = start + margins, start + 2.0 * np.pi - margins
+    return Seams(start, kept, low, high)
+
+
+def _largest_jump(change: Array) -> Array:
+    """Return the largest change of each angle between neighbouring nodes in [rad], shape (8, 6)."""
+    around = np.abs(change - 2.0 * np.pi * np.round(change / (2.0 * np.pi)))
+    return np.asarray(np.nan_to_num(around).max(axis=(0, 1), initial=0.0))
 
 
 def wrist_flips(arm: Arm) -> list[tuple[Array, Array]]:
@@ -90,11 +110,18 @@ class ColumnWalls:
         part: The triangles of the part.
         points: The cutter points.
         seams: Where full turns are counted from.
+        largest: Boxes of this size or more in [rad] are of no interest.
     """
 
     def __init__(
-        self, cell: WorkCell, part: PartTree, points: CutterPoints, seams: Seams
+        self,
+        cell: WorkCell,
+        part: PartTree,
+        points: CutterPoints,
+        seams: Seams,
+        largest: float,
     ) -> None:
+        self._largest = largest
         self._cell = cell
         self._part = part
         self._points = points
@@ -119,18 +146,50 @@ class ColumnWalls:
         return self._images[family]
 
     def _images_of(self, family: int) -> list[Image]:
-        robot = self._cell.robot
-        most = np.floor((robot.upper - robot.lower) / (2.0 * np.pi) + 1e-9).astype(int)
-        counts = np.stack(
-            np.meshgrid(*(np.arange(-n, n + 1) for n in most), indexing="ij"), axis=-1
-        ).reshape(-1, 6)
-        counts = counts[np.argsort(np.abs(counts).sum(axis=1), kind="stable")]
+        counts = [
+            np.stack(np.meshgrid(*per_joint, indexing="ij"), axis=-1).reshape(-1, 6)
+            for per_joint in self._relative_turns(family)
+        ]
         kept = self._seams.kept[family]
         return [
             Image(sign, shift + 2.0 * np.pi * count, (flip, *np.where(kept, count, 0).tolist()))
             for flip, (sign, shift) in enumerate(self.flips)
-            for count in counts
+            for count in counts[flip][np.argsort(np.abs(counts[flip]).sum(axis=1), kind="stable")]
         ]
+
+    def _relative_turns(self, family: int) -> list[list[np.ndarray]]:
+        """Return by how many full turns one posture of a motion can differ from another.
+
+        For each flip that may lie between the two, and each joint; both keep the limits.
+        """
+        robot, seams = self._cell.robot, self._seams
+        where = []  # sign, shift without and with full turns of every place of each joint
+        for sign, shift in self.flips:
+            ends = sign * seams.low[family] + shift, sign * seams.high[family] + shift
+            first = np.ceil((robot.lower - np.maximum(*ends)) / (2.0 * np.pi) - TOUCHING)
+            last = np.floor((robot.upper - np.minimum(*ends)) / (2.0 * np.pi) + TOUCHING)
+            where.append((sign, shift, first, last))
+        relative: list[list[np.ndarray]] = []
+        for flip, (_, between) in enumerate(self.flips):
+            found: list[set[int]] = [{0} if flip == 0 else set() for _ in range(6)]
+            for one, (sign, shift, first, last) in enumerate(where):
+                _, other_shift, other_first, other_last = where[one ^ flip]
+                for joint in range(6):
+                    for k in range(int(first[joint]), int(last[joint]) + 1):
+                        for n in range(int(other_first[joint]), int(other_last[joint]) + 1):
+                            away = other_shift[joint] - shift[joint] + 2.0 * np.pi * (n - k)
+                            turns = (sign[joint] * away - between[joint]) / (2.0 * np.pi)
+                            found[joint].add(round(turns))
+            sign, shift = self.flips[flip]
+            low, high = seams.low[family], seams.high[family]
+            for joint, counts in enumerate(found):
+                ends = sorted(sign[joint] * np.array([low[joint], high[joint]]) + shift[joint])
+                for n in list(counts):
+                    turned = ends[0] + 2.0 * np.pi * n, ends[1] + 2.0 * np.pi * n
+                    if max(turned[0] - high[joint], low[joint] - turned[1]) >= self._largest:
+                        counts.remove(n)
+            relative.append([np.array(sorted(counts), dtype=int) for counts in found])
+        return relative
 
     def within_limits(self, q: Array) -> np.ndarray:
         """Return which of some postures of a family have an image within the limits, shape (n,)."""
@@ -160,19 +219,60 @@ class ColumnWalls:
             for k, place in enumerate(places)
         ]
 
-    def finer(self, wall: Wall, piece: Piece, cell: int) -> tuple[Piece, ...]:
+    def finer(self, piece: Piece, cell: int) -> tuple[Piece, ...]:
         """Return one cell of a wall as pieces with smaller cells."""
-        T_workpiece_cutter = cutter_frames(self._points, np.array([wall.place]))
         grid = np.linspace(piece.at[cell], piece.at[cell + 1], FINER + 1)
-        cells = self._cells(T_workpiece_cutter, [grid])
-        return tuple(found for found in self._pieces(cells, 0) if found.family == piece.family)
+        T_workpiece_cutter = piece.line.T_workpiece_cutter
+        if T_workpiece_cutter is None:
+            pieces = self._row_pieces(grid, piece.line.contact_position)
+        else:
+            pieces = self._pieces(self._cells(T_workpiece_cutter[None], [grid]), 0)
+        return tuple(found for found in pieces if found.family == piece.family)
 
-    def _pieces(self, cells: _Cells, wall: int) -> Iterator[Piece]:
+    def sweep(self, before: float, after: float, t: float, upwards: bool) -> Wall:
+        """Return the wall of places at one contact position, joined to columns on either side.
+
+        From the bottom up one of the columns, along the contact position to the other, and up that
+        one: every motion from the first column to the second crosses it.
+
+        Args:
+            before: The place where it begins.
+            after: The place where it ends, on the same pass.
+            t: The contact position.
+            upwards: Whether it goes up the later column first: what moves from low to high contact
+                positions between the two then crosses on the way.
+        """
+        low_at, high_at = (after, before) if upwards else (before, after)
+        low, high = self.walls([low_at, high_at])
+        inside = np.arange(np.floor(before) + 1.0, np.ceil(after))
+        places = np.unique(np.concatenate([[before], inside, [after]]))
+        grid = _cut_finer(places, np.full(len(places) - 1, ROW_PARTS))
+        pieces = [piece for piece in low.pieces for piece in _below(piece, t)]
+        pieces += self._row_pieces(grid, t)
+        pieces += [piece for piece in high.pieces for piece in _above(piece, t)]
+        index = int(self._points.pass_index[int(before)])
+        return Wall(index, (before + after) / 2.0, tuple(pieces))
+
+    def _row_pieces(self, grid: Array, t: float) -> Iterator[Piece]:
+        arm = self._cell.robot.arm
+        T_base_contact = self._cell.wheel.T_base_contact(t)
+        middle, radius = (grid[:-1] + grid[1:]) / 2.0, np.diff(grid) / 2.0
+        flange = path_jets(
+            self._points, T_base_contact, self._cell.T_flange_workpiece, middle, radius
+        )
+        q = inverse_kinematics(arm, self._cell.Ts_base_flange(t, cutter_frames(self._points, grid)))
+        cells = self._enclosed(q, flange, radius, [grid], np.empty((1, 4, 4)))
+        yield from self._pieces(cells, 0, t)
+
+    def _pieces(self, cells: _Cells, wall: int, row: float | None = None) -> Iterator[Piece]:
         """Yield the pieces of one of several walls."""
         t = cells.grids[wall]
         first, corner = cells.first[wall], cells.first[wall] + wall
         now, at = slice(first, first + len(t) - 1), slice(corner, corner + len(t))
-        cut = self._surely_cuts(cells.Ts_workpiece_cutter[wall], t)[0]
+        cut = np.zeros(len(t) - 1, dtype=bool)
+        if row is None:
+            cut = self._surely_cuts(cells.Ts_workpiece_cutter[wall], t)[0]
+        line = Line(cells.Ts_workpiece_cutter[wall]) if row is None else Line(None, row)
         for family in self.families:
             known = cells.known[family][:, now]
             q = cells.q[at, family]
@@ -195,7 +295,7 @@ class ColumnWalls:
                 steps = np.diff(corners, axis=0)
                 steps -= 2.0 * np.pi * np.round(steps / (2.0 * np.pi))
                 corners = np.concatenate([start[None], start + np.cumsum(steps, axis=0)])
-                piece = Piece(family, t[low : high + 1], corners, pad_low, pad_high)
+                piece = Piece(family, line, t[low : high + 1], corners, pad_low, pad_high)
                 yield from self._within_limits(piece)
 
     def _within_limits(self, piece: Piece) -> Iterator[Piece]:
@@ -265,7 +365,19 @@ class ColumnWalls:
         flange = contact_jets(
             self._cell.wheel, np.repeat(Ts_cutter_flange, counts, axis=0), middle, radius
         )
-        found = joint_derivatives(arm, flange)
+        return self._enclosed(corners, flange, radius, grids, Ts_workpiece_cutter)
+
+    def _enclosed(
+        self,
+        corners: Array,
+        flange: FlangeJets,
+        radius: Array,
+        grids: list[Array],
+        Ts_workpiece_cutter: Array,
+    ) -> _Cells:
+        """Return cells, the motion of the flange over each of them enclosed."""
+        found = joint_derivatives(self._cell.robot.arm, flange)
+        counts = np.array([len(t) - 1 for t in grids])
         eighth = (2.0 * radius) ** 2 / 8.0
         pad_low = np.minimum(0.0, -eighth * found.second_high) - ROUND_OFF
         pad_high = np.maximum(0.0, -eighth * found.second_low) + ROUND_OFF
@@ -311,6 +423,80 @@ class _Cells:
         wanted = np.where(self.known[self.families].all(axis=1), wanted, MOST_PARTS)
         wanted = np.where(self.none[self.families], 1, wanted)
         return np.minimum(wanted.max(axis=0), MOST_PARTS).astype(int)
+
+
+def path_jets(
+    points: CutterPoints, T_base_contact: Array, T_flange_workpiece: Array, at: Array, radius: Array
+) -> FlangeJets:
+    """Enclose the motion of the flange while the part moves along its path at one contact position.
+
+    Args:
+        points: The cutter points.
+        T_base_contact: The contact frame, shape (4, 4).
+        T_flange_workpiece: How the part is held, shape (4, 4).
+        at: Middle of each cell, a fractional cutter point, shape (n,).
+        radius: Half its width, all of it between the same two, shape (n,).
+    """
+    before = np.floor(at).astype(int)
+    one, other = points.Ts_workpiece_cutter[before], points.Ts_workpiece_cutter[before + 1]
+    share = variable(at - before, radius)
+
+    def blend(column: int) -> Axes:
+        a, b = one[:, :3, column], other[:, :3, column]
+        x, y, z = (share.scaled(b[:, k] - a[:, k]).plus(a[:, k]) for k in range(3))
+        return x, y, z
+
+    z = _unit(blend(2))
+    x_free = blend(0)
+    along = _dot(x_free, z)
+    x = _unit(_minus(x_free, (z[0] * along, z[1] * along, z[2] * along)))
+    y = (z[1] * x[2] - z[2] * x[1], z[2] * x[0] - z[0] * x[2], z[0] * x[1] - z[1] * x[0])
+    p = blend(3)
+    T_workpiece_flange = frames.inverse(T_flange_workpiece)
+
+    def in_base(v: Axes) -> Axes:
+        in_cutter = (_dot(x, v), _dot(y, v), _dot(z, v))
+        a, b, c = (
+            in_cutter[0].times(T_base_contact[k, 0])
+            + in_cutter[1].times(T_base_contact[k, 1])
+            + in_cutter[2].times(T_base_contact[k, 2])
+            for k in range(3)
+        )
+        return a, b, c
+
+    def fixed(v: Array) -> Axes:
+        a, b, c = (constant(v[k], at) for k in range(3))
+        return a, b, c
+
+    axes = [in_base(fixed(T_workpiece_flange[:3, k])) for k in range(3)]
+    origin = in_base(_minus(fixed(T_workpiece_flange[:3, 3]), p))
+    a, b, c = (origin[k].plus(T_base_contact[k, 3]) for k in range(3))
+    return FlangeJets(axes[0], axes[1], axes[2], (a, b, c))
+
+
+def _dot(a: Axes, b: Axes) -> Jet:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _minus(a: Axes, b: Axes) -> Axes:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _unit(v: Axes) -> Axes:
+    length = _dot(v, v).root()
+    return v[0] / length, v[1] / length, v[2] / length
+
+
+def _below(piece: Piece, t: float) -> list[Piece]:
+    """Return what of a piece of a column lies below a contact position, whole cells."""
+    end = int(np.searchsorted(piece.at[:-1], t))
+    return [piece.part(0, end)] if end else []
+
+
+def _above(piece: Piece, t: float) -> list[Piece]:
+    """Return what of a piece of a column lies above a contact position, whole cells."""
+    first = int(np.searchsorted(piece.at[1:], t, side="right"))
+    return [piece.part(first, len(piece.pad_low))] if first < len(piece.pad_low) else []
 
 
 def contact_jets(wheel: ContactWheel, Ts_cutter_flange: Array, t: Array, radius: Array) -> FlangeJets:

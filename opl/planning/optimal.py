@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opl.planning.box_track import BoxTracks, Columns
+from opl.planning.box_track import BoxTracks, Bulges, Columns
 from opl.planning.columns import ColumnWalls, seams_of
 from opl.planning.costs import CostWeights
 from opl.planning.families import Families, Fit, Placement, grown
@@ -26,6 +26,7 @@ PROOF_SHARE = 0.9  # of the widening: how far the bound may stay below the path
 ROOM_SHARE = 0.4  # of the widening: how much larger than its box the path may be
 MISSED = 0.05  # of the widening: what a box may miss a cutter point by and still hold it
 MOST_SUBPROBLEMS = 4000
+RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for next
 MOST_ADDED = 3  # walls at once
 
 
@@ -61,7 +62,10 @@ class OptimalSearch:
         self._points = problem.points
         self._settings = settings
         seams = seams_of(problem.field.q)
-        self._walls = ColumnWalls(problem.cell, problem.scene.part, problem.points, seams)
+        found = fallback.path.joint_range_sum
+        self._walls = ColumnWalls(
+            problem.cell, problem.scene.part, problem.points, seams, found
+        )
         self._families = Families(
             self._walls, seams, problem.field.q, problem.cuts, problem.points.pass_index
         )
@@ -70,10 +74,14 @@ class OptimalSearch:
             problem, seams, settings.costs, settings.max_contact_change, most
         )
         self.plan = fallback
+        self._proven = self._least_hope = 0.0
+        self._spent = 0
         gap = PROOF_SHARE * settings.widen
         self.proof = BoxProof(
-            self._walls.images, self._walls.finer, fallback.path.joint_range_sum, gap)
+            self._walls.images, self._walls.finer, found, gap
+        )
         self._places: set[float] = set()
+        self._sweeps: set[tuple[int, int, bool]] = set()
         self._columns = np.arange(len(problem.points), dtype=float)
         n = len(problem.points)
         self._add([0.0, float(n // 2), float(n - 1)])
@@ -81,15 +89,23 @@ class OptimalSearch:
     @property
     def finished(self) -> bool:
         """Whether there is nothing left to do."""
-        return self.proof.closed or self.proof.subproblems >= MOST_SUBPROBLEMS
+        spent = self._spent + self.proof.subproblems >= MOST_SUBPROBLEMS
+        return spent or (self.proof.closed and self.proof.threshold >= self._value)
+
+    @property
+    def _value(self) -> float:
+        return self.plan.path.joint_range_sum
 
     @property
     def lower_bound(self) -> float:
         """No motion has a smaller joint range sum, in [rad]."""
-        return min(self.proof.lower_bound, self.plan.path.joint_range_sum)
+        return min(max(self._proven, self.proof.lower_bound), self._value)
 
     def step(self) -> None:
         """Work on one subproblem."""
+        if self.proof.closed:
+            self._hope_for_less()
+            return
         candidate = self.proof.take_next()
         if candidate is None:
             return
@@ -100,7 +116,7 @@ class OptimalSearch:
             columns = self._tracks.columns(box, placements, self._columns)
             inner = grown(columns.q, columns.free, box)
             if inner is not None:
-                hoped = inner.size * (1.0 + self._settings.widen)
+                hoped = max(inner.size * (1.0 + self._settings.widen), self._least_hope)
                 self.proof.threshold = min(self.proof.threshold, hoped)
             missed = missed or self._missed(columns, box)
         if missed:
@@ -111,6 +127,17 @@ class OptimalSearch:
             self.proof.put_back()
         elif candidate.bound < self.proof.closing:
             self.proof.give_up()
+
+    def _hope_for_less(self) -> None:
+        """Begin the proof again: no motion is as good as a box had made hope."""
+        self._proven = self.lower_bound
+        self._spent += self.proof.subproblems
+        self._least_hope = min(self._value, self.proof.threshold * RAISED)
+        walls = self.proof.walls
+        gap = PROOF_SHARE * self._settings.widen
+        self.proof = BoxProof(self._walls.images, self._walls.finer, self._least_hope, gap)
+        for wall in walls:
+            self.proof.add(wall)
 
     def _missed(self, columns: Columns, box: JointBox) -> list[float]:
         """Return the places that a box misses most, looked at closely."""
@@ -124,6 +151,19 @@ class OptimalSearch:
         for wall in self._walls.walls(places):
             self.proof.add(wall)
             self._places.add(wall.place)
+
+    def _add_sweep(
+        self, columns: Columns, box: JointBox, place: float, t: float, upwards: bool
+    ) -> None:
+        """Add the wall at a contact position that a motion in a box must pass near a place."""
+        key = round(place), round(t), upwards
+        if key in self._sweeps:
+            return
+        before = columns.without(box, place, t, back=True, above=upwards)
+        after = columns.without(box, place, t, back=False, above=not upwards)
+        if before is not None and after is not None:
+            self._sweeps.add(key)
+            self.proof.add(self._walls.sweep(before, after, t, upwards))
 
     def _hold(self, candidate: Candidate) -> tuple[list[Placement], list[float]]:
         """Return the image of each pass that fits into the box, and the cutter points it misses."""
@@ -156,8 +196,10 @@ class OptimalSearch:
         """Look for a motion in a box; return whether more places were taken in first."""
         room = ROOM_SHARE * self._settings.widen * box.size
         found = self._tracks.plan(columns, box, room)
-        if isinstance(found, np.ndarray):
-            self._columns = np.union1d(self._columns, found)
+        if isinstance(found, Bulges):
+            self._columns = np.union1d(self._columns, found.places)
+            for place, t, upwards in found.sweeps:
+                self._add_sweep(columns, box, place, t, upwards)
             return True
         if found is not None and found.path.joint_range_sum < self.plan.path.joint_range_sum:
             self.plan = found

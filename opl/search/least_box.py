@@ -117,11 +117,11 @@ class _Body:
             self._moved[at] = self.images(piece.family)[span.image].of(piece)
         return self._moved[at]
 
-    def finer(self, span: Span, cut: Callable[[Wall, Piece, int], Sequence[Piece]]) -> list[Span]:
+    def finer(self, span: Span, cut: Callable[[Piece, int], Sequence[Piece]]) -> list[Span]:
         """Return the spans of a single cell cut into smaller ones."""
         at = (span.piece, span.first)
         if at not in self._finer:
-            found = cut(self.wall, self.pieces[span.piece], span.first)
+            found = cut(self.pieces[span.piece], span.first)
             self._finer[at] = len(self.pieces), len(found)
             self.pieces += found
         first, count = self._finer[at]
@@ -162,7 +162,7 @@ class BoxProof:
     def __init__(
         self,
         images: Callable[[int], Sequence[Image]],
-        cut: Callable[[Wall, Piece, int], Sequence[Piece]],
+        cut: Callable[[Piece, int], Sequence[Piece]],
         threshold: float,
         gap: float,
     ) -> None:

@@ -19,11 +19,25 @@ UNKNOWN = 50.0  # [rad] pad where nothing is known; beyond what any joint turns
 
 
 @dataclass(frozen=True)
+class Line:
+    """Along what a piece of a wall runs: a place at all contact positions, or the other way about.
+
+    Attributes:
+        T_workpiece_cutter: The place, shape (4, 4); None along the path at one contact position.
+        contact_position: That contact position.
+    """
+
+    T_workpiece_cutter: Array | None
+    contact_position: float = 0.0
+
+
+@dataclass(frozen=True)
 class Piece:
     """An unbroken part of a wall in one posture.
 
     Attributes:
         family: Which posture.
+        line: Along what it runs.
         at: Place of each corner along the wall, increasing, shape (n + 1,).
         corners: Joint positions at the ends of the cells in [rad], shape (n + 1, 6).
         pad_low: How far below the chord of each cell the curve can be, not positive, shape (n, 6).
@@ -31,6 +45,7 @@ class Piece:
     """
 
     family: int
+    line: Line
     at: Array
     corners: Array
     pad_low: Array
@@ -52,6 +67,7 @@ class Piece:
         cells = slice(first, end)
         return Piece(
             self.family,
+            self.line,
             self.at[corners],
             self.corners[corners],
             self.pad_low[cells],
@@ -78,6 +94,7 @@ class Image:
         mirrored = self.sign < 0.0
         return Piece(
             piece.family,
+            piece.line,
             piece.at,
             piece.corners * self.sign + self.shift,
             np.where(mirrored, -piece.pad_high, piece.pad_low),
