@@ -7,7 +7,7 @@ the box between two places, more places are taken in.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,7 +34,7 @@ SUBDIVIDE = np.array([0.25, 0.5, 0.75])  # where an edge that bulges is given pl
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 BEND = 2.0  # times the sagitta that second differences tell: how far postures stand off a chord
 BORDER = 1e-2  # belt units to look beyond what lies in the box
-SWEEP = 2.0  # belt units that the contact moves within one edge where a wall may lie across
+SWEEP = 2.0  # belt units that the contact moves from cutter point to cutter point in a sweep
 MOST_CHECKS = 12  # of motions in one box
 
 
@@ -124,17 +124,20 @@ class BoxTracks:
             placed[own] = placement.of(unrolled)
         return placed
 
-    def plan(self, columns: Columns, box: JointBox, room: float) -> Plan | Bulges | None:
+    def plan(
+        self, columns: Columns, box: JointBox, room: float, learn: Callable[[Bulges], bool]
+    ) -> Plan | None:
         """Return the motion of the smoothest free track in a box.
 
         Args:
             columns: Places, all with postures in the box.
             box: The box.
             room: By how much the motion may leave it, in [rad] of its size.
+            learn: Given where the track leaves the box on its way between places; returns whether
+                that was not known before.
 
         Returns:
-            The motion; or more places, between those where the track leaves the box; or None if
-            nothing is free.
+            The motion; None if nothing is free, or if something was learnt instead.
         """
         inner = box.widened(room / 2.0)
         t, spacing = _sampled(columns.t, columns.q, columns.free, inner, SAMPLES)
@@ -150,8 +153,8 @@ class BoxTracks:
                 break
             sampled, track, spacing = closer, finer, spacing * 2.0 / (SAMPLES - 1)
         bulges = sampled.bulges(track, box.widened(room))
-        if bulges is not None:
-            return bulges
+        if bulges is not None and learn(bulges):
+            return None
         plan = sampled.check(track)
         if plan is None:
             coarse.sweep()
@@ -300,12 +303,10 @@ class _Sampled:
             worst = on_edge[np.argmax(excess[on_edge])]
             t = path.contact_position
             change = t[min(on_edge[-1] + 1, len(t) - 1)] - t[on_edge[0]]
-            if abs(change) > SWEEP:
+            if abs(change) > SWEEP * (places[column + 1] - places[column]):
                 place = np.interp(path.cutter_point[worst], np.arange(len(places)), places)
                 sweeps.append((float(place), float(t[worst]), bool(change > 0.0)))
         wide = bulging[np.diff(places)[bulging] > SMALLEST_EDGE]
-        if not len(wide):
-            return None
         ends = places[wide], places[wide + 1]
         more = np.ravel(ends[0][:, None] + (ends[1] - ends[0])[:, None] * SUBDIVIDE)
         return Bulges(more, tuple(sweeps))

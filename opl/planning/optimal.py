@@ -154,16 +154,18 @@ class OptimalSearch:
 
     def _add_sweep(
         self, columns: Columns, box: JointBox, place: float, t: float, upwards: bool
-    ) -> None:
+    ) -> bool:
         """Add the wall at a contact position that a motion in a box must pass near a place."""
         key = round(place), round(t), upwards
         if key in self._sweeps:
-            return
+            return False
         before = columns.without(box, place, t, back=True, above=upwards)
         after = columns.without(box, place, t, back=False, above=not upwards)
-        if before is not None and after is not None:
-            self._sweeps.add(key)
-            self.proof.add(self._walls.sweep(before, after, t, upwards))
+        if before is None or after is None:
+            return False
+        self._sweeps.add(key)
+        self.proof.add(self._walls.sweep(before, after, t, upwards))
+        return True
 
     def _hold(self, candidate: Candidate) -> tuple[list[Placement], list[float]]:
         """Return the image of each pass that fits into the box, and the cutter points it misses."""
@@ -193,18 +195,23 @@ class OptimalSearch:
         return round(at_walls, 2), float(fit.missing.max())
 
     def _try(self, columns: Columns, box: JointBox) -> bool:
-        """Look for a motion in a box; return whether more places were taken in first."""
+        """Look for a motion in a box; return whether something was learnt of the box instead."""
+        learnt = False
+
+        def learn(bulges: Bulges) -> bool:
+            nonlocal learnt
+            more = np.setdiff1d(bulges.places, self._columns)
+            self._columns = np.union1d(self._columns, more)
+            added = [self._add_sweep(columns, box, *sweep) for sweep in bulges.sweeps]
+            learnt = bool(len(more)) or any(added)
+            return learnt
+
         room = ROOM_SHARE * self._settings.widen * box.size
-        found = self._tracks.plan(columns, box, room)
-        if isinstance(found, Bulges):
-            self._columns = np.union1d(self._columns, found.places)
-            for place, t, upwards in found.sweeps:
-                self._add_sweep(columns, box, place, t, upwards)
-            return True
-        if found is not None and found.path.joint_range_sum < self.plan.path.joint_range_sum:
+        found = self._tracks.plan(columns, box, room, learn)
+        if found is not None and found.path.joint_range_sum < self._value:
             self.plan = found
-            self.proof.threshold = min(self.proof.threshold, found.path.joint_range_sum)
-        return False
+            self.proof.threshold = min(self.proof.threshold, self._value)
+        return learnt
 
 
 def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: Plan) -> Plan:
