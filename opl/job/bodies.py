@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from opl.cell.workcell import PART, WHEEL
-from opl.documents import Document
 from opl.errors import InputError
+from opl.files.documents import Document
 from opl.geometry.frames import Array, NotARotationError, from_roll_pitch_yaw, nearest_pose
 from opl.geometry.mesh import TriangleMesh, load_shell
 from opl.geometry.shapes import Body, Box, Cylinder

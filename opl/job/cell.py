@@ -18,8 +18,8 @@ from pydantic import Field, model_validator
 from opl.cell.limits import Limit
 from opl.cell.robot import Robot, link_names, load_robot
 from opl.cell.workcell import PART, WHEEL, wheel_solid
-from opl.documents import Document, read
 from opl.errors import InputError
+from opl.files.documents import Document, read
 from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, pose
 from opl.geometry.shapes import Body
 from opl.job.bodies import MM, BodySection, NotNegative, Six, Triple, bodies_in_si

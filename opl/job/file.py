@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, ConfigDict, Field
 
-from opl.documents import Document
+from opl.files.documents import Document
 from opl.job.bodies import BodySection, Matrix, NotNegative
 from opl.job.cell import CLEARANCE_MM
 from opl.job.program import ProgramSection

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from opl.cell.workcell import WorkCell
-from opl.documents import read
 from opl.errors import InputError
+from opl.files.documents import read
 from opl.geometry.passes import MachinedSurface, Passes
 from opl.job.around import Surroundings, check_home, surroundings
 from opl.job.bodies import bodies_in_si, pose_of

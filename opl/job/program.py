@@ -10,8 +10,8 @@ from pydantic import Field, model_validator
 
 from opl.cell.robot import Robot
 from opl.cell.spherical_wrist import SphericalWristArm
-from opl.documents import Document
 from opl.errors import InputError, OplError
+from opl.files.documents import Document
 from opl.geometry.frames import Array, nearest_pose
 from opl.job.bodies import Matrix
 from opl.program.actions import Action, Actions, Call, Dwell, Remark, SetOutput, WaitInput

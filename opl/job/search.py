@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from opl.cell.robot import Robot
-from opl.documents import Document
 from opl.field.path import Interpolation
+from opl.files.documents import Document
 from opl.geometry.frames import Array
 from opl.motion.timing import Pace
 from opl.planning.box_search import OptimalSettings

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from opl.documents import Document
 from opl.errors import InputError
+from opl.files.documents import Document
 from opl.geometry.machined import CAD, MESHES, load_machined
 from opl.geometry.mesh import TriangleMesh, load_mesh
 from opl.geometry.outside import facing_inward

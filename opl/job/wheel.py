@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from opl.cell.robot import Robot
-from opl.documents import Document
 from opl.errors import InputError
+from opl.files.documents import Document
 from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, pose
 from opl.geometry.touched import KINDS, TouchedError, TouchedFit, fit_touched
 from opl.geometry.wheel import ContactWheel

@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import link_names, load_robot
 from opl.errors import InputError
+from opl.files.resources import folder
 from opl.geometry.frames import pose, rotation_angle, transform
 from opl.geometry.mesh import TriangleMesh
 from opl.job.cell import load_cell
 from opl.job.load import load
-from opl.resources import folder
 from tests.support.jobs import GONE, QUICK, opl, write_job
 from tests.support.schema_check import schema_faults
 

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from opl import documents
-from opl.documents import Document
 from opl.errors import InputError
+from opl.files import documents
+from opl.files.documents import Document
 
 
 class Part(Document):

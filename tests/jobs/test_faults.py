@@ -19,6 +19,7 @@ from opl import pipeline
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse import inverse
 from opl.cell.robot import forward
+from opl.files.resources import folder
 from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.toolpath import CutterPoints
@@ -28,7 +29,6 @@ from opl.program.inform.files import program_jobs
 from opl.program.inform.playback import play
 from opl.program.pulses import PulseScale
 from opl.proof.prove import profile_of, prove
-from opl.resources import folder
 from tests.support.bare_cells import with_obstacle
 from tests.support.jobs import opl
 

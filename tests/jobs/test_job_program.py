@@ -3,8 +3,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from opl.documents import check, keys
 from opl.errors import InputError
+from opl.files.documents import check, keys
 from opl.job.program import ProgramSection
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.inform import TEMPLATE

@@ -7,9 +7,9 @@ import shutil
 import numpy as np
 import yaml
 
+from opl.files.resources import folder
 from opl.job.load import load
 from opl.planning.fixed import keep_contact
-from opl.resources import folder
 from tests.support.jobs import opl
 from tests.support.planned import problem_of, with_positions
 

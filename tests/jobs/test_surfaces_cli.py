@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from opl.files.resources import folder
 from opl.job.load import load
-from opl.resources import folder
 from opl.surfacing import cut_surface
 from tests.support.jobs import GONE, opl, write_job
 

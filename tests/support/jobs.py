@@ -12,7 +12,7 @@ import trimesh
 import yaml
 
 from opl.cli.commands import main
-from opl.resources import folder
+from opl.files.resources import folder
 
 V_SHAPE = folder("workpieces") / "v_shape"
 V_JOB = V_SHAPE / "job.yaml"
