@@ -7,6 +7,7 @@ that names the file, the key path, the value seen and the values allowed.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -60,7 +61,7 @@ def read(path: Path, model: type[Model]) -> Model:
         InputError: If the file cannot be read, is not YAML, or does not fit the model. All the
             faults of a file are told at once, one a line.
     """
-    return check(_content(path), model, path)
+    return check(content_of(path), model, str(path))
 
 
 def keys(path: Path) -> dict[Any, Any]:
@@ -69,30 +70,43 @@ def keys(path: Path) -> dict[Any, Any]:
     Raises:
         InputError: If the file cannot be read or is not YAML.
     """
-    content = _content(path)
-    return content if isinstance(content, dict) else {}
+    found = content_of(path)
+    return found if isinstance(found, dict) else {}
 
 
-def check(content: object, model: type[Model], path: Path) -> Model:
-    """Return ``content``, as read from ``path``, as a model.
+def check(
+    content: object, model: type[Model], label: str, context: Mapping[str, object] | None = None
+) -> Model:
+    """Return keys and values as a model.
+
+    Args:
+        content: What a file holds, or a mapping that a program has made.
+        model: What it must hold.
+        label: How messages name it.
+        context: What the validators of the model need to know beside it.
 
     Raises:
         InputError: If it does not fit the model.
     """
     if content is None:
-        raise InputError(str(path), "is empty")
+        raise InputError(label, "is empty")
     if not isinstance(content, dict):
-        raise InputError(str(path), f"must hold keys and values, holds {_seen(content)}")
+        raise InputError(label, f"must hold keys and values, holds {_seen(content)}")
     try:
-        return model.model_validate(content)
+        return model.model_validate(content, context=context)
     except ValidationError as error:
         lines = [_fault(fault, model) for fault in error.errors(include_url=False)]
         if len(lines) > 1:
             lines = [f"{len(lines)} faults", *lines]
-        raise InputError(str(path), "\n".join(lines)) from error
+        raise InputError(label, "\n".join(lines)) from error
 
 
-def _content(path: Path) -> Any:
+def content_of(path: Path) -> Any:
+    """Return what a YAML or JSON file holds, unchecked.
+
+    Raises:
+        InputError: If the file cannot be read or is not YAML.
+    """
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:

@@ -24,6 +24,7 @@ from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, pose
 from opl.geometry.shapes import Body
 from opl.job.bodies import MM, BodySection, NotNegative, Six, Triple, bodies_in_si
 from opl.job.pairs import FIXTURE, ROBOT, PairNames, SaidOfPairs, said_of_pairs
+from opl.job.source import Source
 from opl.job.wheel import CellWheelSection, PlacedWheel
 
 CLEARANCE_MM = 5.0
@@ -137,18 +138,18 @@ def load_cell(path: Path) -> Cell:
     Raises:
         InputError: If anything in it is unusable; names file and key path.
     """
-    file = read(path, CellFile)
-    robot = robot_of(path, file.robot)
+    file, source = read(path, CellFile), Source.of_file(path)
+    robot = robot_of(source, file.robot)
     T_cell_base = _base(file.stands, robot)
     T_base_cell = inverse(T_cell_base)
-    _require_names(path, file, robot)
+    _require_names(source, file, robot)
     obstacles = tuple(
         Body(body.name, body.shape, T_base_cell @ body.T_parent_body)
-        for body in bodies_in_si(path, "obstacles", file.obstacles)
+        for body in bodies_in_si(source, "obstacles", file.obstacles)
     )
-    gripper = bodies_in_si(path, "gripper", file.gripper)
+    gripper = bodies_in_si(source, "gripper", file.gripper)
     wheels = tuple(
-        wheel.in_si(path, f"wheels.{place}", robot, T_cell_base)
+        wheel.in_si(source, f"wheels.{place}", robot, T_cell_base)
         for place, wheel in enumerate(file.wheels)
     )
     names = PairNames(
@@ -158,7 +159,7 @@ def load_cell(path: Path) -> Cell:
         obstacles=tuple(body.name for body in obstacles),
     )
     said = said_of_pairs(
-        path,
+        source,
         names,
         [tuple(pair) for pair in file.allowed_contacts],
         [(tuple(one.pair), one.clearance_mm * MM) for one in file.clearances],
@@ -172,22 +173,22 @@ def load_cell(path: Path) -> Cell:
         gripper=gripper,
         clearance=file.clearance_mm * MM,
         said=said,
-        limits=_limits(path, file, robot),
+        limits=_limits(source, file, robot),
         home=None if file.home_deg is None else np.deg2rad(file.home_deg),
     )
 
 
-def robot_of(path: Path, name: str) -> Robot:
+def robot_of(source: Source, name: str) -> Robot:
     """Load the robot that a file names.
 
     Raises:
         InputError: If there is none of the name, or its own file is unusable.
     """
     try:
-        return load_robot(name, path.parent)
+        return load_robot(name, source.folder)
     except InputError as error:
         # what is wrong with a robot's own file is told with that file's name
-        where = f"{path}: robot" if error.where == "robot" else error.where
+        where = source.at("robot") if error.where == "robot" else error.where
         raise InputError(where, error.message) from error
 
 
@@ -199,7 +200,7 @@ def _base(stands: _Stands | None, robot: Robot) -> Array:
     return T_cell_face @ pose(np.eye(3), np.array([0.0, 0.0, robot.base_height]))
 
 
-def _require_names(path: Path, file: CellFile, robot: Robot) -> None:
+def _require_names(source: Source, file: CellFile, robot: Robot) -> None:
     """Refuse two things of one name: a pair would not tell which is meant."""
     taken = {PART: "the part", ROBOT: "all links of the robot", FIXTURE: "the job's fixture"}
     taken.update(dict.fromkeys(link_names(robot), "a link of the robot"))
@@ -208,18 +209,18 @@ def _require_names(path: Path, file: CellFile, robot: Robot) -> None:
         places += [(f"{key}.{place}.name", body.name) for place, body in enumerate(bodies)]
     for where, name in places:
         if name in taken:
-            raise InputError(f"{path}: {where}", f"{name!r} is the name of {taken[name]} already")
+            raise InputError(source.at(where), f"{name!r} is the name of {taken[name]} already")
         taken[name] = where
     if len(file.wheels) > 1 and WHEEL in (wheel.name for wheel in file.wheels):
         raise InputError(
-            f"{path}: wheels", f"each of several needs a name of its own, other than {WHEEL!r}"
+            source.at("wheels"), f"each of several needs a name of its own, other than {WHEEL!r}"
         )
 
 
-def _limits(path: Path, file: CellFile, robot: Robot) -> tuple[Limit, ...]:
+def _limits(source: Source, file: CellFile, robot: Robot) -> tuple[Limit, ...]:
     limits = []
     for place, one in enumerate(file.joint_limits):
-        where = f"{path}: joint_limits.{place}"
+        where = source.at(f"joint_limits.{place}")
         joint = _joint(robot, one.joint, f"{where}.joint")
         if one.joint in (other.joint for other in file.joint_limits[:place]):
             raise InputError(f"{where}.joint", f"joint {one.joint} is given twice")
@@ -228,7 +229,7 @@ def _limits(path: Path, file: CellFile, robot: Robot) -> tuple[Limit, ...]:
             raise InputError(where, f"leaves nothing of {lower:g} to {upper:g}, the robot's own")
         limits.append(_limit(one.joint, np.eye(6)[joint], one))
     for place, sums in enumerate(file.coupled_limits):
-        where = f"{path}: coupled_limits.{place}.coefficients"
+        where = source.at(f"coupled_limits.{place}.coefficients")
         coefficients = np.zeros(6)
         for name, value in sums.coefficients.items():
             coefficients[_joint(robot, name, where)] = value

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
 
 from opl.cell.pairs import PairRules
 from opl.cell.workcell import PART, WHEEL
 from opl.errors import InputError
+from opl.job.source import Source
 
 ROBOT = "robot"  # every link
 FIXTURE = "fixture"  # every body of the job's own fixture
@@ -98,7 +98,7 @@ def is_single(pair: Names) -> bool:
 
 
 def said_of_pairs(
-    path: Path,
+    source: Source,
     names: PairNames,
     allowed: Sequence[Names],
     clearances: Sequence[tuple[Names, float]],
@@ -106,7 +106,7 @@ def said_of_pairs(
     """Check what a cell file says of pairs.
 
     Args:
-        path: The cell file.
+        source: The cell file or mapping.
         names: What there is to be named.
         allowed: Of ``allowed_contacts``.
         clearances: Of ``clearances``, in [m].
@@ -123,7 +123,7 @@ def said_of_pairs(
     ]
     seen: dict[frozenset[str], str] = {}
     for key, pair, distance in said:
-        where = f"{path}: {key}"
+        where = source.at(key)
         for name in pair:
             if name not in names.known:
                 known = ", ".join(names.known)

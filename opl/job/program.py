@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
@@ -14,6 +13,7 @@ from opl.errors import InputError, OplError
 from opl.files.documents import Document
 from opl.geometry.frames import Array, nearest_pose
 from opl.job.bodies import Matrix
+from opl.job.source import Source
 from opl.program.actions import Action, Actions, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.posts import Post, find_post, known_posts
 from opl.program.pulses import require_accepted, require_known
@@ -118,7 +118,7 @@ class ProgramSection(Document):
             )
         return self
 
-    def robot_as_counted(self, path: Path, robot: Robot) -> Robot:
+    def robot_as_counted(self, source: Source, robot: Robot) -> Robot:
         """Return the robot with the pulse ratios and soft limits that the job names.
 
         Raises:
@@ -127,15 +127,15 @@ class ProgramSection(Document):
         if self.pulse_ratios is None:
             return robot
         try:
-            return with_ratios(robot, path.parent / self.pulse_ratios)
+            return with_ratios(robot, source.file(self.pulse_ratios))
         except InputError as error:
-            raise InputError(f"{path}: program.pulse_ratios", str(error)) from error
+            raise InputError(source.at("program.pulse_ratios"), str(error)) from error
 
-    def in_si(self, path: Path, name: str, robot: Robot, home: Array) -> ProgramSettings:
+    def in_si(self, source: Source, name: str, robot: Robot, home: Array) -> ProgramSettings:
         """Return the settings, tried out on a program that only goes home.
 
         Args:
-            path: The job file.
+            source: The job file or mapping.
             name: The program's name.
             robot: Whose program.
             home: Joint positions in [rad], shape (6,).
@@ -143,24 +143,24 @@ class ProgramSection(Document):
         Raises:
             InputError: If something in it is unknown, or the controller does not take it.
         """
-        post = find_post(self.controller, f"{path}: program.controller")
-        self._require_possible(path, post, robot)
-        where = f"{path}: program.accept_unverified_pulses"
+        post = find_post(self.controller, source.at("program.controller"))
+        self._require_possible(source, post, robot)
+        where = source.at("program.accept_unverified_pulses")
         for joint in self.accept_unverified_pulses:
             if joint not in robot.joint_names:
                 known = ", ".join(robot.joint_names)
                 raise InputError(where, f"no such joint {joint!r}; have: {known}")
         if post.counts_pulses and self.positions == "pulses":
-            require_known(robot, f"{path}: program.pulse_ratios")
+            require_known(robot, source.at("program.pulse_ratios"))
             require_accepted(robot.unverified_pulses, self.accept_unverified_pulses, where)
-        settings = self._settings(path)
+        settings = self._settings(source)
         try:
             try_out(name, home, robot, settings)
         except OplError as error:
-            raise InputError(str(path), str(error)) from error
+            raise InputError(source.label, str(error)) from error
         return settings
 
-    def _settings(self, path: Path) -> ProgramSettings:
+    def _settings(self, source: Source) -> ProgramSettings:
         levels = self.levels
         frame = self.user_frame
         return ProgramSettings(
@@ -183,22 +183,22 @@ class ProgramSection(Document):
             ),
             accepted_pulses=tuple(self.accept_unverified_pulses),
             title=self.comment,
-            template=None if self.template is None else path.parent / self.template,
+            template=None if self.template is None else source.file(self.template),
         )
 
-    def _require_possible(self, path: Path, post: Post, robot: Robot) -> None:
+    def _require_possible(self, source: Source, post: Post, robot: Robot) -> None:
         """Refuse another maker's arm, and keys that the post would pass over in silence."""
         if post.counts_pulses:
             if robot.missing_pulses and robot.maker not in _MAY_COUNT_PULSES:
                 raise InputError(
-                    f"{path}: program.controller",
+                    source.at("program.controller"),
                     f"{self.controller} counts pulses, of which {robot.title} (robot: "
                     f"{robot.name}, made by {robot.maker}) has none; name the controller of that "
                     f"arm: {', '.join(_without_pulses())}",
                 )
             if self.positions != "pulses" and not isinstance(robot.arm, SphericalWristArm):
                 raise InputError(
-                    f"{path}: program.positions",
+                    source.at("program.positions"),
                     f"must be pulses: poses of {self.controller} name a posture as that of an arm "
                     f"with a spherical wrist, which {robot.title} has not",
                 )
@@ -207,7 +207,7 @@ class ProgramSection(Document):
         for key in own:
             if key in self.model_fields_set:
                 raise InputError(
-                    f"{path}: program.{key}", f"is for Yaskawa controllers, not for {post.title}"
+                    source.at(f"program.{key}"), f"is for Yaskawa controllers, not for {post.title}"
                 )
 
 

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 from opl.errors import InputError
 from opl.files.documents import Document
@@ -15,7 +16,8 @@ from opl.geometry.mesh import TriangleMesh, load_mesh
 from opl.geometry.outside import facing_inward
 from opl.geometry.passes import Kind, MachinedSurface, Order, Passes
 from opl.geometry.scallop import row_pitch
-from opl.geometry.size import check_sizes
+from opl.geometry.size import SizeError, check_sizes
+from opl.job.source import Source
 
 MM = 1e-3
 
@@ -27,21 +29,43 @@ _NotNegative = Annotated[float, Field(ge=0.0)]
 _Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 _Id = Annotated[int, Field(ge=1)]
 
+# key of the validation context: what a program gives as a value, ``surface`` or ``part`` or both
+GIVEN = "given"
+
 
 class WorkpieceSection(Document):
     """The keys of the section ``workpiece``."""
 
-    surface: str
+    model_config = ConfigDict(json_schema_extra={"required": ["surface", "mesh", "mesh_unit"]})
+
+    surface: str | None = Field(default=None, validate_default=True)
     surface_unit: Literal["mm", "m"] | None = None
     faces: Annotated[list[_Id], Field(min_length=1)] | None = None
     crease_deg: Annotated[float, Field(gt=0.0, lt=180.0)] | None = None
     reversed_normal: bool = False
-    mesh: str
-    mesh_unit: Literal["mm", "m"]
+    mesh: str | None = Field(default=None, validate_default=True)
+    mesh_unit: Literal["mm", "m"] | None = Field(default=None, validate_default=True)
+
+    @field_validator("surface", "mesh", "mesh_unit")
+    @classmethod
+    def _given_once(cls, value: str | None, info: ValidationInfo) -> str | None:
+        """Require a key, unless a program gives what it names; then refuse it."""
+        given = (info.context or {}).get(GIVEN, ())
+        argument = "surface" if info.field_name == "surface" else "part"
+        if value is None and argument not in given:
+            raise PydanticCustomError("missing", "is missing")
+        if value is not None and argument in given:
+            raise ValueError(f"the argument {argument} is given as well; leave one out")
+        return value
 
     @model_validator(mode="after")
     def _fits(self) -> WorkpieceSection:
-        is_mesh = Path(self.surface).suffix.lower() in MESHES
+        if self.surface is None:
+            beside = self.model_fields_set - {"mesh", "mesh_unit"}
+            if beside:
+                raise ValueError(f"{min(beside)} goes with surface, a file")
+            return self
+        is_mesh = self._suffix in MESHES
         if is_mesh and self.surface_unit is None:
             raise ValueError("surface_unit is missing: mesh files do not say their unit, mm or m")
         if not is_mesh:
@@ -52,11 +76,16 @@ class WorkpieceSection(Document):
             raise ValueError("reversed_normal is not for meshes: their triangles tell the outside")
         return self
 
-    def load_surface(self, path: Path) -> MachinedSurface:
+    @property
+    def _suffix(self) -> str:
+        """The kind of the surface's file, e.g. ``.stl``."""
+        return Path(self.surface or "").suffix.lower()
+
+    def load_surface(self, source: Source) -> MachinedSurface:
         """Return the surface to be ground.
 
         Args:
-            path: The job file.
+            source: The job file or mapping.
 
         Raises:
             InputError: If its file or a face of it cannot be used.
@@ -64,44 +93,49 @@ class WorkpieceSection(Document):
         unit, crease = self.surface_unit or "mm", np.deg2rad(self.crease_deg or 30.0)
         try:
             return load_machined(
-                path.parent / self.surface, self.faces, self.reversed_normal, unit, float(crease)
+                source.file(str(self.surface)),
+                self.faces,
+                self.reversed_normal,
+                unit,
+                float(crease),
             )
         except InputError as error:
-            raise InputError(f"{path}: workpiece.surface", str(error)) from error
+            raise InputError(source.at("workpiece.surface"), str(error)) from error
         except ValueError as error:
-            raise InputError(f"{path}: workpiece.faces", str(error)) from error
+            raise InputError(source.at("workpiece.faces"), str(error)) from error
 
-    def load_part(self, path: Path) -> TriangleMesh:
+    def load_part(self, source: Source) -> TriangleMesh:
         """Return the solid for collisions.
 
         Args:
-            path: The job file.
+            source: The job file or mapping.
 
         Raises:
             InputError: If its file holds no solid.
         """
         try:
-            return load_mesh(path.parent / self.mesh, self.mesh_unit)
+            return load_mesh(source.file(str(self.mesh)), self.mesh_unit or "mm")
         except InputError as error:
-            raise InputError(f"{path}: workpiece.mesh", str(error)) from error
+            raise InputError(source.at("workpiece.mesh"), str(error)) from error
 
-    def check_sizes(self, path: Path, surface: MachinedSurface, part: TriangleMesh) -> None:
+    def check_sizes(self, source: Source, surface: MachinedSurface, part: TriangleMesh) -> None:
         """Refuse a surface and a solid that are not of one part of a size that a robot holds.
 
         Raises:
             InputError: If the unit of one of them must be wrong.
         """
-        suffix = Path(self.surface).suffix.lower()
-        unit_key = "surface_unit" if suffix in MESHES else "surface"
+        unit_key = "surface_unit" if self._suffix in MESHES else "surface"
         try:
             check_sizes(surface, part)
-        except ValueError as error:
-            key, _, message = str(error).partition(": ")
-            key = "mesh_unit" if key == "part" else unit_key
-            hint = "; STEP and IGES files carry their unit" if suffix in CAD else ""
-            raise InputError(f"{path}: workpiece.{key}", message + hint) from error
+        except SizeError as error:
+            hint = "; STEP and IGES files carry their unit" if self._suffix in CAD else ""
+            if error.of == "part":
+                where = "part" if self.mesh is None else "workpiece.mesh_unit"
+            else:
+                where = "surface" if self.surface is None else f"workpiece.{unit_key}"
+            raise InputError(source.at(where), str(error) + hint) from error
 
-    def check_outside(self, path: Path, surface: MachinedSurface, part: TriangleMesh) -> None:
+    def check_outside(self, source: Source, surface: MachinedSurface, part: TriangleMesh) -> None:
         """Refuse a surface whose normals point into the solid.
 
         Raises:
@@ -110,12 +144,14 @@ class WorkpieceSection(Document):
         inward = facing_inward(surface, part)
         if inward > MOST_INWARD:
             told = f"normals point into the solid at {100.0 * inward:.0f} % of the surface"
-            if Path(self.surface).suffix.lower() in MESHES:
+            if self.surface is None:
+                raise InputError(source.at("surface"), f"{told}; turn its outside round")
+            if self._suffix in MESHES:
                 raise InputError(
-                    f"{path}: workpiece.surface", f"{told}; export it with its triangles turned"
+                    source.at("workpiece.surface"), f"{told}; export it with its triangles turned"
                 )
             raise InputError(
-                f"{path}: workpiece.reversed_normal",
+                source.at("workpiece.reversed_normal"),
                 f"{told}; set it to {str(not self.reversed_normal).lower()}"
                 + ("" if inward > 0.9 else ", or let all faces of the file point outward"),
             )
@@ -147,11 +183,11 @@ class PassesSection(Document):
             raise ValueError("scallop_mm goes with kind: sections, and only there")
         return self
 
-    def in_si(self, path: Path, surface: MachinedSurface, wheel_radius: float) -> Passes:
+    def in_si(self, source: Source, surface: MachinedSurface, wheel_radius: float) -> Passes:
         """Return how the surface is cut.
 
         Args:
-            path: The job file.
+            source: The job file or mapping.
             surface: The surface to be ground; a pitch from a scallop height depends on it.
             wheel_radius: Radius of the wheel in [m].
 
@@ -163,12 +199,12 @@ class PassesSection(Document):
             pitch = self.pitch_mm * MM
         else:
             if not normal.any():
-                raise InputError(f"{path}: passes.plane_normal", "must not be zero")
+                raise InputError(source.at("passes.plane_normal"), "must not be zero")
             height = (self.scallop_mm or 0.0) * MM
             try:
                 pitch = row_pitch(surface, normal, height, wheel_radius)
             except ValueError as error:
-                raise InputError(f"{path}: passes.scallop_mm", str(error)) from error
+                raise InputError(source.at("passes.scallop_mm"), str(error)) from error
         return Passes(
             plane_normal=normal,
             pitch=pitch,

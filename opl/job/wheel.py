@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
@@ -16,6 +15,7 @@ from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, pose
 from opl.geometry.touched import KINDS, TouchedError, TouchedFit, fit_touched
 from opl.geometry.wheel import ContactWheel
 from opl.job.bodies import MM, Matrix, NotNegative, Positive, Triple, pose_of
+from opl.job.source import Source
 
 # robot: as its controller's pendant shows positions in the robot's own frame
 Frame = Literal["robot", "cell"]
@@ -66,11 +66,11 @@ class WheelSection(Document):
     def _places(self) -> list[str]:
         return ["T_base_contact0_mm", "pendant", "touched"]
 
-    def in_si(self, path: Path, key: str, robot: Robot, T_cell_base: Array) -> PlacedWheel:
+    def in_si(self, source: Source, key: str, robot: Robot, T_cell_base: Array) -> PlacedWheel:
         """Return the wheel in the base frame.
 
         Args:
-            path: The file that it stands in.
+            source: Where it stands.
             key: Its place there.
             robot: Whose pendant showed positions.
             T_cell_base: Where its base frame is in the frame of the cell, shape (4, 4).
@@ -83,7 +83,7 @@ class WheelSection(Document):
         T_base_seen = {"cell": T_base_cell, "robot": pose(np.eye(3), np.array([0.0, 0.0, above]))}
         fit = None
         if self.touched is not None:
-            fit = self._fit(self.touched, f"{path}: {key}.touched")
+            fit = self._fit(self.touched, source.at(f"{key}.touched"))
             belt = self.radius_mm - (self.touched.radius_mm or self.radius_mm)
             T_bare_contact0 = pose(np.eye(3), np.array([0.0, 0.0, -belt * MM]))
             T = T_base_seen[self.touched.frame] @ fit.T_base_contact0 @ T_bare_contact0

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from opl.errors import InputError
-from opl.files.documents import check, keys
+from opl.files.documents import read
 from opl.job.program import ProgramSection
+from opl.job.source import Source
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.inform import TEMPLATE
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings
@@ -18,8 +19,9 @@ EYE = "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 180], [0, 0, 0, 1]]"
 def settings(tmp_path, text, robot=ROBOT):
     path = tmp_path / "job.yaml"
     path.write_text(text)
-    section = check(keys(path), ProgramSection, path)
-    return section.in_si(path, "SAMPLE", section.robot_as_counted(path, robot), HOME)
+    source = Source.of_file(path)
+    section = read(path, ProgramSection)
+    return section.in_si(source, "SAMPLE", section.robot_as_counted(source, robot), HOME)
 
 
 def test_nothing_asked_for_is_a_pulse_job_of_joint_moves(tmp_path):
