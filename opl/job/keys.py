@@ -15,6 +15,16 @@ SURFACE = "workpiece.surface"
 PART = "workpiece.mesh"
 
 PASSES = "passes"
+# by the attribute of `opl.geometry.passes.Passes` that an error names
+OF_PASSES = {
+    "plane_normal": "passes.plane_normal",
+    "pitch": "passes.pitch_mm",
+    "max_bow_height": "passes.bow_height_mm",
+    "largest_step": "passes.largest_step_mm",
+    "rows": "passes.rows",
+    "kind": "passes.kind",
+    "repeats": "passes.repeats",
+}
 
 SEARCH_CONTACT_WEIGHT = "search.weights.contact"
 
