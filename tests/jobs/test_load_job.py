@@ -8,11 +8,13 @@ import pytest
 
 from opl.errors import InputError
 from opl.geometry.mesh import load_mesh
+from opl.geometry.passes import Kind
 from opl.geometry.patchwork import Patchwork
 from opl.geometry.surface_file import load_faces
 from opl.job import keys
 from opl.job.file import JobFile
 from opl.job.load import load_job
+from opl.surfacing import cut_surface
 from tests.support.jobs import V_JOB, V_SHAPE, document, write_job
 
 SURFACE = load_faces(V_SHAPE / "surface.json")[0].surface
@@ -139,3 +141,30 @@ def test_every_named_key_path_is_one_of_a_job(path):
     assert not exists(
         {"properties": schema["properties"]}, schema["$defs"], [*path.split("."), "x"]
     )
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value"),
+    [
+        ("plane_normal", np.zeros(3)),
+        ("pitch", 0.0),
+        ("max_bow_height", 0.0),
+        ("largest_step", 0.0),
+        ("rows", 1000),
+        ("repeats", 0),
+    ],
+)
+def test_a_refused_value_of_the_passes_is_named_by_its_key(attribute, value):
+    job = load_job(V_JOB)
+    with pytest.raises(InputError) as caught:
+        cut_surface(replace(job, passes=replace(job.passes, **{attribute: value})))
+    assert caught.value.where == f"{V_JOB}: {keys.OF_PASSES[attribute]}"
+
+
+def test_a_refused_kind_of_passes_is_named_by_its_key():
+    job = load_job(V_JOB)
+    two = Patchwork((*job.surface.faces, *job.surface.faces))
+    with pytest.raises(InputError) as caught:
+        cut_surface(replace(job, surface=two, passes=replace(job.passes, kind=Kind.ALONG_U)))
+    assert caught.value.where == f"{V_JOB}: passes.kind"
+    assert caught.value.message == "along_u needs a single NURBS face"
