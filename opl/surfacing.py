@@ -52,5 +52,5 @@ def cut_surface(job: Job) -> Surfacing:
     except ValueError as error:
         raise InputError(job.source.at(keys.PASSES), str(error)) from error
     cell = job.cell
-    found = inspect(job.surface, job.passes, laid, cell.wheel, cell.contact_allowance)
+    found = inspect(job.surface, job.passes, laid, cell.wheel, cell.max_belt_penetration)
     return Surfacing(laid, found)

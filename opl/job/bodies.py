@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, field_validator, model_validator
 
 from opl.cell.workcell import PART, WHEEL
 from opl.errors import InputError
@@ -46,15 +46,35 @@ def pose_of(matrix_mm: list[list[float]]) -> Array:
 
 
 class BodySection(Document):
-    """A named solid."""
+    """A named solid: exactly one of box_mm, cylinder_mm and mesh."""
 
-    name: Annotated[str, Field(min_length=1)]
-    at_mm: Triple
-    rotation_deg: Triple = Field(default=[0.0, 0.0, 0.0])
-    box_mm: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = None
-    cylinder_mm: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None
-    mesh: str | None = None
-    mesh_unit: Literal["mm", "m"] | None = None
+    model_config = ConfigDict(title="Body")
+
+    name: Annotated[str, Field(min_length=1)] = Field(
+        description="Name of the body, for messages and pairs."
+    )
+    at_mm: Triple = Field(
+        description="Position of the body's origin (x, y, z) in the frame of its section; the "
+        "origin of a box or a cylinder is its centre."
+    )
+    rotation_deg: Triple = Field(
+        default=[0.0, 0.0, 0.0],
+        description="Roll, pitch, yaw: turns about the fixed axes x, then y, then z.",
+    )
+    box_mm: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="A box: its edges along x, y and z."
+    )
+    cylinder_mm: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="A cylinder: its radius, and its length along z."
+    )
+    mesh: str | None = Field(
+        default=None,
+        description="A mesh file (STL, PLY, OBJ); it need not be closed. Relative names are looked "
+        "up beside this file.",
+    )
+    mesh_unit: Literal["mm", "m"] | None = Field(
+        default=None, description="Unit of the mesh file, which does not carry one."
+    )
 
     @model_validator(mode="after")
     def _one_shape(self) -> BodySection:

@@ -1,8 +1,8 @@
 """The cell file: what many jobs share. YAML in, values in the robot's base frame out.
 
-Everything that stands in the cell is given in the frame of the cell. ``stands`` says where the
-robot's mounting face is in it, so another arm needs no other line than its name: its base frame
-comes to lie as high above the face as its axis 2. Without ``stands`` the frame of the cell is the
+Everything that stands in the cell is given in the frame of the cell. ``mounting_face`` says where
+the robot's mounting face is in it, so another arm needs no other line than its name: its base frame
+comes to lie as high above the face as its axis 2. Without it the frame of the cell is the
 robot's base frame.
 """
 
@@ -10,71 +10,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
 
 from opl.cell.limits import Limit
 from opl.cell.robot import Robot, link_names, load_robot
 from opl.cell.workcell import PART, WHEEL, wheel_solid
 from opl.errors import InputError
-from opl.files.documents import Document, read
+from opl.files.documents import read
 from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, pose
 from opl.geometry.shapes import Body
-from opl.job.bodies import MM, BodySection, NotNegative, Six, Triple, bodies_in_si
+from opl.job.bodies import MM, bodies_in_si
+from opl.job.cell_file import CellFile, MountingFace, Range
 from opl.job.pairs import FIXTURE, ROBOT, PairNames, SaidOfPairs, said_of_pairs
 from opl.job.source import Source
-from opl.job.wheel import CellWheelSection, PlacedWheel
-
-CLEARANCE_MM = 5.0
-_TwoNames = Annotated[list[str], Field(min_length=2, max_length=2)]
-
-
-class _Stands(Document):
-    at_mm: Triple
-    rotation_deg: Triple = Field(default=[0.0, 0.0, 0.0])
-
-
-class _Range(Document):
-    lower_deg: float
-    upper_deg: float
-
-    @model_validator(mode="after")
-    def _in_order(self) -> _Range:
-        if self.lower_deg >= self.upper_deg:
-            raise ValueError(f"lower_deg must be below upper_deg {self.upper_deg:g}")
-        return self
-
-
-class _JointLimit(_Range):
-    joint: str
-
-
-class _CoupledLimit(_Range):
-    name: Annotated[str, Field(min_length=1)] | None = None
-    coefficients: Annotated[dict[str, float], Field(min_length=1)]
-
-
-class _PairClearance(Document):
-    pair: _TwoNames
-    clearance_mm: NotNegative
-
-
-class CellFile(Document):
-    """The keys of a cell file; `opl schema --cell` prints them for editors."""
-
-    robot: str
-    stands: _Stands | None = None
-    wheels: Annotated[list[CellWheelSection], Field(min_length=1)]
-    obstacles: list[BodySection] = Field(default=[])
-    gripper: list[BodySection] = Field(default=[])
-    clearance_mm: NotNegative = CLEARANCE_MM
-    clearances: list[_PairClearance] = Field(default=[])
-    allowed_contacts: list[_TwoNames] = Field(default=[])
-    joint_limits: list[_JointLimit] = Field(default=[])
-    coupled_limits: list[_CoupledLimit] = Field(default=[])
-    home_deg: Six | None = None
+from opl.job.wheel import PlacedWheel
 
 
 @dataclass(frozen=True)
@@ -140,7 +90,7 @@ def load_cell(path: Path) -> Cell:
     """
     file, source = read(path, CellFile), Source.of_file(path)
     robot = robot_of(source, file.robot)
-    T_cell_base = _base(file.stands, robot)
+    T_cell_base = _base(file.mounting_face, robot)
     T_base_cell = inverse(T_cell_base)
     _require_names(source, file, robot)
     obstacles = tuple(
@@ -162,7 +112,7 @@ def load_cell(path: Path) -> Cell:
         source,
         names,
         [tuple(pair) for pair in file.allowed_contacts],
-        [(tuple(one.pair), one.clearance_mm * MM) for one in file.clearances],
+        [(tuple(one.pair), one.clearance_mm * MM) for one in file.pair_clearances],
     )
     return Cell(
         path=path,
@@ -192,11 +142,11 @@ def robot_of(source: Source, name: str) -> Robot:
         raise InputError(where, error.message) from error
 
 
-def _base(stands: _Stands | None, robot: Robot) -> Array:
+def _base(face: MountingFace | None, robot: Robot) -> Array:
     """Return T_cell_base: the base frame lies straight above the mounting face."""
-    if stands is None:
+    if face is None:
         return np.eye(4)
-    T_cell_face = from_roll_pitch_yaw(np.deg2rad(stands.rotation_deg), np.array(stands.at_mm) * MM)
+    T_cell_face = from_roll_pitch_yaw(np.deg2rad(face.rotation_deg), np.array(face.at_mm) * MM)
     return T_cell_face @ pose(np.eye(3), np.array([0.0, 0.0, robot.base_height]))
 
 
@@ -245,7 +195,7 @@ def _joint(robot: Robot, name: str, where: str) -> int:
     return robot.joint_names.index(name)
 
 
-def _limit(name: str, coefficients: Array, limits: _Range) -> Limit:
+def _limit(name: str, coefficients: Array, limits: Range) -> Limit:
     lower, upper = np.deg2rad([limits.lower_deg, limits.upper_deg])
     return Limit(name, coefficients, float(lower), float(upper))
 

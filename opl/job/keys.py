@@ -7,7 +7,7 @@ CLEARANCE = "clearance_mm"
 WHEEL_POSE = "wheel.T_base_contact0_mm"
 WHEEL_WIDTH = "wheel.width_mm"
 WHEEL_MAX_ROLL = "wheel.max_roll_deg"
-WHEEL_MAX_BELT_PENETRATION = "wheel.contact_allowance_mm"
+WHEEL_MAX_BELT_PENETRATION = "wheel.max_belt_penetration_mm"
 
 FIXTURE_POSE = "fixture.T_flange_workpiece_mm"
 
@@ -19,8 +19,8 @@ PASSES = "passes"
 OF_PASSES = {
     "plane_normal": "passes.plane_normal",
     "pitch": "passes.pitch_mm",
-    "max_bow_height": "passes.bow_height_mm",
-    "largest_step": "passes.largest_step_mm",
+    "max_bow_height": "passes.max_chord_error_mm",
+    "largest_step": "passes.max_step_mm",
     "rows": "passes.rows",
     "kind": "passes.kind",
     "repeats": "passes.repeats",
@@ -29,7 +29,7 @@ OF_PASSES = {
 SEARCH_CONTACT_WEIGHT = "search.weights.contact"
 
 PROCESS_FEED = "process.feed_mm_s"
-PROCESS_CONTACT_SPEED = "process.contact_speed"
+PROCESS_CONTACT_SPEED = "process.max_contact_speed"
 PROCESS_MAX_DWELL = "process.max_dwell_s"
 PROCESS_MAX_ACCELERATION = "process.max_acceleration_deg_s2"
 

@@ -22,7 +22,7 @@ from opl.job.bodies import bodies_in_si, pose_of
 from opl.job.file import JobFile
 from opl.job.search import Method, Search
 from opl.job.source import Source
-from opl.job.surface import GIVEN
+from opl.job.workpiece import GIVEN
 from opl.motion.timing import Pace
 from opl.program.settings import ProgramSettings
 
@@ -115,11 +115,11 @@ def _in_si(
     robot = file.program.robot_as_counted(source, around.robot)
     robot = file.process.robot_as_limited(robot)
     fixture = (*around.gripper, *bodies_in_si(source, "fixture.bodies", file.fixture.bodies))
-    if file.search.max_contact_error_mm <= file.passes.bow_height_mm:
+    if file.search.max_contact_error_mm <= file.passes.max_chord_error_mm:
         raise InputError(
             source.at("search.max_contact_error_mm"),
-            f"must be larger than passes.bow_height_mm, which is part of it, "
-            f"got {file.search.max_contact_error_mm:g} and {file.passes.bow_height_mm:g}",
+            f"must be larger than passes.max_chord_error_mm, which is part of it, "
+            f"got {file.search.max_contact_error_mm:g} and {file.passes.max_chord_error_mm:g}",
         )
     part = file.workpiece.load_part(source) if part is None else part
     surface = file.workpiece.load_surface(source) if surface is None else surface
@@ -132,13 +132,13 @@ def _in_si(
         part=part,
         fixture=fixture,
         T_flange_workpiece=pose_of(file.fixture.T_flange_workpiece_mm),
-        contact_allowance=around.placed.contact_allowance,
+        max_belt_penetration=around.placed.max_belt_penetration,
         clearance=around.clearance,
         pairs=around.pairs,
         limits=around.limits,
     )
     check_home(around.home_key, cell, around.home)
-    search = file.search.in_si(file.passes.bow_height_mm)
+    search = file.search.in_si(file.passes.max_chord_error_mm)
     if method is not None:
         search = replace(search, method=Method(method))
     return Job(

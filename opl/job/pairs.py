@@ -109,7 +109,7 @@ def said_of_pairs(
         source: The cell file or mapping.
         names: What there is to be named.
         allowed: Of ``allowed_contacts``.
-        clearances: Of ``clearances``, in [m].
+        clearances: Of ``pair_clearances``, in [m].
 
     Raises:
         InputError: If a name is unknown, or a pair is given twice or makes no sense.
@@ -118,7 +118,7 @@ def said_of_pairs(
         (f"allowed_contacts.{place}", pair, None) for place, pair in enumerate(allowed)
     ]
     said += [
-        (f"clearances.{place}.pair", pair, distance)
+        (f"pair_clearances.{place}.pair", pair, distance)
         for place, (pair, distance) in enumerate(clearances)
     ]
     seen: dict[frozenset[str], str] = {}
@@ -134,7 +134,7 @@ def said_of_pairs(
         elif pair[0] == pair[1]:
             fault = "are one and the same"
         elif distance is None and PART in pair and set(pair) & set(names.wheels):
-            fault = "how deep a part may sink into the belt is the wheel's contact_allowance_mm"
+            fault = "how deep a part may sink into the belt is the wheel's max_belt_penetration_mm"
         elif distance is not None and is_single(pair) and not names.move_apart(*pair):
             fault = (
                 "do not move against each other, or share a bearing: no distance between them is "

@@ -71,7 +71,7 @@ def written(request, tmp_path_factory):
     content = yaml.safe_load((home / "job.yaml").read_text())
     own = PARTS[request.param]
     content["passes"].update(
-        rows=2, largest_step_mm=12, bow_height_mm=0.09, end_margin_mm=own["end_margin_mm"]
+        rows=2, max_step_mm=12, max_chord_error_mm=0.09, end_margin_mm=own["end_margin_mm"]
     )
     content["search"].update(method="recursive", contact_positions=45)
     content["process"].update(approach_mm=20, home_deg=own["home_deg"])

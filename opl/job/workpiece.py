@@ -1,4 +1,4 @@
-"""The sections ``workpiece`` and ``passes`` of a job file: their keys, units and defaults."""
+"""The section ``workpiece`` of a job file: the part, and its surface to be ground."""
 
 from __future__ import annotations
 
@@ -14,19 +14,13 @@ from opl.files.documents import Document
 from opl.geometry.machined import CAD, MESHES, load_machined
 from opl.geometry.mesh import TriangleMesh, load_mesh
 from opl.geometry.outside import facing_inward
-from opl.geometry.passes import Kind, MachinedSurface, Order, Passes
-from opl.geometry.scallop import row_pitch
+from opl.geometry.passes import MachinedSurface
 from opl.geometry.size import SizeError, check_sizes
 from opl.job.source import Source
-
-MM = 1e-3
 
 # so much of a surface may look as if it faced into the solid before it is refused
 MOST_INWARD = 0.1
 
-_Positive = Annotated[float, Field(gt=0.0)]
-_NotNegative = Annotated[float, Field(ge=0.0)]
-_Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 _Id = Annotated[int, Field(ge=1)]
 
 # key of the validation context: what a program gives as a value, ``surface`` or ``part`` or both
@@ -34,17 +28,46 @@ GIVEN = "given"
 
 
 class WorkpieceSection(Document):
-    """The keys of the section ``workpiece``."""
+    """The part as a closed solid, and its surface to be ground; both in the workpiece frame."""
 
-    model_config = ConfigDict(json_schema_extra={"required": ["surface", "mesh", "mesh_unit"]})
+    model_config = ConfigDict(
+        title="Workpiece", json_schema_extra={"required": ["surface", "mesh", "mesh_unit"]}
+    )
 
-    surface: str | None = Field(default=None, validate_default=True)
-    surface_unit: Literal["mm", "m"] | None = None
-    faces: Annotated[list[_Id], Field(min_length=1)] | None = None
-    crease_deg: Annotated[float, Field(gt=0.0, lt=180.0)] | None = None
-    reversed_normal: bool = False
-    mesh: str | None = Field(default=None, validate_default=True)
-    mesh_unit: Literal["mm", "m"] | None = Field(default=None, validate_default=True)
+    surface: str | None = Field(
+        default=None,
+        validate_default=True,
+        description="The surface to be ground: NURBS faces (.json, .yaml, in mm), a CAD file "
+        "(.step, .stp, .iges, .igs) or a mesh (.stl, .ply, .obj), relative to this file.",
+    )
+    surface_unit: Literal["mm", "m"] | None = Field(
+        default=None, description="Unit of a surface from a mesh; needed there, and only there."
+    )
+    faces: Annotated[list[_Id], Field(min_length=1)] | None = Field(
+        default=None,
+        description="Faces to be ground, by their numbers in `opl faces`; else all of the file.",
+    )
+    crease_deg: Annotated[float, Field(gt=0.0, lt=180.0)] | None = Field(
+        default=None,
+        description="Angle between triangles of a mesh that ends a face; without it, 30. For "
+        "surfaces from a mesh only.",
+    )
+    reversed_normal: bool = Field(
+        default=False,
+        description="Whether the outside of the faces is the side that the file has as inside. Not "
+        "for meshes.",
+    )
+    mesh: str | None = Field(
+        default=None,
+        validate_default=True,
+        description="The part as a closed solid, for collisions: .stl, .ply or .obj, relative to "
+        "this file.",
+    )
+    mesh_unit: Literal["mm", "m"] | None = Field(
+        default=None,
+        validate_default=True,
+        description="Unit of the mesh file, which does not carry one.",
+    )
 
     @field_validator("surface", "mesh", "mesh_unit")
     @classmethod
@@ -155,66 +178,3 @@ class WorkpieceSection(Document):
                 f"{told}; set it to {str(not self.reversed_normal).lower()}"
                 + ("" if inward > 0.9 else ", or let all faces of the file point outward"),
             )
-
-
-class PassesSection(Document):
-    """The keys of the section ``passes``."""
-
-    kind: Literal["sections", "along_u", "along_v"] = "sections"
-    plane_normal: _Triple | None = None
-    pitch_mm: _Positive | None = None
-    scallop_mm: _Positive | None = None
-    margin_mm: _NotNegative = 0.0
-    end_margin_mm: _NotNegative = 0.0
-    rows: Annotated[int, Field(ge=1)] | None = None
-    repeats: Annotated[int, Field(ge=1, le=20)] = 1
-    shift_mm: _NotNegative = 0.0
-    bow_height_mm: _Positive
-    largest_step_mm: _Positive
-    order: Literal["one_way", "zigzag", "both", "shortest"] = "one_way"
-
-    @model_validator(mode="after")
-    def _fits(self) -> PassesSection:
-        if (self.pitch_mm is None) == (self.scallop_mm is None):
-            raise ValueError("needs either pitch_mm or scallop_mm, the height left between rows")
-        if (self.kind == "sections") != (self.plane_normal is not None):
-            raise ValueError("plane_normal goes with kind: sections, and only there")
-        if self.kind != "sections" and self.scallop_mm is not None:
-            raise ValueError("scallop_mm goes with kind: sections, and only there")
-        return self
-
-    def in_si(self, source: Source, surface: MachinedSurface, wheel_radius: float) -> Passes:
-        """Return how the surface is cut.
-
-        Args:
-            source: The job file or mapping.
-            surface: The surface to be ground; a pitch from a scallop height depends on it.
-            wheel_radius: Radius of the wheel in [m].
-
-        Raises:
-            InputError: If there is no pitch that keeps the scallop height.
-        """
-        normal = np.array(self.plane_normal or [0.0, 0.0, 0.0])
-        if self.pitch_mm is not None:
-            pitch = self.pitch_mm * MM
-        else:
-            if not normal.any():
-                raise InputError(source.at("passes.plane_normal"), "must not be zero")
-            height = (self.scallop_mm or 0.0) * MM
-            try:
-                pitch = row_pitch(surface, normal, height, wheel_radius)
-            except ValueError as error:
-                raise InputError(source.at("passes.scallop_mm"), str(error)) from error
-        return Passes(
-            plane_normal=normal,
-            pitch=pitch,
-            max_bow_height=self.bow_height_mm * MM,
-            largest_step=self.largest_step_mm * MM,
-            margin=self.margin_mm * MM,
-            rows=self.rows,
-            order=Order(self.order),
-            kind=Kind(self.kind),
-            end_margin=self.end_margin_mm * MM,
-            repeats=self.repeats,
-            shift=self.shift_mm * MM,
-        )
