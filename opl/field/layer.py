@@ -15,7 +15,7 @@ def wheel_layer(
 ) -> Array:
     """Return the signed distance of the part to the wheel in [m], shape (N, M).
 
-    As in `signed_wheel_distance`: exact where it is less than the contact allowance permits.
+    As in `signed_wheel_distance`: exact where it is less than the largest belt penetration allows.
 
     Args:
         cell: The cell.
@@ -26,7 +26,7 @@ def wheel_layer(
     Ts_contact0_contact = cell.wheel.T_contact0_contact(contact_positions)
     # cutter and contact coincide, whatever robot brings the part there
     Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[:, None]
-    return signed_wheel_distance(part, cell.wheel, Ts_contact0_workpiece, -cell.planned_allowance)
+    return signed_wheel_distance(part, cell.wheel, Ts_contact0_workpiece, -cell.planned_penetration)
 
 
 def layer_at(
@@ -46,6 +46,6 @@ def layer_at(
     Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[columns]
     layer = np.full(at.shape, -np.inf)
     layer[at] = signed_wheel_distance(
-        part, cell.wheel, Ts_contact0_workpiece, -cell.planned_allowance
+        part, cell.wheel, Ts_contact0_workpiece, -cell.planned_penetration
     )
     return layer

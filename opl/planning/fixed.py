@@ -64,7 +64,7 @@ def keep_contact(problem: GrindingProblem) -> FixedContact:
                 q = nodes.q[np.arange(len(descent.rows)), descent.rows]
     if q is None:
         return FixedContact(None, False, "no continuous path within reach and limits at t = 0")
-    cut = np.flatnonzero(fixed.wheel_clearance[:, 0] < -problem.cell.planned_allowance)
+    cut = np.flatnonzero(fixed.wheel_clearance[:, 0] < -problem.cell.planned_penetration)
     if len(cut):
         deepest = -1e3 * float(fixed.wheel_clearance.min())
         return FixedContact(

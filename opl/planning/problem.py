@@ -29,7 +29,7 @@ class GrindingProblem:
         points: N cutter points.
         field: The nodes of every branch.
         wheel_clearance: Signed distance of the part to the wheel in [m], exact where it is less
-            than the contact allowance permits, shape (N, M).
+            than the largest belt penetration allows, shape (N, M).
         interpolation: How the path between nodes is filled in.
         pace: Speeds, approach and home.
         links: Ways through the air, found so far; not to be given, and kept as long as the cell is
@@ -62,7 +62,7 @@ class GrindingProblem:
 
     def free_nodes(self, nodes: NodeMatrix) -> np.ndarray:
         """Return which nodes exist and do not cut into the wheel, shape (N, n_rows)."""
-        free = self.wheel_clearance >= -self.cell.planned_allowance
+        free = self.wheel_clearance >= -self.cell.planned_penetration
         return np.ascontiguousarray(nodes.exists & free[:, nodes.position_index])
 
     def ladder(self, nodes: NodeMatrix, free: np.ndarray) -> Ladder:

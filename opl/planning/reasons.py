@@ -93,7 +93,7 @@ def _describe_run(problem: GrindingProblem, first: int, last: int) -> str:
     pass_index = int(problem.points.pass_index[first])
     line = f"{where} (pass {pass_index + 1}): nothing is free: {', '.join(parts)}"
     deepest_free = float(problem.wheel_clearance[first : last + 1].max())
-    if deepest_free < -problem.cell.planned_allowance:
+    if deepest_free < -problem.cell.planned_penetration:
         line += f"; the part cuts {-1e3 * deepest_free:.2f} mm into the wheel at best"
     return line
 
@@ -101,7 +101,7 @@ def _describe_run(problem: GrindingProblem, first: int, last: int) -> str:
 def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
     """Weigh, over the contact positions of a column, what rules each out."""
     cell, robot = problem.cell, problem.cell.robot
-    allowed = problem.wheel_clearance[column] >= -problem.cell.planned_allowance
+    allowed = problem.wheel_clearance[column] >= -problem.cell.planned_penetration
     counts: Counter[str] = Counter()
     n_positions = len(problem.field.contact_positions)
     for position in np.unique(np.linspace(0, n_positions - 1, MOST_POSITIONS).astype(int)):

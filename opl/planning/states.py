@@ -46,6 +46,8 @@ def node_states(problem: GrindingProblem, branch: int) -> np.ndarray:
             columns = np.flatnonzero(asked >= 0)
             hit = problem.scene.collides(nodes.q[columns, asked[columns]])
             states[columns[hit], position] = codes.index(NodeState.COLLISION)
-    states[problem.wheel_clearance < -problem.cell.planned_allowance] = codes.index(NodeState.WHEEL)
+    states[problem.wheel_clearance < -problem.cell.planned_penetration] = codes.index(
+        NodeState.WHEEL
+    )
     states[np.isnan(problem.field.q[:, :, branch, 0])] = codes.index(NodeState.REACH)
     return states

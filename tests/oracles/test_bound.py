@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from opl.field.path import BrokenStepError, fill_in
+from opl.files.resources import folder
 from opl.job.load import load
 from opl.planning.bound import StripProof, raise_bound
 from opl.planning.branch import branches_of
 from opl.planning.refine import RefinedProblem, refine
-from opl.resources import folder
 from opl.search.certificate import least_box
 from opl.search.ladder import Ladder
 from opl.search.strips import Strips, no_strips, strips_of

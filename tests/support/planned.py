@@ -9,13 +9,13 @@ from opl.cell.collision import CollisionScene
 from opl.cell.wheel_distance import part_tree
 from opl.field.layer import wheel_layer
 from opl.field.nodes import build_nodes
+from opl.files.resources import folder
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import load
 from opl.motion.timing import timed
 from opl.pipeline import cutter_points
 from opl.planning.plan import plan_recursive
 from opl.planning.problem import GrindingProblem
-from opl.resources import folder
 from opl.verification.replay import replay
 
 V_JOB = folder("workpieces") / "v_shape" / "job.yaml"
