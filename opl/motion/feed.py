@@ -81,8 +81,8 @@ def dwell_refusal(stretches: tuple[SlowStretch, ...], pace: Pace) -> NoPathError
         return None
     return NoPathError(
         f"the belt would dwell on one spot for more than {pace.max_dwell:g} s beyond the time at "
-        "the feed (process.max_dwell_s); raise process.max_contact_speed or lower process.feed_mm_s, "
-        "or let the contact move less (search.weights.contact)",
+        "the feed (process.max_dwell_s); raise process.max_contact_speed or lower "
+        "process.feed_mm_s, or let the contact move less (search.weights.contact)",
         [
             f"pass {one.pass_index + 1}, cutter point {one.dwell_at:.2f}: {one.dwell:.2f} s"
             for one in too_long
