@@ -104,11 +104,11 @@ def wrist_reach(robot: Robot, ahead: Array, up: Array) -> Array:
 def _corners(shape: coal.CollisionGeometry) -> Array:
     """Return points whose convex hull is a shape, in its own frame in [m], shape (n, 3)."""
     if isinstance(shape, coal.Box):
-        return np.array(list(product((-1.0, 1.0), repeat=3))) * shape.halfSide
+        return np.asarray(np.array(list(product((-1.0, 1.0), repeat=3))) * shape.halfSide)
     if isinstance(shape, coal.Sphere):
         around, over = np.meshgrid(*[np.linspace(0.0, 2.0 * np.pi, _CIRCLE)] * 2)
         sides = [np.cos(around) * np.sin(over), np.sin(around) * np.sin(over), np.cos(over)]
-        return shape.radius * np.stack(sides, axis=-1).reshape(-1, 3)
+        return np.asarray(shape.radius * np.stack(sides, axis=-1).reshape(-1, 3))
     if isinstance(shape, coal.Cylinder):
         angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE, endpoint=False)
         circle = shape.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)

@@ -84,7 +84,7 @@ class ParallelAxesArm:
         cos1, sin1 = np.cos(theta1), np.sin(theta1)
 
         def in_plane(v: Array) -> Array:
-            return cos1 * v[0] + sin1 * v[1]  # along the heading of the arm
+            return np.asarray(cos1 * v[0] + sin1 * v[1])  # along the heading of the arm
 
         # z_flange is -sin5 e1 + cos5 y, with e1 = (cos tilt, -sin tilt) ahead and up
         z_ahead, z_up, z_left = in_plane(z), z[2], cos1 * z[1] - sin1 * z[0]

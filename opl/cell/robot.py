@@ -26,7 +26,7 @@ from opl.cell.spherical_wrist import SphericalWristArm
 from opl.cell.urdf_tree import UrdfTree
 from opl.errors import InputError
 from opl.files.resources import folder
-from opl.geometry.frames import Array, pose
+from opl.geometry.frames import Array, pose, read_only
 
 # In which a joint is taken to reach its top speed where nobody knows its acceleration, in [s].
 # Integrators guess 0.1 s for arms of this kind; slower is the safe side.
@@ -78,10 +78,9 @@ class Robot:
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper", "max_speed", "max_acceleration", "pulses_per_radian"):
-            copy = np.array(getattr(self, name), dtype=float)
+            copy = read_only(getattr(self, name))
             if copy.shape != (N_JOINTS,):
                 raise ValueError(f"{name} has shape {copy.shape}, must have ({N_JOINTS},)")
-            copy.setflags(write=False)
             object.__setattr__(self, name, copy)
 
     @property

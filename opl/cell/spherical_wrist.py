@@ -141,16 +141,16 @@ def _orientation(
     cos1, sin1, cos_tilt, sin_tilt = np.cos(theta1), np.sin(theta1), np.cos(tilt), np.sin(tilt)
 
     def in_plane(v: Array) -> Array:
-        return cos1 * v[0] + sin1 * v[1]  # along the heading of the arm
+        return np.asarray(cos1 * v[0] + sin1 * v[1])  # along the heading of the arm
 
     def along_e1(v: Array) -> Array:
-        return cos_tilt * in_plane(v) - sin_tilt * v[2]
+        return np.asarray(cos_tilt * in_plane(v) - sin_tilt * v[2])
 
     def along_e2(v: Array) -> Array:
-        return cos1 * v[1] - sin1 * v[0]
+        return np.asarray(cos1 * v[1] - sin1 * v[0])
 
     def along_e3(v: Array) -> Array:
-        return sin_tilt * in_plane(v) + cos_tilt * v[2]
+        return np.asarray(sin_tilt * in_plane(v) + cos_tilt * v[2])
 
     z1, z2 = along_e1(z), along_e2(z)
     sin5 = np.sqrt(z1**2 + z2**2)

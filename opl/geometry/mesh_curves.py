@@ -121,7 +121,7 @@ def plane_polylines(
     # so every cut edge is cut in its inside, and each polyline is a chain of whole triangles
     heights = np.where(np.abs(heights) < scale, scale, heights)
     above = heights > 0.0
-    edges = mesh.faces[:, [[0, 1], [1, 2], [2, 0]]]  # (m, 3, 2)
+    edges = mesh.edges
     cut = above[edges[..., 0]] != above[edges[..., 1]]
     crossed = np.flatnonzero(cut.any(axis=1))  # each in two edges
     if not len(crossed):

@@ -77,7 +77,7 @@ class MachinedSurface(Protocol):
 
 def bounding_box(surface: MachinedSurface) -> Array:
     """Return the least and the largest x, y, z of a surface in [m], shape (2, 3)."""
-    return np.array([surface.extent_along(axis) for axis in np.eye(3)]).T
+    return np.asarray(np.array([surface.extent_along(axis) for axis in np.eye(3)]).T)
 
 
 @dataclass(frozen=True)

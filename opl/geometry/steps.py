@@ -189,7 +189,7 @@ def _bow_heights(curve: SurfaceCurve, nodes: Array) -> Array:
     inner = own[own.searchsorted(nodes[0], "right") : own.searchsorted(nodes[-1])]
     step = nodes.searchsorted(inner, "right") - 1
     np.maximum.at(away, step, _away(curve.positions(inner) - origins[step], chords[step]))
-    return np.sqrt(away)
+    return np.asarray(np.sqrt(away))
 
 
 def _away(points: Array, chords: Array) -> Array:
@@ -198,4 +198,4 @@ def _away(points: Array, chords: Array) -> Array:
     square = np.maximum(np.sum(chords * chords, axis=-1), np.finfo(float).tiny)
     fraction = np.clip(np.sum(points * chords, axis=-1) / square, 0.0, 1.0)
     away = points - fraction[..., None] * chords
-    return np.sum(away * away, axis=-1)
+    return np.asarray(np.sum(away * away, axis=-1))

@@ -187,7 +187,7 @@ class _Equations:
         p = p_contact0[self.of_point]
         from_axle = np.hypot(p[:, 1], p[:, 2] - self._radius)
         along = np.take_along_axis(p, np.maximum(self.axis, 0)[:, None], axis=1)[:, 0]
-        return np.where(self.axis < 0, from_axle, along) - self.target
+        return np.asarray(np.where(self.axis < 0, from_axle, along) - self.target)
 
     def jacobian(self, p_contact0: Array) -> Array:
         """Return the change of each value with turns about and moves along x, y, z: (count, 6)."""
@@ -208,7 +208,7 @@ class _Equations:
         beside = np.abs(p_contact0[:, 0]) - self._half
         beyond = np.hypot(p_contact0[:, 1], p_contact0[:, 2] - self._radius) - self._radius
         outside = np.select([self._on_rim, self._on_side], [beside, beyond], 0.0)
-        return np.sqrt(squares + np.square(np.maximum(outside, 0.0)))
+        return np.asarray(np.sqrt(squares + np.square(np.maximum(outside, 0.0))))
 
 
 def _starts(rows: _Equations) -> list[Array]:

@@ -60,7 +60,7 @@ class Ladder:
 
     def step_key(self, column: int, row: int, next_row: int) -> int:
         """Return the number under which a step is remembered as blocked."""
-        n_rows = self.q.shape[1]
+        n_rows = int(self.q.shape[1])
         return (column * n_rows + row) * n_rows + next_row
 
 

@@ -210,7 +210,7 @@ def _cheapest(  # type: ignore[no-untyped-def]
                         before[column, row] = here
             following[row] += node_cost[column, row]
         best[:] = following
-    row = np.argmin(best)
+    row = int(np.argmin(best))
     total = best[row]
     if total == np.inf:
         return total
