@@ -1,6 +1,6 @@
 """Limits that a cell adds to those of the joints, such as for the dress pack.
 
-The robot keeps its own ranges, because its controller tells full turns apart by them. A cell
+The robot keeps its own ranges, because its controller distinguishes full turns by them. A cell
 narrows the range of a joint, or of a sum of joints: the hose along the forearm does not care which
 of two axes winds it up, R + T together may turn only so far. Such a limit is linear in the joints,
 so where both ends of a linear joint move keep it, the whole move does.

@@ -94,7 +94,7 @@ class ParallelAxesArm:
         flip = np.array([1.0, -1.0])[:, None, None, None]
         theta5 = flip * np.arctan2(np.where(straight, 0.0, sin5), z_left)
         cos_tilt, sin_tilt = -flip * z_ahead / length, flip * z_up / length
-        # where z_flange says nothing of the tilt: e3, along the last link, is -sin6 x - cos6 y
+        # where z_flange leaves the tilt open: e3, along the last link, is -sin6 x - cos6 y
         e3 = -np.sin(near[5]) * x - np.cos(near[5]) * y
         cos_tilt = np.where(straight, e3[2], cos_tilt)
         sin_tilt = np.where(straight, in_plane(e3), sin_tilt)

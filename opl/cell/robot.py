@@ -189,7 +189,7 @@ def _model(urdf: Path) -> pin.Model:
 
 
 def _check_urdf(robot: Robot) -> None:
-    """Refuse a URDF that speaks of other joints, lacks a frame, or hides shapes from the replay."""
+    """Refuse a URDF that has other joints, lacks a frame, or hides shapes from the replay."""
     try:
         model = _model(robot.urdf)
     except ValueError as error:

@@ -123,8 +123,8 @@ def _orientation(
     Theta6 is measured against that axis 5, not found from z: near the straight wrist theta4 is
     hardly known, and their sum comes out right only if both rest on the same theta4.
 
-    Turning axis 4 by half a turn and bending the wrist the other way gives the same axes. A
-    straight wrist has no other way; both slots then keep theta4_free.
+    Turning axis 4 by half a turn and bending the wrist to the other side gives the same axes. A
+    straight wrist has no other side; both slots then keep theta4_free.
 
     Args:
         theta1: Angle of axis 1 in [rad], shape (2 back, 1, n).

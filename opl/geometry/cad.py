@@ -92,13 +92,13 @@ def _read(path: Path) -> Any:
         raise InputError(str(path), f"cannot be read: {error.strerror}") from error
     if not content:
         raise InputError(str(path), "is empty")
-    # OpenCASCADE tells its troubles on standard output
+    # OpenCASCADE prints its troubles to standard output
     printers = Message.DefaultMessenger_s().ChangePrinters()
     printers.Clear()
     is_step = path.suffix.lower() in (".step", ".stp")
     reader = STEPControl_Reader() if is_step else IGESControl_Reader()
     what = "STEP" if is_step else "IGES"
-    # the last record of an IGES file says T in column 73; a file cut short is read without a word
+    # the last record of an IGES file has a T in column 73; OpenCASCADE reads what is cut short
     if not is_step and content.splitlines()[-1][72:73] != b"T":
         raise InputError(str(path), "is not a whole IGES file")
     try:

@@ -62,7 +62,7 @@ class FaceSummary:
 
 
 def list_faces(path: Path, unit: Literal["mm", "m"] | None, crease: float) -> list[FaceSummary]:
-    """Return what can be said of each face of a file.
+    """Return a summary of each face of a file.
 
     Args:
         path: A STEP or IGES file, a NURBS file, or a mesh.
@@ -74,7 +74,7 @@ def list_faces(path: Path, unit: Literal["mm", "m"] | None, crease: float) -> li
     """
     if path.suffix.lower() in MESHES:
         if unit is None:
-            raise InputError(str(path), "a mesh does not say its unit: give --unit mm or --unit m")
+            raise InputError(str(path), "a mesh file has no unit: give --unit mm or --unit m")
         return _mesh_faces(load_triangles(path, unit), crease)
     return [
         _summary(number, face.type, Patchwork((face,)), face.n_holes)
@@ -120,7 +120,7 @@ def preview(faces: list[FaceSummary], face: FaceSummary) -> tuple[str, list[str]
     across, up = (k for k in range(3) if k != depth)
     low = np.min([one.low for one in faces], axis=0)
     high = np.max([one.high for one in faces], axis=0)
-    # the same scale both ways, a line being as high as two characters are wide
+    # the same scale across and down, a line being as high as two characters are wide
     scale = max((high[across] - low[across]) / _WIDTH, (high[up] - low[up]) / (2.0 * _HEIGHT))
     width = int(np.ceil((high[across] - low[across]) / scale + 1e-9)) + 1
     height = int(np.ceil((high[up] - low[up]) / (2.0 * scale) + 1e-9)) + 1

@@ -44,7 +44,7 @@ def load_machined(
     """Read the surface to be ground.
 
     Args:
-        path: A NURBS file, a mesh, or a STEP or IGES file, told by the end of its name.
+        path: A NURBS file, a mesh, or a STEP or IGES file, recognised by its suffix.
         ids: Faces to be ground, counted from 1 as `opl faces` lists them; None for all. In a mesh
             they are regions between creases.
         reversed_normal: Whether the outside is where the file has the inside.

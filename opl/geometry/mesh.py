@@ -105,7 +105,7 @@ def load_mesh(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
 
     Args:
         path: The file.
-        unit: What one unit of the file is; mesh files do not say.
+        unit: What one unit of the file is; mesh files do not state it.
 
     Raises:
         InputError: If the file cannot be read, has no triangles, or if they do not enclose a

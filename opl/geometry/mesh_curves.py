@@ -69,7 +69,7 @@ class MeshCurve:
 
     @property
     def breaks(self) -> Array:
-        """Return no place: triangles do not tell where the curvature of their surface jumps."""
+        """Return no place: triangles do not show where the curvature of their surface jumps."""
         return np.empty(0)
 
     def frames(self, arc_length: Array) -> Array:
@@ -113,8 +113,8 @@ def plane_polylines(
         offset: Distance of the plane from the origin along n in [m].
 
     Returns:
-        For each polyline its nodes as points of edges: both vertices and the fraction of the way
-        between them, shapes (k,). A closed one ends with its first node.
+        For each polyline its nodes as points of edges: both vertices and the fraction of the
+        distance between them, shapes (k,). A closed one ends with its first node.
     """
     heights = mesh.vertices @ plane_normal - offset
     scale = _ON_PLANE * float(np.ptp(mesh.vertices, axis=0).max(initial=0.0))

@@ -45,7 +45,7 @@ def smooth_regions(mesh: TriangleMesh, crease: float) -> np.ndarray:
     graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(areas), len(areas)))
     count, labels = connected_components(graph, directed=False)
     sizes = np.bincount(labels, weights=areas, minlength=count)
-    # equal areas in the order of their first triangle, whatever the last digit says
+    # equal areas in the order of their first triangle, whatever their last digits are
     rank = np.empty(count, dtype=np.int64)
     rank[np.argsort(-np.round(sizes / sizes.max(), 6), kind="stable")] = np.arange(count)
     return np.asarray(rank[labels])

@@ -20,7 +20,7 @@ from opl.geometry.frames import Array
 from opl.geometry.section import CONVERGED, MAX_NEWTON_STEPS, ON_PLANE, Section
 from opl.geometry.surface_grid import SurfaceGrid
 
-# how far beside a knot its two sides are looked at, as a fraction of the way to the next node
+# how far beside a knot its two sides are looked at, as a fraction of the distance to the next node
 _BESIDE = 1e-6
 
 # normals on both sides of a knot that differ by more than this make a kink [rad]
@@ -183,7 +183,7 @@ def _refined(section: Section, uv: Array, tolerance: float) -> SectionCurve:
 def _breaks(section: Section, uv: Array) -> NDArray[np.int64]:
     """Return which inner nodes lie on a knot where the curvature of the curve jumps, shape (b,).
 
-    Every crossing of a knot is a node. A knot tells nothing by itself: that of an exact circle in
+    Every crossing of a knot is a node. A knot alone is no evidence: that of an exact circle in
     several rational pieces is smooth.
     """
     surface = section.surface

@@ -49,7 +49,7 @@ class Ladder:
 
     @property
     def step_rule(self) -> tuple[Array, np.ndarray, float, Array, float]:
-        """What tells small steps from others, in the order in which the inner loops take it."""
+        """What makes a step small enough, in the order in which the inner loops take it."""
         return (
             self.contact_position,
             self.off_wheel,
