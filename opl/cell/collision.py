@@ -13,7 +13,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.robot import forward_kinematics
+from opl.cell.robot import collision_shapes, forward_kinematics
 from opl.cell.workcell import (
     PART,
     SECOND_OPINION,
@@ -39,13 +39,7 @@ class CollisionScene:
     """
 
     def __init__(self, cell: WorkCell) -> None:
-        self._model = pin.buildModelFromUrdf(str(cell.robot.urdf))
-        self._geometry = pin.buildGeomFromUrdf(
-            self._model,
-            str(cell.robot.urdf),
-            pin.GeometryType.COLLISION,
-            package_dirs=[str(cell.robot.urdf.parent)],  # where relative names of meshes start
-        )
+        self._model, self._geometry = collision_shapes(cell.robot)
         for link in self._geometry.geometryObjects:
             if isinstance(link.geometry, coal.BVHModelBase):
                 # as in the replay, which otherwise would refuse what is planned

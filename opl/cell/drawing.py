@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from opl.cell.full_turns import full_turns, principal
 from opl.cell.parallel_axes import ParallelAxesArm
-from opl.cell.robot import Robot
+from opl.cell.robot import Robot, collision_shapes
 from opl.cell.triangle import bend_to
 from opl.geometry.frames import Array, transform
 
@@ -39,13 +39,7 @@ class DrawnArm:
 
 def drawn_arm(robot: Robot) -> DrawnArm:
     """Return what there is to draw of a robot at its zero posture."""
-    model = pin.buildModelFromUrdf(str(robot.urdf))
-    geometry = pin.buildGeomFromUrdf(
-        model,
-        str(robot.urdf),
-        pin.GeometryType.COLLISION,
-        package_dirs=[str(robot.urdf.parent)],
-    )
+    model, geometry = collision_shapes(robot)
     data, shapes = model.createData(), geometry.createData()
     pin.computeJointJacobians(model, data, np.zeros(6))
     pin.updateGeometryPlacements(model, data, geometry, shapes)

@@ -183,6 +183,18 @@ def link_names(robot: Robot) -> tuple[str, ...]:
     )
 
 
+def collision_shapes(robot: Robot) -> tuple[pin.Model, pin.GeometryModel]:
+    """Return the joints of a robot and the shapes they move, new ones at each call."""
+    model = pin.buildModelFromUrdf(str(robot.urdf))
+    shapes = pin.buildGeomFromUrdf(
+        model,
+        str(robot.urdf),
+        pin.GeometryType.COLLISION,
+        package_dirs=[str(robot.urdf.parent)],  # where relative names of meshes start
+    )
+    return model, shapes
+
+
 @cache
 def _model(urdf: Path) -> pin.Model:
     return pin.buildModelFromUrdf(str(urdf))
