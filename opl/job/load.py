@@ -16,7 +16,7 @@ from opl.job.around import Surroundings, check_home, surroundings
 from opl.job.bodies import bodies_in_si, pose_of
 from opl.job.file import JobFile
 from opl.job.search import Method, Search
-from opl.motion.timing import Pace
+from opl.motion.process import ProcessSettings
 from opl.program.settings import ProgramSettings
 
 
@@ -32,7 +32,7 @@ class Job:
         surface: The surface to be ground, in the workpiece frame.
         passes: How the surface is cut.
         search: How the path is sought.
-        pace: Speeds, approach and home.
+        process: Speeds, approach and home.
         program: How the program is written.
     """
 
@@ -43,7 +43,7 @@ class Job:
     surface: MachinedSurface
     passes: Passes
     search: Search
-    pace: Pace
+    process: ProcessSettings
     program: ProgramSettings
 
 
@@ -96,6 +96,6 @@ def load(path: Path, method: str | None = None) -> Job:
         surface=surface,
         passes=file.passes.in_si(path, surface, cell.wheel.radius),
         search=search,
-        pace=file.process.in_si(around.home),
+        process=file.process.in_si(around.home),
         program=file.program.in_si(path, file.name, robot, around.home),
     )

@@ -13,7 +13,7 @@ from opl.cell.robot import Robot
 from opl.documents import Document
 from opl.field.path import Interpolation
 from opl.geometry.frames import Array
-from opl.motion.timing import Pace
+from opl.motion.process import ProcessSettings
 from opl.planning.box_search import OptimalSettings
 from opl.planning.costs import Costs
 from opl.planning.objective import ObjectiveWeights
@@ -144,9 +144,9 @@ class ProcessSection(Document):
         limits = np.deg2rad(self.max_acceleration_deg_s2)
         return replace(robot, max_acceleration=limits, acceleration_assumed=False)
 
-    def in_si(self, home: Array) -> Pace:
+    def in_si(self, home: Array) -> ProcessSettings:
         """Return the section's values; home in [rad], shape (6,)."""
-        return Pace(
+        return ProcessSettings(
             feed=self.feed_mm_s * MM,
             approach_length=self.approach_mm * MM,
             approach_turn=float(np.deg2rad(self.approach_turn_deg)),

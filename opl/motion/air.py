@@ -18,7 +18,7 @@ from opl.geometry.toolpath import CutterPoints
 from opl.motion.leads import lead_offsets
 from opl.motion.links import Links, NoLinkError
 from opl.motion.motion import FREE_MOVES, Motion, Stretch
-from opl.motion.timing import Pace
+from opl.motion.process import ProcessSettings
 
 
 class UnreachableApproachError(Exception):
@@ -49,19 +49,21 @@ class BlockedLinkError(Exception):
         self.error = error
 
 
-def whole_motion(cell: WorkCell, points: CutterPoints, path: GrindingPath, pace: Pace) -> Motion:
+def whole_motion(
+    cell: WorkCell, points: CutterPoints, path: GrindingPath, process: ProcessSettings
+) -> Motion:
     """Join the passes of a path into one motion from home to home, its times still unknown.
 
     Args:
         cell: The cell.
         points: The cutter points of the path.
         path: The path on the wheel.
-        pace: Speeds, approach and home.
+        process: Speeds, approach and home.
 
     Raises:
         UnreachableApproachError: If an approach or retract leaves reach or limits.
     """
-    legs = [_Leg(pace.home[None], Stretch.HOME, pass_index=-1)]
+    legs = [_Leg(process.home[None], Stretch.HOME, pass_index=-1)]
     for index in range(int(points.pass_index[-1]) + 1):
         on_pass = np.flatnonzero(path.pass_index == index)
         first, last = int(on_pass[0]), int(on_pass[-1])
@@ -69,7 +71,7 @@ def whole_motion(cell: WorkCell, points: CutterPoints, path: GrindingPath, pace:
             lead(
                 cell,
                 points,
-                pace,
+                process,
                 stretch,
                 path.branch,
                 int(path.cutter_point[k]),
@@ -92,7 +94,7 @@ def whole_motion(cell: WorkCell, points: CutterPoints, path: GrindingPath, pace:
             )
         )
         legs.append(_Leg(lead_out, Stretch.RETRACT, index))
-    legs.append(_Leg(pace.home[None], Stretch.HOME, pass_index=-1))
+    legs.append(_Leg(process.home[None], Stretch.HOME, pass_index=-1))
 
     q = np.concatenate([leg.q for leg in legs])
     place = np.concatenate([leg.cutter_point for leg in legs])
@@ -167,7 +169,7 @@ class _Leg:
 def lead(
     cell: WorkCell,
     points: CutterPoints,
-    pace: Pace,
+    process: ProcessSettings,
     stretch: Stretch,
     branch: int,
     column: int,
@@ -179,7 +181,7 @@ def lead(
     Args:
         cell: The cell.
         points: The cutter points.
-        pace: How long it is, and how far it turns.
+        process: How long it is, and how far it turns.
         stretch: Whether it is the approach or the retract.
         branch: Slot of the inverse kinematics.
         column: The cutter point that is ground.
@@ -189,7 +191,7 @@ def lead(
     Raises:
         UnreachableApproachError: If it leaves reach or limits.
     """
-    offsets = lead_offsets(pace.approach_length, pace.approach_turn, stretch)
+    offsets = lead_offsets(process.approach_length, process.approach_turn, stretch)
     T_contact_away = np.tile(np.eye(4), (len(offsets), 1, 1))
     T_contact_away[:, :3, 3] = offsets
     T_base_contact = cell.wheel.T_base_contact(contact_position)

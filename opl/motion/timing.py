@@ -21,6 +21,7 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.leads import lead_count
 from opl.motion.motion import Motion, Stretch
+from opl.motion.process import ProcessSettings
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, TimeLaw, fastest_law
 
@@ -36,33 +37,6 @@ class Cause(str, Enum):
     PIVOTING = "pivoting"  # the contact moves over the wheel, which has a speed limit of its own
     SPEED = "speed"  # a joint turns at its top speed
     ACCELERATION = "acceleration"  # a joint speeds up or slows down as fast as it can
-
-
-@dataclass(frozen=True)
-class Pace:
-    """How fast, and how far off the wheel.
-
-    Attributes:
-        feed: Speed of the ground point along the surface in [m/s].
-        approach_length: Length of approach and retract in [m].
-        approach_turn: What their direction turns by in [rad]; 0 for straight along the contact
-            normal.
-        approach_speed: Speed of both in [m/s].
-        contact_speed: Largest speed of the contact position on the wheel in belt units per second:
-            pivoting takes time even where the ground point hardly moves.
-        max_dwell: Longest that the belt may stay on one spot beyond the time at the feed in [s].
-        air_speed: Fraction of each joint's largest speed used for free moves, 0 to 1.
-        home: Joint positions at the start and the end in [rad], shape (6,).
-    """
-
-    feed: float
-    approach_length: float
-    approach_turn: float
-    approach_speed: float
-    contact_speed: float
-    max_dwell: float
-    air_speed: float
-    home: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +57,14 @@ class Timing:
     joint: NDArray[np.int64]
 
 
-def timed(motion: Motion, points: CutterPoints, pace: Pace, robot: Robot) -> Motion:
+def timed(motion: Motion, points: CutterPoints, process: ProcessSettings, robot: Robot) -> Motion:
     """Return a motion with the time of every move; arguments as of `time_motion`."""
-    return time_motion(motion, points, pace, robot).motion
+    return time_motion(motion, points, process, robot).motion
 
 
-def time_motion(motion: Motion, points: CutterPoints, pace: Pace, robot: Robot) -> Timing:
+def time_motion(
+    motion: Motion, points: CutterPoints, process: ProcessSettings, robot: Robot
+) -> Timing:
     """Return how long the moves of a motion take, and why.
 
     The ground point passes along the surface at the feed, or slower where the contact position
@@ -99,7 +75,7 @@ def time_motion(motion: Motion, points: CutterPoints, pace: Pace, robot: Robot) 
     Args:
         motion: The motion; its durations are not looked at.
         points: Its cutter points.
-        pace: The speeds.
+        process: The speeds.
         robot: Whose motion.
 
     Raises:
@@ -111,12 +87,12 @@ def time_motion(motion: Motion, points: CutterPoints, pace: Pace, robot: Robot) 
     arc = np.interp(motion.cutter_point, np.arange(len(points)), points.arc_length)
     on_wheel = np.array([kind == _WHEEL for kind, _ in kinds])
     way = np.where(on_wheel, np.abs(np.diff(arc, prepend=np.nan)), np.nan)
-    over_wheel = np.abs(np.diff(motion.contact_position, prepend=np.nan)) / pace.contact_speed
-    count = lead_count(pace.approach_length, pace.approach_turn)
-    lead = pace.approach_length / count / pace.approach_speed
+    over_wheel = np.abs(np.diff(motion.contact_position, prepend=np.nan)) / process.contact_speed
+    count = lead_count(process.approach_length, process.approach_turn)
+    lead = process.approach_length / count / process.approach_speed
     air = np.array([kind == _AIR for kind, _ in kinds])
-    wanted = np.where(air, fastest / pace.air_speed, lead)
-    wanted[on_wheel] = np.maximum(way / pace.feed, over_wheel)[on_wheel]
+    wanted = np.where(air, fastest / process.air_speed, lead)
+    wanted[on_wheel] = np.maximum(way / process.feed, over_wheel)[on_wheel]
 
     duration = np.maximum(wanted, fastest)
     duration[0] = 0.0
@@ -136,7 +112,7 @@ def time_motion(motion: Motion, points: CutterPoints, pace: Pace, robot: Robot) 
         duration[kept] = np.maximum(needed, duration[kept])
     cause = [Cause.NONE] * len(motion)
     for move in np.flatnonzero(on_wheel):
-        if duration[move] * pace.feed > FOLLOWED * way[move]:
+        if duration[move] * process.feed > FOLLOWED * way[move]:
             slow = Cause.ACCELERATION if by_acceleration[move] else Cause.SPEED
             cause[move] = Cause.PIVOTING if joint[move] < 0 else slow
     return Timing(replace(motion, duration=duration), way, tuple(cause), joint)

@@ -98,7 +98,7 @@ def _away(
         return lead(
             problem.cell,
             problem.points,
-            problem.pace,
+            problem.process,
             stretch,
             branch.nodes.branch,
             column,

@@ -114,7 +114,7 @@ def try_recursive(problem: GrindingProblem, start: Start, most_checks: int) -> P
 def _tracks(problem: GrindingProblem, branches: list[Branch], start: Start) -> Iterator[Track]:
     """Yield tracks in the order in which the search wants them checked."""
     if start is Start.NEAREST:
-        yield from tracks_from_nearest_start(branches, problem.pace.home)
+        yield from tracks_from_nearest_start(branches, problem.process.home)
         return
     robot = problem.cell.robot
     for track in tracks_from_best_start(branches):
@@ -149,7 +149,7 @@ def check_track(
         branch.block_step(error.column, rows, error.cause)
         return None
     try:
-        motion = whole_motion(problem.cell, problem.points, path, problem.pace)
+        motion = whole_motion(problem.cell, problem.points, path, problem.process)
     except UnreachableApproachError as error:
         branch.block_node(error.column, int(rows[error.column]), f"approach: {error.cause}")
         return None

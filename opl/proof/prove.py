@@ -80,8 +80,8 @@ def prove(
     rule = Rule(
         search.max_contact_error,
         search.interpolation.max_contact_step,
-        job.pace.approach_length,
-        job.pace.approach_turn,
+        job.process.approach_length,
+        job.process.approach_turn,
     )
     found = recognise(job.cell, points, playback.q, playback.duration, playback.stations, rule)
     replayed = replay(job.cell, points, found.motion, search.max_contact_error, progress)

@@ -37,7 +37,7 @@ def written_findings(
         motion: The written postures with their labels and written times; one for each visit.
         playback: The moves they are from.
     """
-    asked = timed(motion, points, job.pace, job.cell.robot)
+    asked = timed(motion, points, job.process, job.cell.robot)
     return [
         *_first_moves(playback),
         *_fast_moves(motion, asked, playback),
@@ -101,7 +101,7 @@ def _rounded_ends(job: Job, motion: Motion, playback: Playback) -> Iterator[Find
 def _ends_away_from_home(job: Job, motion: Motion) -> Iterator[Finding]:
     names = job.cell.robot.joint_names
     for posture, place in ((0, "way from home"), (len(motion) - 1, "way home")):
-        away: Array = np.abs(motion.q[posture] - job.pace.home)
+        away: Array = np.abs(motion.q[posture] - job.process.home)
         if away.max() > HOME_SLACK:
             joint = int(away.argmax())
             told = f"{np.rad2deg(away[joint]):.3f} deg from home"

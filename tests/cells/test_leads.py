@@ -152,8 +152,8 @@ def test_a_turn_out_of_range_is_refused_by_key(tmp_path, turn):
 
 
 def test_a_job_that_does_not_say_leads_straight(tmp_path):
-    pace = load(write_job(tmp_path)).pace
-    assert pace.approach_turn == 0.0
-    said = load(write_job(tmp_path, {"process.approach_turn_deg": 0})).pace
-    np.testing.assert_array_equal(said.home, pace.home)
-    assert replace(said, home=None) == replace(pace, home=None)
+    process = load(write_job(tmp_path)).process
+    assert process.approach_turn == 0.0
+    said = load(write_job(tmp_path, {"process.approach_turn_deg": 0})).process
+    np.testing.assert_array_equal(said.home, process.home)
+    assert replace(said, home=None) == replace(process, home=None)

@@ -113,7 +113,7 @@ def test_a_step_and_an_approach_beyond_a_limit_are_refused_by_name():
         problem.cell, limits=(JointLimit("U only", np.eye(6)[2], lead[2] + 1e-3, EVERYWHERE),)
     )
     with pytest.raises(UnreachableApproachError) as refused:
-        whole_motion(cell, problem.points, path, problem.pace)
+        whole_motion(cell, problem.points, path, problem.process)
     assert refused.value.cause == "limits of U only"
 
     nodes = next(n for n in problem.field.branches if n.branch == path.branch)

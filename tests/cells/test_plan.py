@@ -89,7 +89,7 @@ def test_the_best_start_is_no_worse_than_the_nearest():
 def test_the_nearest_start_is_the_node_nearest_to_home():
     problem = small_problem()
     path = plan_recursive(problem, Start.NEAREST).path
-    home = problem.pace.home
+    home = problem.process.home
     nearest = np.inf
     for nodes in problem.field.branches:
         q = nodes.q[0][problem.free_nodes(nodes)[0]]
@@ -118,7 +118,7 @@ def by_printed_recursion(problem):
 
     Every step is filled in and asked about on its own, when the recursion comes to it.
     """
-    home = problem.pace.home
+    home = problem.process.home
     fields = [(nodes, problem.free_nodes(nodes)) for nodes in problem.field.branches]
     starts = sorted(
         (np.linalg.norm(nodes.q[0, row] - home), index, row)
@@ -201,7 +201,7 @@ def test_a_wall_at_the_wheel_is_named_with_the_points_it_shuts():
 
 def test_a_way_that_only_ends_in_a_collision_is_named():
     problem = one_row_problem()
-    home = problem.pace.home
+    home = problem.process.home
     ghosts = Ghosts(home + np.array([0.0, 0.01, 0.0, 0.0, 0.0, 0.0]), radius=0.02)
     # home itself is in it, so is every way from and to home
     with pytest.raises(NoPathError, match=r"R_link and ghost"):
@@ -335,7 +335,7 @@ MOTIONS = pytest.mark.parametrize(
 
 @MOTIONS
 def test_a_motion_starts_and_ends_at_home(problem, motion):
-    np.testing.assert_array_equal(motion().q[[0, -1]], np.array([problem().pace.home] * 2))
+    np.testing.assert_array_equal(motion().q[[0, -1]], np.array([problem().process.home] * 2))
     assert motion().stretch[0] is motion().stretch[-1] is Stretch.HOME
 
 
@@ -376,7 +376,7 @@ def test_approach_and_retract_run_along_the_contact_normal(problem, motion):
             np.testing.assert_allclose(away - np.outer(away @ into, into), 0.0, atol=1e-9)
             np.testing.assert_allclose(Ts[:, :3, :3], Ts[[-1] * len(Ts), :3, :3], atol=1e-9)
             distance = (away @ into)[:-1]
-            assert distance.max() == pytest.approx(problem().pace.approach_length)
+            assert distance.max() == pytest.approx(problem().process.approach_length)
             steps = np.diff(away @ into)
             assert (steps[:-1] * (-1 if kind == "approach" else 1) > 0.0).all()
 
@@ -401,10 +401,10 @@ def test_no_joint_is_asked_for_more_than_its_speed(problem, motion):
 
 @MOTIONS
 def test_the_feed_is_kept_on_the_wheel_unless_a_joint_could_not_follow(problem, motion):
-    pace, points = problem().pace, problem().points
+    process, points = problem().process, problem().points
     # what slow acceleration does to the feed is told in test_timing.py
     robot = replace(problem().cell.robot, max_acceleration=np.full(6, 1e6))
-    motion = timed(motion(), points, pace, robot)
+    motion = timed(motion(), points, process, robot)
     fastest = robot.max_speed
     arc_length = problem().points.arc_length
     arc = np.interp(motion.cutter_point, np.arange(len(arc_length)), arc_length)
@@ -412,10 +412,10 @@ def test_the_feed_is_kept_on_the_wheel_unless_a_joint_could_not_follow(problem, 
     for k in range(1, len(motion)):
         on_wheel = not np.isnan(motion.cutter_point[[k - 1, k]]).any()
         if on_wheel:
-            needed = abs(arc[k] - arc[k - 1]) / pace.feed
+            needed = abs(arc[k] - arc[k - 1]) / process.feed
             least = (np.abs(motion.q[k] - motion.q[k - 1]) / fastest).max()
             t = motion.contact_position
-            over_wheel = abs(t[k] - t[k - 1]) / pace.contact_speed
+            over_wheel = abs(t[k] - t[k - 1]) / process.contact_speed
             assert motion.duration[k] == pytest.approx(max(needed, least, over_wheel))
             checked += 1
     assert checked > 100
@@ -423,28 +423,28 @@ def test_the_feed_is_kept_on_the_wheel_unless_a_joint_could_not_follow(problem, 
 
 @MOTIONS
 def test_free_moves_run_at_their_share_of_the_joint_speeds(problem, motion):
-    motion, pace = motion(), problem().pace
+    motion, process = motion(), problem().process
     for k, stretch in enumerate(motion.stretch):
         if k and stretch in (Stretch.HOME, Stretch.LINK):
             speed = np.abs(motion.q[k] - motion.q[k - 1]) / motion.duration[k]
             share = (speed / problem().cell.robot.max_speed).max()
-            assert share == pytest.approx(pace.air_speed)
+            assert share == pytest.approx(process.air_speed)
 
 
 @MOTIONS
 def test_leads_run_at_the_approach_speed(problem, motion):
-    motion, pace = motion(), problem().pace
+    motion, process = motion(), problem().process
     Ts = forward_kinematics(problem().cell.robot, motion.q)
     for k, stretch in enumerate(motion.stretch):
         if stretch in (Stretch.APPROACH, Stretch.RETRACT):
             way = np.linalg.norm(Ts[k, :3, 3] - Ts[k - 1, :3, 3])
-            assert way / motion.duration[k] == pytest.approx(pace.approach_speed, rel=1e-6)
+            assert way / motion.duration[k] == pytest.approx(process.approach_speed, rel=1e-6)
 
 
 def test_a_slow_robot_takes_the_time_it_needs():
     problem, plan = small_problem(), small_plan()
     robot = replace(problem.cell.robot, max_speed=np.full(6, 0.01))
-    slow = timed(plan.motion, problem.points, problem.pace, robot)
+    slow = timed(plan.motion, problem.points, problem.process, robot)
     speed = np.abs(np.diff(slow.q, axis=0)) / slow.duration[1:, None]
     assert speed.max() == pytest.approx(0.01)
 
@@ -459,15 +459,15 @@ def test_a_retract_beyond_a_limit_is_refused():
     lower[joint] = last[joint] + 1e-6
     cell = replace(problem.cell, robot=replace(robot, lower=lower))
     with pytest.raises(UnreachableApproachError) as caught:
-        whole_motion(cell, problem.points, plan.path, problem.pace)
+        whole_motion(cell, problem.points, plan.path, problem.process)
     assert caught.value.cause == "limits of U"
 
 
 def test_an_approach_from_out_of_reach_is_refused():
     problem, plan = small_problem(), small_plan()
-    pace = replace(problem.pace, approach_length=5.0)
+    process = replace(problem.process, approach_length=5.0)
     with pytest.raises(UnreachableApproachError, match="approach to cutter point 0: reach"):
-        whole_motion(problem.cell, problem.points, plan.path, pace)
+        whole_motion(problem.cell, problem.points, plan.path, process)
 
 
 # motions as values

@@ -22,7 +22,10 @@ from opl.verification.ways import Ways
 from tests.support.planned import small_job, small_motion, small_problem, tiny_motion, tiny_problem
 
 RULE = Rule(
-    1e-4, small_job().search.interpolation.max_contact_step, small_job().pace.approach_length, 0.0
+    1e-4,
+    small_job().search.interpolation.max_contact_step,
+    small_job().process.approach_length,
+    0.0,
 )
 
 

@@ -37,7 +37,7 @@ def timing_of(name, share):
     problem, plan = {"v": (v_problem, v_plan), "s": (s_problem, s_plan)}[name]
     robot = problem().cell.robot
     robot = replace(robot, max_acceleration=share * robot.max_acceleration)
-    return time_motion(plan().motion, problem().points, problem().pace, robot), problem(), robot
+    return time_motion(plan().motion, problem().points, problem().process, robot), problem(), robot
 
 
 PARTS = pytest.mark.parametrize("name", ["v", "s"])
@@ -93,9 +93,9 @@ def test_mean_accelerations_between_moves_are_those_of_the_joints(name, share):
 @SHARES
 def test_the_feed_is_kept_but_where_the_report_says(name, share):
     timing, problem, _ = timing_of(name, share)
-    motion, feed = timing.motion, problem.pace.feed
+    motion, feed = timing.motion, problem.process.feed
     ways = ways_on_wheel(motion, problem.points)
-    slow = slow_stretches(timing, problem.pace)
+    slow = slow_stretches(timing, problem.process)
     reported = np.zeros(len(motion), dtype=bool)
     for one in slow:
         inside = (motion.cutter_point > one.start) & (motion.cutter_point <= one.end)
@@ -118,8 +118,8 @@ def test_the_feed_is_kept_but_where_the_report_says(name, share):
 def test_hard_limits_lower_the_feed_at_more_places_and_name_the_joints(name):
     usual, problem, _ = timing_of(name, 1.0)
     hard, _, robot = timing_of(name, HARD)
-    pace = problem.pace
-    few, many = slow_stretches(usual, pace), slow_stretches(hard, pace)
+    process = problem.process
+    few, many = slow_stretches(usual, process), slow_stretches(hard, process)
     assert len(many) > len(few)
     assert hard.motion.duration.sum() > usual.motion.duration.sum() * 1.05
     blamed = [share for one in many for share in one.shares if share.cause is Cause.ACCELERATION]
@@ -129,7 +129,7 @@ def test_hard_limits_lower_the_feed_at_more_places_and_name_the_joints(name):
 
 def test_without_slow_joints_only_pivoting_lowers_the_feed():
     timing, problem, _ = timing_of("v", 1e6)
-    slow = slow_stretches(timing, problem.pace)
+    slow = slow_stretches(timing, problem.process)
     assert len(slow) >= problem.points.n_passes
     for one in slow:
         assert [(share.cause, share.joint) for share in one.shares] == [(Cause.PIVOTING, None)]
@@ -143,7 +143,7 @@ def standing_contact(times_on_point, feed=0.02):
     problem = v_problem()
     n = 41
     place = np.concatenate([[0.0], np.ones(n), [2.0]])
-    t = np.concatenate([[0.0], np.linspace(0.0, times_on_point * problem.pace.contact_speed, n)])
+    t = np.concatenate([[0.0], np.linspace(0.0, times_on_point * problem.process.contact_speed, n)])
     t = np.append(t, t[-1])
     q = np.zeros((n + 2, 6))
     q[:, 0] = place * 0.01
@@ -167,8 +167,8 @@ def points_10_mm_apart():
 def test_a_contact_that_pivots_on_one_point_dwells_there_as_long_as_it_takes():
     problem, motion = standing_contact(times_on_point=1.5)
     robot = replace(problem.cell.robot, max_acceleration=np.full(6, 1e6))
-    timing = time_motion(motion, points_10_mm_apart(), problem.pace, robot)
-    (one,) = slow_stretches(timing, problem.pace)
+    timing = time_motion(motion, points_10_mm_apart(), problem.process, robot)
+    (one,) = slow_stretches(timing, problem.process)
     assert one.dwell == pytest.approx(1.5)
     assert (one.start, one.end, one.dwell_at, one.slowest) == (1.0, 1.0, 1.0, 0.0)
     assert one.shares[0].cause is Cause.PIVOTING
@@ -179,9 +179,9 @@ def test_a_contact_that_pivots_on_one_point_dwells_there_as_long_as_it_takes():
 def test_a_dwell_longer_than_allowed_is_refused_with_place_and_time(allowed, refused):
     problem, motion = standing_contact(times_on_point=1.5)
     robot = replace(problem.cell.robot, max_acceleration=np.full(6, 1e6))
-    pace = replace(problem.pace, max_dwell=allowed)
-    slow = slow_stretches(time_motion(motion, points_10_mm_apart(), pace, robot), pace)
-    refusal = dwell_refusal(slow, pace)
+    process = replace(problem.process, max_dwell=allowed)
+    slow = slow_stretches(time_motion(motion, points_10_mm_apart(), process, robot), process)
+    refusal = dwell_refusal(slow, process)
     assert (refusal is not None) == refused
     if refusal is not None:
         assert "1.49 s" in refusal.message and "process.max_dwell_s" in refusal.message
@@ -193,8 +193,8 @@ def test_a_joint_at_its_top_speed_is_blamed_for_it():
     speed = problem.cell.robot.max_speed.copy()
     speed[0] = 0.01  # 0.02 rad/s would be needed
     robot = replace(problem.cell.robot, max_speed=speed, max_acceleration=np.full(6, 1e6))
-    timing = time_motion(motion, points_10_mm_apart(), problem.pace, robot)
-    slow = slow_stretches(timing, problem.pace)
+    timing = time_motion(motion, points_10_mm_apart(), problem.process, robot)
+    slow = slow_stretches(timing, problem.process)
     assert {(s.cause, s.joint) for one in slow for s in one.shares} >= {(Cause.SPEED, 0)}
     assert timing.motion.duration[[1, -1]] == pytest.approx(1.0, rel=1e-3)  # 10 mm at 10 mm/s
 

@@ -57,7 +57,7 @@ def problem_of(job, points_of=None):
         build_nodes(job.cell, points, positions),
         wheel_layer(job.cell, part, points, positions),
         job.search.interpolation,
-        job.pace,
+        job.process,
     )
 
 
@@ -85,13 +85,13 @@ def small_plan():
 def small_motion():
     """Return a free and timed motion over the two rows."""
     problem = small_problem()
-    return timed(small_plan().motion, problem.points, problem.pace, problem.cell.robot)
+    return timed(small_plan().motion, problem.points, problem.process, problem.cell.robot)
 
 
 @cache
 def v_motion():
     problem = v_problem()
-    return timed(v_plan().motion, problem.points, problem.pace, problem.cell.robot)
+    return timed(v_plan().motion, problem.points, problem.process, problem.cell.robot)
 
 
 @cache
@@ -100,14 +100,14 @@ def tiny_problem():
     problem = problem_of(with_positions(small_job(), 30), points_of=slice(50, 70))
     on_the_way = plan_recursive(problem).motion.q[1]  # where the first approach begins
     home = on_the_way + np.array([0.3, -0.2, 0.0, 0.2, 0.1, 0.2])
-    return replace(problem, pace=replace(problem.pace, home=home))
+    return replace(problem, process=replace(problem.process, home=home))
 
 
 @cache
 def tiny_motion():
     problem = tiny_problem()
     motion = plan_recursive(problem).motion
-    return timed(motion, problem.points, problem.pace, problem.cell.robot)
+    return timed(motion, problem.points, problem.process, problem.cell.robot)
 
 
 def replay_tiny(motion=None, cell=None):
