@@ -77,7 +77,7 @@ def run(job: Job, progress: Progress = lambda stage, fraction: None) -> Outcome:
         return outcome
     with clock("verification"):
         outcome.verification = verification = replay(
-            job.cell, points, timing.motion, job.search.max_contact_error, clock.share
+            job.cell, points, timing.timed, job.search.max_contact_error, clock.share
         )
     if verification.verified is None:
         outcome.status = "unsafe"

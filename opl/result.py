@@ -236,7 +236,7 @@ def _program(outcome: Outcome) -> dict[str, Any] | None:
         "files": list(outcome.files),
         "sha256": {name: digest(text.encode()) for name, text in outcome.files.items()},
         "moves": len(outcome.program.moves),
-        "duration_s": round(float(verified.motion.duration.sum()), 3),
+        "duration_s": round(verified.timed.seconds, 3),
         "passes": [
             {"wanted_s": round(time.wanted, 3), "written_s": round(time.written, 3)}
             for time in outcome.program.pass_times

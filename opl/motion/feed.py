@@ -71,7 +71,7 @@ def slow_stretches(timing: Timing, process: ProcessSettings) -> tuple[SlowStretc
         process: What is asked for.
     """
     slow = np.array([cause is not Cause.NONE for cause in timing.cause])
-    index = timing.motion.pass_index
+    index = timing.timed.motion.pass_index
     return tuple(_stretch(timing, process, moves) for moves in _runs(slow, index))
 
 
@@ -101,9 +101,9 @@ def _runs(wanted: np.ndarray, index: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _stretch(timing: Timing, process: ProcessSettings, moves: np.ndarray) -> SlowStretch:
-    motion = timing.motion
-    speed = timing.way / np.maximum(motion.duration, 1e-12)
-    longer = motion.duration - timing.way / process.feed
+    motion, duration = timing.timed.motion, timing.timed.duration
+    speed = timing.surface_distance / np.maximum(duration, 1e-12)
+    longer = duration - timing.surface_distance / process.feed
     shares: dict[tuple[Cause, int], float] = {}
     for move in moves:
         key = (timing.cause[move], int(timing.joint[move]))

@@ -50,7 +50,7 @@ def figures_of_path(
         robot: Whose path.
     """
     timing = time_motion(motion, points, process, robot)
-    seconds = timing.motion.duration[~np.isnan(timing.way)].sum()
+    seconds = timing.timed.duration[motion.grinding].sum()
     return Figures(path.joint_ranges, path.joint_travel, path.contact_travel, float(seconds))
 
 

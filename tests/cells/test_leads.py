@@ -13,11 +13,11 @@ from opl import pipeline
 from opl.geometry.frames import transform
 from opl.job.load import load
 from opl.motion.leads import LEAD_SPACING, LEAD_TURN, lead_count, lead_offsets
-from opl.motion.motion import Stretch
+from opl.motion.motion import MoveKind
 from tests.support.jobs import opl, write_job
 from tests.support.planned import small_job
 
-SIDES = {Stretch.APPROACH: -1.0, Stretch.RETRACT: 1.0}
+SIDES = {MoveKind.APPROACH: -1.0, MoveKind.RETRACT: 1.0}
 LENGTHS = st.floats(0.002, 0.3)
 TURNS = st.floats(np.deg2rad(0.5), np.deg2rad(90.0))
 STRETCHES = st.sampled_from(list(SIDES))

@@ -9,7 +9,7 @@ import pytest
 
 from opl.job.load import load
 from opl.motion.feed import HARDLY_MOVES, dwell_refusal, slow_stretches
-from opl.motion.motion import Motion, Stretch
+from opl.motion.motion import Motion, MoveKind
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, fastest_law
 from opl.motion.timing import Cause, time_motion
@@ -59,19 +59,20 @@ def ways_on_wheel(motion, points):
 @SHARES
 def test_the_passes_keep_joint_speeds_and_accelerations_seen_from_outside(name, share):
     timing, problem, robot = timing_of(name, share)
-    motion, limits = timing.motion, JointLimits(robot.max_speed, robot.max_acceleration)
+    motion, limits = timing.timed.motion, JointLimits(robot.max_speed, robot.max_acceleration)
     ways = ways_on_wheel(motion, problem.points)
     step, seen = 1e-3, 0
     for index in range(problem.points.n_passes):
         moves = np.flatnonzero(~np.isnan(ways) & (motion.pass_index == index))
         q = motion.q[np.concatenate([moves[:1] - 1, moves])]
-        law = fastest_law(rounded_line(q, motion.duration[moves]), limits, at_rest=True)
+        law = fastest_law(rounded_line(q, timing.timed.duration[moves]), limits, at_rest=True)
         samples = law.postures(np.arange(0.0, law.time[-1], step))
         assert (np.abs(np.diff(samples, axis=0)) / step / robot.max_speed).max() <= 1.001
         second = samples[2:] - 2.0 * samples[1:-1] + samples[:-2]
         assert (np.abs(second) / step**2 / robot.max_acceleration).max() <= 1.001
         # with the ramps at its ends, and every move at one speed, a pass takes little longer
-        assert 1.0 < law.time[-1] / motion.duration[moves].sum() < (1.02 if share == 1.0 else 1.15)
+        longer = law.time[-1] / timing.timed.duration[moves].sum()
+        assert 1.0 < longer < (1.02 if share == 1.0 else 1.15)
         seen += len(samples)
     assert seen > 10_000
 
@@ -81,10 +82,10 @@ def test_the_passes_keep_joint_speeds_and_accelerations_seen_from_outside(name, 
 def test_mean_accelerations_between_moves_are_those_of_the_joints(name, share):
     # no model of the corners: speeds of the straight moves, and the time between their middles
     timing, problem, robot = timing_of(name, share)
-    motion = timing.motion
+    motion = timing.timed.motion
     on_pass = ~np.isnan(ways_on_wheel(motion, problem.points))
-    speed = np.diff(motion.q, axis=0) / motion.duration[1:, None]
-    between = (motion.duration[1:-1] + motion.duration[2:]) / 2.0
+    speed = np.diff(motion.q, axis=0) / timing.timed.duration[1:, None]
+    between = (timing.timed.duration[1:-1] + timing.timed.duration[2:]) / 2.0
     mean = np.abs(np.diff(speed, axis=0)) / between[:, None] / robot.max_acceleration
     assert mean[on_pass[1:-1] & on_pass[2:]].max() < 1.5
 
@@ -93,7 +94,7 @@ def test_mean_accelerations_between_moves_are_those_of_the_joints(name, share):
 @SHARES
 def test_the_feed_is_kept_but_where_the_report_says(name, share):
     timing, problem, _ = timing_of(name, share)
-    motion, feed = timing.motion, problem.process.feed
+    motion, feed = timing.timed.motion, problem.process.feed
     ways = ways_on_wheel(motion, problem.points)
     slow = slow_stretches(timing, problem.process)
     reported = np.zeros(len(motion), dtype=bool)
@@ -101,12 +102,12 @@ def test_the_feed_is_kept_but_where_the_report_says(name, share):
         inside = (motion.cutter_point > one.start) & (motion.cutter_point <= one.end)
         reported |= inside & (motion.pass_index == one.pass_index)
     on_pass = ~np.isnan(ways)
-    speed = np.divide(ways, motion.duration, out=np.full(len(ways), np.nan), where=on_pass)
+    speed = np.divide(ways, timing.timed.duration, out=np.full(len(ways), np.nan), where=on_pass)
     kept = on_pass & ~reported
     assert kept.sum() > 100
     assert (speed[kept] >= feed / 1.01 - 1e-12).all() and (speed[on_pass] <= feed + 1e-12).all()
     assert (speed[on_pass & reported] < feed / 1.01).all()
-    longer = motion.duration[reported].sum() - ways[reported].sum() / feed
+    longer = timing.timed.duration[reported].sum() - ways[reported].sum() / feed
     assert sum(one.longer for one in slow) == pytest.approx(longer)
     for one in slow:
         inside = reported & (motion.cutter_point > one.start) & (motion.cutter_point <= one.end)
@@ -121,7 +122,7 @@ def test_hard_limits_lower_the_feed_at_more_places_and_name_the_joints(name):
     process = problem.process
     few, many = slow_stretches(usual, process), slow_stretches(hard, process)
     assert len(many) > len(few)
-    assert hard.motion.duration.sum() > usual.motion.duration.sum() * 1.05
+    assert hard.timed.seconds > usual.timed.seconds * 1.05
     blamed = [share for one in many for share in one.shares if share.cause is Cause.ACCELERATION]
     assert {robot.joint_names[share.joint] for share in blamed} >= {"R"}
     assert sum(share.longer for share in blamed) > 1.0
@@ -149,13 +150,7 @@ def standing_contact(times_on_point, feed=0.02):
     q[:, 0] = place * 0.01
     q[:, 3] = t * 1e-3
     return problem, Motion(
-        q,
-        np.zeros(n + 2),
-        (Stretch.GRIND,) * (n + 2),
-        t,
-        place,
-        np.zeros(n + 2, dtype=np.int64),
-        np.full(n + 2, np.nan),
+        q, (MoveKind.GRIND,) * (n + 2), t, place, np.zeros(n + 2, dtype=np.int64)
     )
 
 
@@ -196,7 +191,7 @@ def test_a_joint_at_its_top_speed_is_blamed_for_it():
     timing = time_motion(motion, points_10_mm_apart(), problem.process, robot)
     slow = slow_stretches(timing, problem.process)
     assert {(s.cause, s.joint) for one in slow for s in one.shares} >= {(Cause.SPEED, 0)}
-    assert timing.motion.duration[[1, -1]] == pytest.approx(1.0, rel=1e-3)  # 10 mm at 10 mm/s
+    assert timing.timed.duration[[1, -1]] == pytest.approx(1.0, rel=1e-3)  # 10 mm at 10 mm/s
 
 
 # from the command line

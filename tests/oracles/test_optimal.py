@@ -12,7 +12,6 @@ from scipy.sparse.csgraph import dijkstra
 from opl.cell.robot import forward_kinematics
 from opl.motion.check import RESOLUTION, densify
 from opl.motion.figures import figures_of_path
-from opl.motion.timing import timed
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import roughness
 from opl.planning.finer_bound import finer_bound
@@ -29,7 +28,7 @@ from opl.verification.replay import replay
 from tests.support.bare_cells import Ghosts
 from tests.support.fcl_scene import FclScene
 from tests.support.jobs import opl, write_job
-from tests.support.planned import problem_of, small_job, v_job, with_positions
+from tests.support.planned import problem_of, small_job, timed, v_job, with_positions
 
 SETTINGS = v_job().search.optimal
 ONLY_TRAVEL = replace(
@@ -149,9 +148,8 @@ def test_the_motion_is_free_in_two_other_scenes():
     scene = FclScene(problem.cell)
     dense, _ = densify(plan.motion.q, RESOLUTION)
     assert all(min(scene.clearances(q).values(), default=1.0) > 0.0 for q in dense[::4])
-    motion = timed(plan.motion, problem.points, problem.process, problem.cell.robot)
     allowed = small_job().search.max_contact_error
-    verification = replay(problem.cell, problem.points, motion, allowed)
+    verification = replay(problem.cell, problem.points, timed(problem, plan.motion), allowed)
     assert verification.verified is not None, verification.findings
 
 

@@ -11,7 +11,7 @@ from opl.field.layer import wheel_layer
 from opl.field.nodes import build_nodes
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import load
-from opl.motion.timing import timed
+from opl.motion.timing import time_motion
 from opl.pipeline import cutter_points
 from opl.planning.plan import plan_recursive
 from opl.planning.problem import GrindingProblem
@@ -81,17 +81,24 @@ def small_plan():
     return plan_recursive(small_problem())
 
 
-@cache
+def timed(problem, motion):
+    """Return a motion with its times."""
+    return time_motion(motion, problem.points, problem.process, problem.cell.robot).timed
+
+
 def small_motion():
-    """Return a free and timed motion over the two rows."""
-    problem = small_problem()
-    return timed(small_plan().motion, problem.points, problem.process, problem.cell.robot)
+    """Return a free motion over the two rows."""
+    return small_plan().motion
 
 
 @cache
-def v_motion():
-    problem = v_problem()
-    return timed(v_plan().motion, problem.points, problem.process, problem.cell.robot)
+def small_timed():
+    return timed(small_problem(), small_motion())
+
+
+@cache
+def v_timed():
+    return timed(v_problem(), v_plan().motion)
 
 
 @cache
@@ -104,16 +111,18 @@ def tiny_problem():
 
 
 @cache
+def tiny_timed():
+    return timed(tiny_problem(), plan_recursive(tiny_problem()).motion)
+
+
 def tiny_motion():
-    problem = tiny_problem()
-    motion = plan_recursive(problem).motion
-    return timed(motion, problem.points, problem.process, problem.cell.robot)
+    return tiny_timed().motion
 
 
-def replay_tiny(motion=None, cell=None):
+def replay_tiny(timed=None, cell=None):
     """Replay the tiny motion, or another one, or in another cell."""
     problem, allowed = tiny_problem(), small_job().search.max_contact_error
-    return replay(cell or problem.cell, problem.points, motion or tiny_motion(), allowed)
+    return replay(cell or problem.cell, problem.points, timed or tiny_timed(), allowed)
 
 
 def with_problem_cell(problem, cell):
