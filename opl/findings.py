@@ -20,7 +20,7 @@ class Finding:
     Attributes:
         level: How bad it is.
         kind: A short fixed word, e.g. ``collision``, ``limit``, ``speed``, ``contact``.
-        where: The place: cutter point, pass, stretch of the motion.
+        where: The place: cutter point, pass, move of the motion.
         message: The bodies or the joint, and the amount.
     """
 

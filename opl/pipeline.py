@@ -69,15 +69,15 @@ def run(job: Job, progress: Progress = lambda stage, fraction: None) -> Outcome:
     with clock("motion"):
         # what is proven is what the digits of the program can say
         told = as_told(plan.motion, job)
-        timing = time_motion(told, points, job.pace, job.cell.robot)
-        outcome.slow = slow_stretches(timing, job.pace)
-    outcome.refusal = dwell_refusal(outcome.slow, job.pace)
+        timing = time_motion(told, points, job.process, job.cell.robot)
+        outcome.slow = slow_stretches(timing, job.process)
+    outcome.refusal = dwell_refusal(outcome.slow, job.process)
     if outcome.refusal is not None:
         outcome.status = "no_path"
         return outcome
     with clock("verification"):
         outcome.verification = verification = replay(
-            job.cell, points, timing.motion, job.search.max_contact_error, clock.share
+            job.cell, points, timing.timed, job.search.max_contact_error, clock.share
         )
     if verification.verified is None:
         outcome.status = "unsafe"
@@ -125,7 +125,7 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
         layer = wheel_layer(job.cell, part, points, contact_positions)
         scene = CollisionScene(job.cell).for_second_opinion()
     problem = GrindingProblem(
-        job.cell, scene, part, points, field, layer, job.search.interpolation, job.pace
+        job.cell, scene, part, points, field, layer, job.search.interpolation, job.process
     )
     unreachable = unreachable_points(problem)
     if len(unreachable):
@@ -135,11 +135,11 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
             f"{runs_of(unreachable)} of {len(points)}; check {job.around.wheel_key} and "
             "fixture.T_flange_workpiece_mm",
         )
-    inside = enclosing_bodies(job.cell, job.pace.home)
+    inside = enclosing_bodies(job.cell, job.process.home)
     if inside:
         pairs = ", ".join(" inside of ".join(pair) for pair in inside)
         raise InputError(job.around.home_key, f"at home one is in the other: {pairs}")
-    hits = [*scene.colliding_pairs(job.pace.home), *_part_near_wheel(job, part)]
+    hits = [*scene.colliding_pairs(job.process.home), *_part_near_wheel(job, part)]
     if hits:
         pairs = ", ".join(" and ".join(pair) for pair in hits)
         needed = f"{1e3 * job.cell.required_clearance:g} mm (clearance_mm)"
@@ -152,7 +152,7 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
 
 def _part_near_wheel(job: Job, part: PartTree) -> list[tuple[str, str]]:
     """Return part and wheel if they are too near at home, where they do not touch on purpose."""
-    home = job.pace.home[None]
+    home = job.process.home[None]
     Ts_contact0_workpiece = job.cell.Ts_contact0_workpiece(forward_kinematics(job.cell.robot, home))
     needed = job.cell.part_from_wheel
     distance = signed_wheel_distance(part, job.cell.wheel, Ts_contact0_workpiece, needed)[0]

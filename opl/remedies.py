@@ -150,7 +150,7 @@ def _changed(job: Job, cell: WorkCell, points: CutterPoints) -> GrindingProblem:
         build_nodes(cell, points, positions),
         wheel_layer(cell, part, points, positions),
         job.search.interpolation,
-        job.pace,
+        job.process,
     )
 
 

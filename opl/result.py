@@ -150,16 +150,16 @@ def _refinement(refinement: Refinement | None) -> dict[str, Any] | None:
 
 
 def _feed(outcome: Outcome) -> dict[str, Any] | None:
-    slow, pace = outcome.slow, outcome.job.pace
+    slow, process = outcome.slow, outcome.job.process
     if slow is None:
         return None
     dwell = max(slow, key=lambda one: one.dwell, default=None)
     return {
-        "set_mm_s": _rounded(pace.feed * MM),
+        "set_mm_s": _rounded(process.feed * MM),
         "lowered": [_slow_stretch(one, outcome.job.cell.robot.joint_names) for one in slow],
         "longest_dwell_s": 0.0 if dwell is None else round(dwell.dwell, 3),
         "longest_dwell_at": None if dwell is None or not dwell.dwell else round(dwell.dwell_at, 3),
-        "max_dwell_s": pace.max_dwell,
+        "max_dwell_s": process.max_dwell,
     }
 
 
@@ -236,7 +236,7 @@ def _program(outcome: Outcome) -> dict[str, Any] | None:
         "files": list(outcome.files),
         "sha256": {name: digest(text.encode()) for name, text in outcome.files.items()},
         "moves": len(outcome.program.moves),
-        "duration_s": round(float(verified.motion.duration.sum()), 3),
+        "duration_s": round(verified.timed.seconds, 3),
         "passes": [
             {"wanted_s": round(time.wanted, 3), "written_s": round(time.written, 3)}
             for time in outcome.program.pass_times

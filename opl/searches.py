@@ -41,7 +41,7 @@ def search_path(outcome: Outcome, problem: GrindingProblem) -> Plan:
     # the cheapest at the cutter points need not be so on the way between them
     alone, robot = ObjectiveWeights(0.0, travel, time), problem.cell.robot
     values = [
-        alone.value(figures_of_path(one.path, one.motion, problem.points, problem.pace, robot))
+        alone.value(figures_of_path(one.path, one.motion, problem.points, problem.process, robot))
         for one in (cheapest, plan)
     ]
     return cheapest if values[0] <= values[1] else replace(plan)
@@ -55,13 +55,13 @@ def compare(outcome: Outcome) -> dict[str, Figures]:
     compared = {}
     if outcome.fixed is not None and outcome.fixed.q is not None:
         q = outcome.fixed.q
-        compared["fixed"] = figures_of_points(q, points, job.pace, robot)
+        compared["fixed"] = figures_of_points(q, points, job.process, robot)
     plans = {"paper_start": outcome.paper_start, "recursive": outcome.recursive}
     if outcome.plan is not outcome.recursive:
         plans["optimal"] = outcome.plan
     for name, plan in plans.items():
         if plan is not None:
-            compared[name] = figures_of_path(plan.path, plan.motion, points, job.pace, robot)
+            compared[name] = figures_of_path(plan.path, plan.motion, points, job.process, robot)
     return compared
 
 

@@ -57,7 +57,7 @@ def verify(job: Path, programs: tuple[Path, ...], as_json: bool, quiet: bool) ->
 
 def told(job: Job, n_points: int, proof: Proof) -> dict[str, Any]:
     """Return what was proven, for other programs; null stands for what could not be told."""
-    found, motion = proof.verification, proof.motion
+    found, timed = proof.verification, proof.timed
     return {
         "proven": proof.proven,
         "job": job.name,
@@ -68,7 +68,7 @@ def told(job: Job, n_points: int, proof: Proof) -> dict[str, Any]:
         "positions": proof.moves,
         "cutter_points": n_points,
         "cutter_points_ground": proof.ground,
-        "duration_s": None if motion is None else round(float(motion.duration.sum()), 3),
+        "duration_s": None if timed is None else round(timed.seconds, 3),
         "engine": None if found is None else found.engine,
         "poses": None if found is None else found.poses,
         "collisions": None if found is None else found.collisions,

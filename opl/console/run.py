@@ -203,10 +203,10 @@ def show_proof(job: Job, points: CutterPoints, proof: Proof, as_written: bool | 
     console = _console()
     lines = [f"read {path}" for path in proof.files]
     lines += [f"calls {name}, which was not looked at" for name in proof.foreign]
-    found, motion = proof.verification, proof.motion
-    if found is not None and motion is not None:
+    found, timed = proof.verification, proof.timed
+    if found is not None and timed is not None:
         lines += [
-            f"{proof.moves} positions, {motion.duration.sum():.1f} s, for {job.cell.robot.title}",
+            f"{proof.moves} positions, {timed.seconds:.1f} s, for {job.cell.robot.title}",
             f"{proof.ground} of {len(points)} cutter points recognised in order, "
             f"{points.n_passes} passes",
             f"replayed in {found.engine}: {found.poses} poses, {found.collisions} collisions, "

@@ -12,7 +12,7 @@ def told_times(outcome: Outcome) -> Iterator[str]:
     """Yield lines about the times of a program."""
     assert outcome.program is not None and outcome.slow is not None
     job, slow, cycle = outcome.job, outcome.slow, outcome.program.cycle
-    feed = f"feed: {1e3 * job.pace.feed:g} mm/s"
+    feed = f"feed: {1e3 * job.process.feed:g} mm/s"
     if not slow:
         yield f"{feed} all over"
     else:
@@ -28,7 +28,7 @@ def told_times(outcome: Outcome) -> Iterator[str]:
         if dwell.dwell > 0.0:
             yield (
                 f"longest dwell on one spot: {dwell.dwell:.2f} s at cutter point "
-                f"{dwell.dwell_at:.1f}, {job.pace.max_dwell:g} s allowed"
+                f"{dwell.dwell_at:.1f}, {job.process.max_dwell:g} s allowed"
             )
     if cycle is not None:
         waits = f", {cycle.waits:.1f} s waiting" if cycle.waits else ""

@@ -23,7 +23,7 @@ from opl.job.file import JobFile
 from opl.job.search import Method, Search
 from opl.job.source import Source
 from opl.job.workpiece import GIVEN
-from opl.motion.timing import Pace
+from opl.motion.process import ProcessSettings
 from opl.program.settings import ProgramSettings
 
 
@@ -39,7 +39,7 @@ class Job:
         surface: The surface to be ground, in the workpiece frame.
         passes: How the surface is cut.
         search: How the path is sought.
-        pace: Speeds, approach and home.
+        process: Speeds, approach and home.
         program: How the program is written.
     """
 
@@ -50,7 +50,7 @@ class Job:
     surface: MachinedSurface
     passes: Passes
     search: Search
-    pace: Pace
+    process: ProcessSettings
     program: ProgramSettings
 
     @property
@@ -149,6 +149,6 @@ def _in_si(
         surface=surface,
         passes=file.passes.in_si(source, surface, cell.wheel.radius),
         search=search,
-        pace=file.process.in_si(around.home),
+        process=file.process.in_si(around.home),
         program=file.program.in_si(source, file.name, robot, around.home),
     )

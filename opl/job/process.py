@@ -12,7 +12,7 @@ from opl.cell.robot import Robot
 from opl.files.documents import Document
 from opl.geometry.frames import Array
 from opl.job.bodies import MM, Positive, Six
-from opl.motion.timing import Pace
+from opl.motion.process import ProcessSettings
 
 SixPositive = Annotated[list[Positive], Field(min_length=6, max_length=6)]
 
@@ -69,9 +69,9 @@ class ProcessSection(Document):
         limits = np.deg2rad(self.max_acceleration_deg_s2)
         return replace(robot, max_acceleration=limits, acceleration_assumed=False)
 
-    def in_si(self, home: Array) -> Pace:
+    def in_si(self, home: Array) -> ProcessSettings:
         """Return the section's values; home in [rad], shape (6,)."""
-        return Pace(
+        return ProcessSettings(
             feed=self.feed_mm_s * MM,
             approach_length=self.approach_mm * MM,
             approach_turn=float(np.deg2rad(self.approach_turn_deg)),

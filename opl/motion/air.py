@@ -17,8 +17,8 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.leads import lead_offsets
 from opl.motion.links import Links, NoLinkError
-from opl.motion.motion import FREE_MOVES, Motion, Stretch
-from opl.motion.timing import Pace
+from opl.motion.motion import Motion, MoveKind
+from opl.motion.process import ProcessSettings
 
 
 class UnreachableApproachError(Exception):
@@ -49,19 +49,21 @@ class BlockedLinkError(Exception):
         self.error = error
 
 
-def whole_motion(cell: WorkCell, points: CutterPoints, path: GrindingPath, pace: Pace) -> Motion:
-    """Join the passes of a path into one motion from home to home, its times still unknown.
+def whole_motion(
+    cell: WorkCell, points: CutterPoints, path: GrindingPath, process: ProcessSettings
+) -> Motion:
+    """Join the passes of a path into one motion from home to home.
 
     Args:
         cell: The cell.
         points: The cutter points of the path.
         path: The path on the wheel.
-        pace: Speeds, approach and home.
+        process: Speeds, approach and home.
 
     Raises:
         UnreachableApproachError: If an approach or retract leaves reach or limits.
     """
-    legs = [_Leg(pace.home[None], Stretch.HOME, pass_index=-1)]
+    parts = [Motion.off_wheel(process.home[None], MoveKind.HOME, -1)]
     for index in range(int(points.pass_index[-1]) + 1):
         on_pass = np.flatnonzero(path.pass_index == index)
         first, last = int(on_pass[0]), int(on_pass[-1])
@@ -69,47 +71,32 @@ def whole_motion(cell: WorkCell, points: CutterPoints, path: GrindingPath, pace:
             lead(
                 cell,
                 points,
-                pace,
-                stretch,
+                process,
+                kind,
                 path.branch,
                 int(path.cutter_point[k]),
                 path.contact_position[k],
                 path.q[k],
             )
-            for k, stretch in ((first, Stretch.APPROACH), (last, Stretch.RETRACT))
+            for k, kind in ((first, MoveKind.APPROACH), (last, MoveKind.RETRACT))
         )
-        air = Stretch.HOME if index == 0 else Stretch.LINK
-        legs.append(_Leg(lead_in[-1:], air, index))
-        # the part touches down as an approach; the first cutter point ends that move
-        legs.append(_Leg(lead_in[-2::-1], Stretch.APPROACH, index))
-        legs.append(
-            _Leg(
+        free = MoveKind.HOME if index == 0 else MoveKind.LINK
+        place = path.cutter_point[on_pass]
+        parts += [
+            Motion.off_wheel(lead_in[-1:], free, index),
+            # the last move of the approach ends at the first cutter point
+            Motion.off_wheel(lead_in[-2::-1], MoveKind.APPROACH, index),
+            Motion(
                 path.q[on_pass],
-                Stretch.GRIND,
-                index,
+                tuple(map(MoveKind.at_cutter_point, place)),
                 path.contact_position[on_pass],
-                path.cutter_point[on_pass],
-            )
-        )
-        legs.append(_Leg(lead_out, Stretch.RETRACT, index))
-    legs.append(_Leg(pace.home[None], Stretch.HOME, pass_index=-1))
-
-    q = np.concatenate([leg.q for leg in legs])
-    place = np.concatenate([leg.cutter_point for leg in legs])
-    stretch = tuple(
-        Stretch.BETWEEN if leg.stretch is Stretch.GRIND and point % 1.0 else leg.stretch
-        for leg in legs
-        for point in leg.cutter_point
-    )
-    return Motion(
-        q=q,
-        duration=np.full(len(q), np.nan),
-        stretch=stretch,
-        contact_position=np.concatenate([leg.contact_position for leg in legs]),
-        cutter_point=place,
-        pass_index=np.concatenate([np.full(len(leg.q), leg.pass_index) for leg in legs]),
-        clearance=np.full(len(q), np.nan),
-    )
+                place,
+                path.pass_index[on_pass],
+            ),
+            Motion.off_wheel(lead_out, MoveKind.RETRACT, index),
+        ]
+    parts.append(Motion.off_wheel(process.home[None], MoveKind.HOME, -1))
+    return Motion.joined(parts)
 
 
 def linked(motion: Motion, links: Links) -> Motion:
@@ -122,53 +109,22 @@ def linked(motion: Motion, links: Links) -> Motion:
     Raises:
         BlockedLinkError: If there is none for one of them.
     """
-    moves = [k for k in range(1, len(motion)) if motion.stretch[k] in FREE_MOVES]
+    moves = np.flatnonzero(motion.free[1:]) + 1
     on_the_way = []
-    for move in moves:
+    for move in moves.tolist():
         try:
             on_the_way.append(links.find(motion.q[move - 1], motion.q[move]))
         except NoLinkError as error:
             raise BlockedLinkError(move, error) from error
     before = np.repeat(moves, [len(q) for q in on_the_way])
-    if not len(before):
-        return motion
-    source = np.insert(np.arange(len(motion)), before, before)
-    q = np.insert(motion.q, before, np.concatenate(on_the_way), axis=0)
-    return Motion(
-        q=q,
-        duration=motion.duration[source],
-        stretch=tuple(motion.stretch[k] for k in source),
-        contact_position=motion.contact_position[source],
-        cutter_point=motion.cutter_point[source],
-        pass_index=motion.pass_index[source],
-        clearance=motion.clearance[source],
-    )
-
-
-class _Leg:
-    """Some postures of one kind."""
-
-    def __init__(
-        self,
-        q: Array,
-        stretch: Stretch,
-        pass_index: int,
-        contact_position: Array | None = None,
-        cutter_point: Array | None = None,
-    ) -> None:
-        nothing = np.full(len(q), np.nan)
-        self.q = q
-        self.stretch = stretch
-        self.pass_index = pass_index
-        self.contact_position = nothing if contact_position is None else contact_position
-        self.cutter_point = nothing if cutter_point is None else cutter_point
+    return motion.with_inserted(before, np.concatenate(on_the_way)) if len(before) else motion
 
 
 def lead(
     cell: WorkCell,
     points: CutterPoints,
-    pace: Pace,
-    stretch: Stretch,
+    process: ProcessSettings,
+    kind: MoveKind,
     branch: int,
     column: int,
     contact_position: float,
@@ -179,8 +135,8 @@ def lead(
     Args:
         cell: The cell.
         points: The cutter points.
-        pace: How long it is, and how far it turns.
-        stretch: Whether it is the approach or the retract.
+        process: How long it is, and how far it turns.
+        kind: Whether it is the approach or the retract.
         branch: Slot of the inverse kinematics.
         column: The cutter point that is ground.
         contact_position: Where on the wheel.
@@ -189,7 +145,7 @@ def lead(
     Raises:
         UnreachableApproachError: If it leaves reach or limits.
     """
-    offsets = lead_offsets(pace.approach_length, pace.approach_turn, stretch)
+    offsets = lead_offsets(process.approach_length, process.approach_turn, kind)
     T_contact_away = np.tile(np.eye(4), (len(offsets), 1, 1))
     T_contact_away[:, :3, 3] = offsets
     T_base_contact = cell.wheel.T_base_contact(contact_position)

@@ -11,7 +11,7 @@ from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import PartTree, signed_wheel_distance
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array
-from opl.motion.motion import FREE_MOVES, Motion
+from opl.motion.motion import Motion
 
 RESOLUTION = np.deg2rad(1.0)  # largest joint change between two postures that are asked
 
@@ -66,8 +66,7 @@ def find_faults(
     """
     q, move = densify(motion.q, RESOLUTION)
     Ts_base_flange = forward_kinematics(cell.robot, q)
-    free_move = np.array([stretch in FREE_MOVES for stretch in motion.stretch])
-    needed = np.where(free_move[move], cell.part_from_wheel, -cell.planned_penetration)
+    needed = np.where(motion.free[move], cell.part_from_wheel, -cell.planned_penetration)
     Ts_contact0_workpiece = cell.Ts_contact0_workpiece(Ts_base_flange)
     cuts = signed_wheel_distance(part, cell.wheel, Ts_contact0_workpiece, needed) < needed
     # a move that is refused for the wheel need not be asked about the rest

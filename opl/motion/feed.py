@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.errors import NoPathError
-from opl.motion.timing import Cause, Pace, Timing
+from opl.motion.process import ProcessSettings
+from opl.motion.timing import Cause, Timing
 
 # The belt dwells where the ground point is slower than this part of the feed.
 HARDLY_MOVES = 0.5
@@ -60,28 +61,30 @@ class SlowStretch:
         return sum(share.longer for share in self.shares)
 
 
-def slow_stretches(timing: Timing, pace: Pace) -> tuple[SlowStretch, ...]:
+def slow_stretches(timing: Timing, process: ProcessSettings) -> tuple[SlowStretch, ...]:
     """Return the stretches of the passes that are slower than the feed by a hundredth or more.
 
     The ramps at both ends of a pass are not among them: the robot has to rest there.
 
     Args:
         timing: A motion with its times.
-        pace: What is asked for.
+        process: What is asked for.
     """
     slow = np.array([cause is not Cause.NONE for cause in timing.cause])
-    index = timing.motion.pass_index
-    return tuple(_stretch(timing, pace, moves) for moves in _runs(slow, index))
+    index = timing.timed.motion.pass_index
+    return tuple(_stretch(timing, process, moves) for moves in _runs(slow, index))
 
 
-def dwell_refusal(stretches: tuple[SlowStretch, ...], pace: Pace) -> NoPathError | None:
+def dwell_refusal(
+    stretches: tuple[SlowStretch, ...], process: ProcessSettings
+) -> NoPathError | None:
     """Return why a path is refused on which the belt would dwell too long, None if it is not."""
-    too_long = [one for one in stretches if one.dwell > pace.max_dwell]
+    too_long = [one for one in stretches if one.dwell > process.max_dwell]
     if not too_long:
         return None
     return NoPathError(
-        f"the belt would dwell on one spot for more than {pace.max_dwell:g} s beyond the time at "
-        "the feed (process.max_dwell_s); raise process.max_contact_speed or lower "
+        f"the belt would dwell on one spot for more than {process.max_dwell:g} s beyond the time "
+        "at the feed (process.max_dwell_s); raise process.max_contact_speed or lower "
         "process.feed_mm_s, or let the contact move less (search.weights.contact)",
         [
             f"pass {one.pass_index + 1}, cutter point {one.dwell_at:.2f}: {one.dwell:.2f} s"
@@ -97,17 +100,17 @@ def _runs(wanted: np.ndarray, index: np.ndarray) -> Iterator[np.ndarray]:
     yield from (run for run in np.split(moves, np.flatnonzero(breaks) + 1) if len(run))
 
 
-def _stretch(timing: Timing, pace: Pace, moves: np.ndarray) -> SlowStretch:
-    motion = timing.motion
-    speed = timing.way / np.maximum(motion.duration, 1e-12)
-    longer = motion.duration - timing.way / pace.feed
+def _stretch(timing: Timing, process: ProcessSettings, moves: np.ndarray) -> SlowStretch:
+    motion, duration = timing.timed.motion, timing.timed.duration
+    speed = timing.surface_distance / np.maximum(duration, 1e-12)
+    longer = duration - timing.surface_distance / process.feed
     shares: dict[tuple[Cause, int], float] = {}
     for move in moves:
         key = (timing.cause[move], int(timing.joint[move]))
         shares[key] = shares.get(key, 0.0) + float(longer[move])
     slowest = int(moves[speed[moves].argmin()])
     hardly = np.zeros(len(motion), dtype=bool)
-    hardly[moves] = speed[moves] < HARDLY_MOVES * pace.feed
+    hardly[moves] = speed[moves] < HARDLY_MOVES * process.feed
     dwells = list(_runs(hardly, motion.pass_index))
     longest = max(dwells, key=lambda run: longer[run].sum(), default=None)
     return SlowStretch(

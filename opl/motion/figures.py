@@ -11,7 +11,8 @@ from opl.field.path import GrindingPath
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion
-from opl.motion.timing import Pace, followed, time_motion
+from opl.motion.process import ProcessSettings
+from opl.motion.timing import followed, time_motion
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Figures:
 
 
 def figures_of_path(
-    path: GrindingPath, motion: Motion, points: CutterPoints, pace: Pace, robot: Robot
+    path: GrindingPath, motion: Motion, points: CutterPoints, process: ProcessSettings, robot: Robot
 ) -> Figures:
     """Return the figures of a found path.
 
@@ -45,20 +46,22 @@ def figures_of_path(
         path: The path.
         motion: The whole motion that it is part of.
         points: Its cutter points.
-        pace: The speeds.
+        process: The speeds.
         robot: Whose path.
     """
-    timing = time_motion(motion, points, pace, robot)
-    seconds = timing.motion.duration[~np.isnan(timing.way)].sum()
+    timing = time_motion(motion, points, process, robot)
+    seconds = timing.timed.duration[motion.grinding].sum()
     return Figures(path.joint_ranges, path.joint_travel, path.contact_travel, float(seconds))
 
 
-def figures_of_points(q: Array, points: CutterPoints, pace: Pace, robot: Robot) -> Figures:
+def figures_of_points(
+    q: Array, points: CutterPoints, process: ProcessSettings, robot: Robot
+) -> Figures:
     """Return the figures of a contact-fixed path, one posture per cutter point, shape (N, 6)."""
     on_wheel = np.diff(points.pass_index) == 0
     turned = np.abs(np.diff(q, axis=0))
     arc = np.abs(np.diff(points.arc_length))
-    seconds = np.maximum(arc / pace.feed, (turned / robot.max_speed).max(axis=1))
+    seconds = np.maximum(arc / process.feed, (turned / robot.max_speed).max(axis=1))
     ground = [np.flatnonzero(points.pass_index == k) for k in range(points.n_passes)]
     total = sum(followed(q[rows], seconds[rows[:-1]], robot).sum() for rows in ground)
     return Figures(np.ptp(q, axis=0), float(turned[on_wheel].sum()), 0.0, float(total))

@@ -51,7 +51,8 @@ class TimeLaw:
     Attributes:
         line: The line.
         place: Places on it in [s], ascending, shape (g,).
-        pace: Change of the place with time there, 1 where the wanted times are kept, shape (g,).
+        path_speed: Change of the place with time there, 1 where the wanted times are kept, shape
+            (g,).
         speed_load: Largest part of its speed limit that each joint uses up on the piece that ends
             at each place but the first, shape (g - 1, 6).
         acceleration_load: The same of its acceleration limit.
@@ -59,14 +60,14 @@ class TimeLaw:
 
     line: RoundedLine
     place: Array
-    pace: Array
+    path_speed: Array
     speed_load: Array
     acceleration_load: Array
 
     @property
     def time(self) -> Array:
         """When it gets to each place in [s], from 0, shape (g,)."""
-        steps = 2.0 * np.diff(self.place) / (self.pace[:-1] + self.pace[1:])
+        steps = 2.0 * np.diff(self.place) / (self.path_speed[:-1] + self.path_speed[1:])
         return np.concatenate([[0.0], np.cumsum(steps)])
 
     @property
@@ -77,16 +78,17 @@ class TimeLaw:
     @property
     def node_times(self) -> Array:
         """When it gets to each posture of the line in [s], shape (n,)."""
-        return self.time[self.node_index]
+        times: Array = self.time[self.node_index]
+        return times
 
     def postures(self, time: Array) -> Array:
         """Return the joint positions at times in [rad], shape (k, 6)."""
         at = self.time
         piece = np.clip(np.searchsorted(at, time, side="right") - 1, 0, len(at) - 2)
         spent = time - at[piece]
-        change = np.diff(self.pace) / np.diff(at)
+        change = np.diff(self.path_speed) / np.diff(at)
         return self.line.postures(
-            self.place[piece] + (self.pace[piece] + change[piece] * spent / 2.0) * spent
+            self.place[piece] + (self.path_speed[piece] + change[piece] * spent / 2.0) * spent
         )
 
 
@@ -109,20 +111,20 @@ def fastest_law(line: RoundedLine, limits: JointLimits, at_rest: bool) -> TimeLa
     place = _grid(whole, limits)
     slope = whole.slopes(place)
     bend = np.diff(slope, axis=0) / np.diff(place)[:, None]
-    pace = _pace(place, slope, bend, limits, at_rest)
+    path_speed = _path_speed(place, slope, bend, limits, at_rest)
     inside = slice(
         int(np.searchsorted(place, line.knots[0] - 1e-12)),
         int(np.searchsorted(place, line.knots[-1] - 1e-12)) + 1,
     )
-    loads = _loads(slope, bend, place, pace, limits)
+    loads = _loads(slope, bend, place, path_speed, limits)
     pieces = slice(inside.start, inside.stop - 1)
-    law = TimeLaw(line, place[inside], pace[inside], loads[0][pieces], loads[1][pieces])
+    law = TimeLaw(line, place[inside], path_speed[inside], loads[0][pieces], loads[1][pieces])
     require_limits(law, limits)
     return law
 
 
 def _run_up(slope: Array, limits: JointLimits) -> float:
-    """Return the wanted time in which the whole pace is reached from rest, straight on, in [s]."""
+    """Return the wanted time in which full path speed is reached from rest, straight on, in [s]."""
     return float(0.51 * np.max(np.abs(slope) / limits.acceleration)) + 1e-3
 
 
@@ -134,7 +136,7 @@ def _grid(line: RoundedLine, limits: JointLimits) -> Array:
     graded = straight & (length > SHORT)
     places = [knots, knots[:-1][~graded] + length[~graded] / 2.0]
     places.append((knots[:-1, None] + length[:, None] * GRADES)[graded].ravel())
-    # from rest to the whole pace on a straight piece, and back
+    # from rest to full path speed on a straight piece, and back
     for end, inwards in ((0, 1.0), (-1, -1.0)):
         ramp = 0.5 * np.max(np.abs(line.slope[end]) / limits.acceleration)
         if straight[end] and 0.0 < ramp < length[end]:
@@ -148,11 +150,11 @@ def _grid(line: RoundedLine, limits: JointLimits) -> Array:
 
 
 def _loads(
-    slope: Array, bend: Array, place: Array, pace: Array, limits: JointLimits
+    slope: Array, bend: Array, place: Array, path_speed: Array, limits: JointLimits
 ) -> tuple[Array, Array]:
     """Return what a law uses up of speed and acceleration on each piece, shape (g - 1, 6) each."""
-    speed = np.abs(slope) * pace[:, None] / limits.speed
-    squared = pace[:, None] ** 2
+    speed = np.abs(slope) * path_speed[:, None] / limits.speed
+    squared = path_speed[:, None] ** 2
     gain = np.diff(squared, axis=0) / (2.0 * np.diff(place)[:, None])
     at_start = slope[:-1] * gain + bend * squared[:-1]
     at_end = slope[1:] * gain + bend * squared[1:]
@@ -160,11 +162,13 @@ def _loads(
     return np.maximum(speed[:-1], speed[1:]), acceleration
 
 
-def _pace(place: Array, slope: Array, bend: Array, limits: JointLimits, at_rest: bool) -> Array:
-    """Return the highest pace at each place, shape (g,).
+def _path_speed(
+    place: Array, slope: Array, bend: Array, limits: JointLimits, at_rest: bool
+) -> Array:
+    """Return the highest path speed at each place, shape (g,).
 
-    The whole pace is kept but around the pieces that do not allow it. They are solved one by one,
-    with as much before and after as it takes to come down to their pace and up again.
+    Full path speed is kept but around the pieces that do not allow it. They are solved one by one,
+    with as much before and after as it takes to come down to their path speed and up again.
     """
     steady = np.ones(len(place))
     hot = np.maximum(*_loads(slope, bend, place, steady, limits)).max(axis=1) > 1.0
@@ -173,17 +177,17 @@ def _pace(place: Array, slope: Array, bend: Array, limits: JointLimits, at_rest:
     while True:
         near = maximum_filter1d(hot.astype(int), 2 * around + 1, mode="constant")
         edges = np.flatnonzero(np.diff(near, prepend=0, append=0))
-        pace = steady.copy()
+        path_speed = steady.copy()
         for start, end in edges.reshape(-1, 2):
             part = slice(start, end + 1)
-            found = _fastest_pace(
+            found = _fastest_path_speed(
                 place[part], slope[part], bend[start:end], limits, start > 0, end < last
             )
             if found is None:
                 break
-            pace[part] = found
+            path_speed[part] = found
         else:
-            return pace
+            return path_speed
         if around >= last:
             raise UnsafeError(
                 "no time law keeps the joints' speeds and accelerations; raise "
@@ -192,26 +196,26 @@ def _pace(place: Array, slope: Array, bend: Array, limits: JointLimits, at_rest:
         around = min(4 * around, last)
 
 
-def _fastest_pace(
+def _fastest_path_speed(
     place: Array, slope: Array, bend: Array, limits: JointLimits, enters: bool, leaves: bool
 ) -> Array | None:
-    """Return the highest pace over some pieces, None if toppra finds none.
+    """Return the highest path speed over some pieces, None if toppra finds none.
 
     Args:
         place: Where the pieces end, shape (g,).
         slope: There, shape (g, 6).
         bend: Of each piece, shape (g - 1, 6).
         limits: What the joints can do.
-        enters: Whether it comes at the whole pace, not from rest.
-        leaves: Whether it goes on at the whole pace, not at rest.
+        enters: Whether it comes at full path speed, not from rest.
+        leaves: Whether it goes on at full path speed, not at rest.
     """
     constraint = _Limits(place, slope, bend, limits)
     search = TOPPRA([constraint], _Place(place), gridpoints=place, solver_wrapper="seidel")
     search.compute_parameterization(float(enters), float(leaves))
-    pace = search.problem_data.sd_vec
-    if pace is None or np.isnan(pace).any() or (np.maximum(pace[:-1], pace[1:]) <= 0.0).any():
+    found = search.problem_data.sd_vec
+    if found is None or np.isnan(found).any() or (np.maximum(found[:-1], found[1:]) <= 0.0).any():
         return None
-    return np.asarray(pace)
+    return np.asarray(found)
 
 
 def require_limits(law: TimeLaw, limits: JointLimits) -> None:
@@ -263,7 +267,7 @@ class _Limits(LinearConstraint):
         super().__init__()
         self.identical = True
         length = np.diff(place)[:, None]
-        # u: half the change of the squared pace with the place, x: the squared pace at the start
+        # u: half the change of the squared path speed with the place, x: its square at the start
         at_start, at_end = slope[:-1], slope[1:] + 2.0 * length * bend
         scale = np.tile(limits.acceleration, 2)
         self._of_u = np.hstack([at_start, at_end]) / scale

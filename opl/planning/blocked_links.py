@@ -11,7 +11,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.motion.air import BlockedLinkError, UnreachableApproachError, lead
-from opl.motion.motion import Motion, Stretch
+from opl.motion.motion import Motion, MoveKind
 from opl.planning.branch import Branch
 from opl.planning.problem import GrindingProblem
 
@@ -35,7 +35,7 @@ def block_link(
     move, error = blocked.move, blocked.error
     index = int(motion.pass_index[move])
     column = len(rows) if index < 0 else int(np.argmax(problem.points.pass_index == index))
-    between = motion.stretch[move] is Stretch.LINK
+    between = motion.kind[move] is MoveKind.LINK
     way = "way between passes" if between else "way home" if index < 0 else "way from home"
     cause = f"{error}" if between else f"{way}: {error}"
     home_end = None if between else int(index < 0)
@@ -48,11 +48,11 @@ def block_link(
         branch.block_node(after, int(rows[after]), f"approach: {cause}")
     elif between:
         start, goal = motion.q[move - 1], motion.q[move]
-        from_rows = _joined(problem, branch, Stretch.RETRACT, before, int(rows[before]), start)
-        to_rows = _joined(problem, branch, Stretch.APPROACH, after, int(rows[after]), goal)
+        from_rows = _joined(problem, branch, MoveKind.RETRACT, before, int(rows[before]), start)
+        to_rows = _joined(problem, branch, MoveKind.APPROACH, after, int(rows[after]), goal)
         branch.block_steps(before, from_rows, to_rows, f"link: {cause}")
     else:
-        lead_there = Stretch.RETRACT if index < 0 else Stretch.APPROACH
+        lead_there = MoveKind.RETRACT if index < 0 else MoveKind.APPROACH
         end, posture = (before, move - 1) if index < 0 else (after, move)
         for row in _joined(problem, branch, lead_there, end, int(rows[end]), motion.q[posture]):
             branch.block_node(end, row, cause)
@@ -61,7 +61,7 @@ def block_link(
 def _joined(
     problem: GrindingProblem,
     branch: Branch,
-    stretch: Stretch,
+    kind: MoveKind,
     column: int,
     row: int,
     q_away: Array,
@@ -71,7 +71,7 @@ def _joined(
     Args:
         problem: What is to be planned.
         branch: The branch.
-        stretch: Whether they are off the wheel before it, approach, or after it, retract.
+        kind: Whether they are off the wheel before it, approach, or after it, retract.
         column: The cutter point.
         row: A row, which is among those returned.
         q_away: Its posture at the end of approach or retract in [rad], shape (6,).
@@ -83,7 +83,7 @@ def _joined(
     for side in (free[t[free] > t[row]], free[t[free] < t[row]], free[t[free] == t[row]]):
         last = q_away
         for other in side[np.argsort(np.abs(t[side] - t[row]), kind="stable")].tolist():
-            q = _away(problem, branch, stretch, column, other)
+            q = _away(problem, branch, kind, column, other)
             if other != row and q is not None and problem.links.joined(last, q):
                 found.append(other)
                 last = q
@@ -91,15 +91,15 @@ def _joined(
 
 
 def _away(
-    problem: GrindingProblem, branch: Branch, stretch: Stretch, column: int, row: int
+    problem: GrindingProblem, branch: Branch, kind: MoveKind, column: int, row: int
 ) -> Array | None:
     """Return where approach or retract of a node is farthest off, None if it cannot be made."""
     try:
-        return lead(
+        away: Array = lead(
             problem.cell,
             problem.points,
-            problem.pace,
-            stretch,
+            problem.process,
+            kind,
             branch.nodes.branch,
             column,
             branch.nodes.contact_position[row],
@@ -107,3 +107,4 @@ def _away(
         )[-1]
     except UnreachableApproachError:
         return None
+    return away

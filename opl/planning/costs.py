@@ -68,8 +68,8 @@ def roughness(
         joint_weights=costs.joint_weights,
         contact_weight=costs.contact_weight,
         time_weight=costs.time_weight,
-        step_seconds=np.where(problem.off_wheel, 0.0, arc_step / problem.pace.feed),
+        step_seconds=np.where(problem.off_wheel, 0.0, arc_step / problem.process.feed),
         max_speed=robot.max_speed,
-        contact_speed=problem.pace.contact_speed,
+        contact_speed=problem.process.contact_speed,
         node_cost=node_cost,
     )

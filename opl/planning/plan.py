@@ -19,7 +19,7 @@ from opl.errors import NoPathError, NoWayError
 from opl.field.path import BrokenStepError, GrindingPath, fill_in
 from opl.motion.air import BlockedLinkError, UnreachableApproachError, linked, whole_motion
 from opl.motion.check import Fault, find_faults
-from opl.motion.motion import FREE_MOVES, Motion, Stretch
+from opl.motion.motion import Motion, MoveKind
 from opl.planning.blocked_links import block_link
 from opl.planning.branch import Branch, Track, branches_of
 from opl.planning.impasse import shortest_impasse
@@ -114,7 +114,7 @@ def try_recursive(problem: GrindingProblem, start: Start, most_checks: int) -> P
 def _tracks(problem: GrindingProblem, branches: list[Branch], start: Start) -> Iterator[Track]:
     """Yield tracks in the order in which the search wants them checked."""
     if start is Start.NEAREST:
-        yield from tracks_from_nearest_start(branches, problem.pace.home)
+        yield from tracks_from_nearest_start(branches, problem.process.home)
         return
     robot = problem.cell.robot
     for track in tracks_from_best_start(branches):
@@ -149,7 +149,7 @@ def check_track(
         branch.block_step(error.column, rows, error.cause)
         return None
     try:
-        motion = whole_motion(problem.cell, problem.points, path, problem.pace)
+        motion = whole_motion(problem.cell, problem.points, path, problem.process)
     except UnreachableApproachError as error:
         branch.block_node(error.column, int(rows[error.column]), f"approach: {error.cause}")
         return None
@@ -158,7 +158,7 @@ def check_track(
     faults = [
         fault
         for fault in faults
-        if motion.stretch[fault.move] not in FREE_MOVES
+        if not motion.kind[fault.move].is_free
         or (fault.at_end and motion.pass_index[fault.move] >= 0)
     ]
     for fault in faults:
@@ -177,9 +177,9 @@ def _block(
 ) -> None:
     """Take out of the ladder what a fault rules out: a node or a step."""
     cause = " and ".join(fault.pair)
-    stretch, index = motion.stretch[fault.move], int(motion.pass_index[fault.move])
+    kind, index = motion.kind[fault.move], int(motion.pass_index[fault.move])
     on_pass = np.flatnonzero(problem.points.pass_index == index)
-    if stretch in (Stretch.GRIND, Stretch.BETWEEN):
+    if kind.on_wheel:
         point = motion.cutter_point[fault.move]
         end = int(np.ceil(point))
         if point == end and fault.at_end and fault.pair != (PART, WHEEL):
@@ -188,11 +188,9 @@ def _block(
             branch.block_node(end, int(rows[end]), cause)
         elif branch.free[end, rows[end]]:
             branch.block_step(end - 1, rows, cause)
-    elif stretch is Stretch.APPROACH:
-        branch.block_node(int(on_pass[0]), int(rows[on_pass[0]]), f"approach: {cause}")
-    elif stretch is Stretch.RETRACT:
+    elif kind is MoveKind.RETRACT:
         branch.block_node(int(on_pass[-1]), int(rows[on_pass[-1]]), f"retract: {cause}")
-    else:  # a free move ends where the approach begins
+    else:  # the approach, or a free move that ends where it begins
         branch.block_node(int(on_pass[0]), int(rows[on_pass[0]]), f"approach: {cause}")
 
 

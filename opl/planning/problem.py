@@ -14,7 +14,7 @@ from opl.field.path import Interpolation
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.links import Links
-from opl.motion.timing import Pace
+from opl.motion.process import ProcessSettings
 from opl.search.ladder import Ladder
 
 
@@ -31,7 +31,7 @@ class GrindingProblem:
         wheel_clearance: Signed distance of the part to the wheel in [m], exact where it is less
             than the largest belt penetration allows, shape (N, M).
         interpolation: How the path between nodes is filled in.
-        pace: Speeds, approach and home.
+        process: Speeds, approach and home.
         links: Ways through the air, found so far; not to be given, and kept as long as the cell is
             the same.
     """
@@ -43,7 +43,7 @@ class GrindingProblem:
     field: NodeField
     wheel_clearance: Array
     interpolation: Interpolation
-    pace: Pace
+    process: ProcessSettings
     links: Links = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:

@@ -18,7 +18,7 @@ from opl.field.nodes import NodeField, NodeMatrix
 from opl.field.path import GrindingPath, cutter_frames
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.motion import Motion, Stretch
+from opl.motion.motion import Motion
 from opl.planning.branch import Branch, branches_of
 from opl.planning.problem import GrindingProblem
 
@@ -41,12 +41,7 @@ class RefinedProblem:
 
     def original_motion(self, motion: Motion) -> Motion:
         """Return a motion with its cutter points in the original numbering."""
-        place = self._original_places(motion.cutter_point)
-        stretch = tuple(
-            Stretch.BETWEEN if kind is Stretch.GRIND and where % 1.0 else kind
-            for kind, where in zip(motion.stretch, place, strict=True)
-        )
-        return replace(motion, cutter_point=place, stretch=stretch)
+        return motion.renumbered(self._original_places(motion.cutter_point))
 
     def _original_places(self, columns: Array) -> Array:
         return np.interp(columns, np.arange(len(self.places)), self.places)

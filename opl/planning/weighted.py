@@ -136,4 +136,4 @@ class _Sweep:
 
 def _figures(problem: GrindingProblem, plan: Plan) -> Figures:
     robot = problem.cell.robot
-    return figures_of_path(plan.path, plan.motion, problem.points, problem.pace, robot)
+    return figures_of_path(plan.path, plan.motion, problem.points, problem.process, robot)

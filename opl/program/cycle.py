@@ -16,7 +16,7 @@ from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, fastest_law
 from opl.program.actions import Call, Dwell, WaitInput
 from opl.program.moves import CycleTime, Kind, Move, Program
-from opl.program.settings import ByKind, ProgramSettings
+from opl.program.settings import ProgramSettings
 
 
 def cycle_time(
@@ -71,9 +71,5 @@ def _acceleration(moves: Sequence[Move], robot: Robot, settings: ProgramSettings
     """Return the joint accelerations of a stretch as the program asks for them, shape (6,)."""
     percents = [100.0]
     for ramp in (settings.acceleration, settings.deceleration):
-        percents += [percent for move in moves if (percent := _percent(ramp, move.kind))]
+        percents += [percent for move in moves if (percent := ramp.of(move.kind))]
     return robot.max_acceleration * min(percents) / 100.0
-
-
-def _percent(ramp: ByKind, kind: Kind) -> int | None:
-    return {Kind.WHEEL: ramp.on_wheel, Kind.LEAD: ramp.lead, Kind.AIR: ramp.air}[kind]

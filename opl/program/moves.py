@@ -9,16 +9,16 @@ the hand's tool point along a line instead, away from where the contact was prov
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from opl.errors import UnsafeError
-from opl.motion.motion import Motion, Stretch, VerifiedMotion
+from opl.motion.motion import Motion, Phase, TimedMotion, VerifiedMotion
 from opl.program.actions import NO_ACTIONS, Action, Actions
-from opl.program.stops import ON_WHEEL, actions_at, stops_at
+from opl.program.stops import actions_at, stops_at
 
 Array = NDArray[np.float64]
 
@@ -39,6 +39,11 @@ class Kind(str, Enum):
     WHEEL = "on_wheel"  # grinding
     LEAD = "lead"  # approach or retract, to or from the wheel
     AIR = "air"  # from and to home, and between passes
+
+    @classmethod
+    def of(cls, phase: Phase) -> Kind:
+        """Return the kind of a move by what happens during it."""
+        return {Phase.GRINDING: cls.WHEEL, Phase.FREE: cls.AIR}.get(phase, cls.LEAD)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +160,7 @@ def plan_moves(
 
     A posture that repeats the one before needs no move; its time goes to the move that follows,
     which so gets slower, never faster. The robot stops at home, where it enters and leaves the
-    wheel, where a stretch ends, and at sharp corners off the wheel; it never stops within a pass.
+    wheel, where a phase ends, and at sharp corners off the wheel; it never stops within a pass.
 
     Args:
         verified: What the program shall do.
@@ -171,45 +176,33 @@ def plan_moves(
     """
     if not isinstance(verified, VerifiedMotion):
         raise TypeError(f"a program is made of a VerifiedMotion, got {type(verified).__name__}")
-    motion = verified.motion
-    kept = _distinct_postures(motion.q)
-    speeds = _speeds(motion, kept, np.asarray(max_speed), joint_names)
-    times = np.diff(np.cumsum(motion.duration)[kept]).tolist()
-    # reduceat: a kept posture also stands for the repeated ones that follow it
-    on_wheel = np.logical_or.reduceat([s in ON_WHEEL for s in motion.stretch], kept)
-    stops = stops_at(motion, kept, on_wheel)
-    done_there = actions_at(motion, kept, on_wheel, actions)
+    kept = _distinct_postures(verified.motion.q)
+    motion = _without_repeats(verified.motion, kept)
+    speeds = _speeds(verified.timed, kept, np.asarray(max_speed), joint_names)
+    times = verified.timed.take(kept).duration.tolist()
+    stops, on_wheel = stops_at(motion), motion.on_wheel
+    done_there = actions_at(motion, actions)
     moves = []
-    before: int | None = None
-    for m, posture in enumerate(kept):
-        pass_here = int(motion.pass_index[posture])
-        pass_before = None if before is None else int(motion.pass_index[before])
+    pass_before: int | None = None
+    for m, (posture, phase) in enumerate(zip(kept, motion.phase, strict=True)):
+        pass_here = int(motion.pass_index[m])
         comment = "HOME" if pass_here < 0 else f"PASS {pass_here + 1}"
-        grinding = m > 0 and on_wheel[m] and on_wheel[m - 1] and pass_here == pass_before
         moves.append(
             Move(
-                q=motion.q[posture],
+                q=motion.q[m],
                 speed=float(speeds[m]),
-                exact_stop=bool(stops[m]),
+                exact_stop=stops[m],
                 on_wheel=bool(on_wheel[m]),
                 posture=int(posture),
-                duration=times[m - 1] if m else None,
-                kind=_kind(motion.stretch[posture], grinding, bool(on_wheel[m])),
-                ground_pass=pass_here if grinding else None,
+                duration=times[m] if m else None,
+                kind=Kind.of(phase),
+                ground_pass=pass_here if phase is Phase.GRINDING else None,
                 comment=comment if pass_here != pass_before else None,
                 actions=done_there.get(m, ()),
             )
         )
-        before = int(posture)
+        pass_before = pass_here
     return Program(name=name, comments=tuple(comments), moves=tuple(moves))
-
-
-def _kind(stretch: Stretch, grinding: bool, on_wheel: bool) -> Kind:
-    if grinding:
-        return Kind.WHEEL
-    if on_wheel or stretch in (Stretch.APPROACH, Stretch.RETRACT):
-        return Kind.LEAD  # the move onto the wheel ends the approach
-    return Kind.AIR
 
 
 def _distinct_postures(q: Array) -> NDArray[np.intp]:
@@ -221,11 +214,19 @@ def _distinct_postures(q: Array) -> NDArray[np.intp]:
     return np.array(kept)
 
 
+def _without_repeats(motion: Motion, kept: NDArray[np.intp]) -> Motion:
+    """Return the kept configurations; what one is for, those that repeat it on the wheel say."""
+    repeats = np.split(np.arange(len(motion)), kept[1:])
+    on_wheel = motion.on_wheel
+    rows = [int(group[on_wheel[group].argmax()]) for group in repeats]
+    return replace(motion.take(rows), q=motion.q[kept])
+
+
 def _speeds(
-    motion: Motion, kept: NDArray[np.intp], max_speed: Array, joint_names: Sequence[str]
+    timed: TimedMotion, kept: NDArray[np.intp], max_speed: Array, joint_names: Sequence[str]
 ) -> Array:
     """Return the speed of the move to each kept posture, shape (len(kept),)."""
-    times = np.diff(np.cumsum(motion.duration)[kept])
+    motion, times = timed.motion, timed.take(kept).duration[1:]
     joint_times = np.abs(np.diff(motion.q[kept], axis=0)) / max_speed  # at top speed, [s]
     with np.errstate(divide="ignore"):
         speeds = np.concatenate([[START_SPEED], joint_times.max(axis=1) / times])
@@ -233,7 +234,8 @@ def _speeds(
     if speeds[m] > 1.0 + OVERSPEED:
         joint = joint_names[int(np.argmax(joint_times[m - 1]))]
         raise UnsafeError(
-            f"posture {kept[m]} ({motion.stretch[kept[m]].value}): joint {joint} would need "
+            f"posture {kept[m]} ({motion.kind[kept[m]].value}): joint {joint} would need "
             f"{100.0 * speeds[m]:.1f} % of its top speed"
         )
-    return np.minimum(speeds, 1.0)
+    possible: Array = np.minimum(speeds, 1.0)
+    return possible

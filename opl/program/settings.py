@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opl.program.actions import NO_ACTIONS, Actions
+from opl.program.moves import Kind
 
 Array = NDArray[np.float64]
 
@@ -56,6 +57,10 @@ class ByKind:
     on_wheel: int | None = None
     lead: int | None = None
     air: int | None = None
+
+    def of(self, kind: Kind) -> int | None:
+        """Return the number for a kind of move."""
+        return {Kind.WHEEL: self.on_wheel, Kind.LEAD: self.lead, Kind.AIR: self.air}[kind]
 
 
 @dataclass(frozen=True, eq=False)

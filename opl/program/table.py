@@ -31,8 +31,8 @@ def render_table(
     """Return the table, one row for each posture of the motion.
 
     Passes count from 1 as in the job's comments, cutter points from 0. A cell is empty where a
-    quantity is not defined: pass at home, cutter point and t off the wheel, clearance where none
-    was computed. Columns of pulses are there if all are known. Speed is what the program says, and
+    quantity is not defined: pass at home, cutter point and t off the wheel. Columns of pulses are
+    there if all are known. Speed is what the program says, and
     programmed_s the time of the move at it; both are empty for a posture that repeats the one
     before and so has no move of its own (the time of that row is in the move that follows), and
     programmed_s where nobody knows from where it comes.
@@ -58,16 +58,16 @@ def render_table(
         (
             str(motion.pass_index[i] + 1) if motion.pass_index[i] >= 0 else "",
             _fixed(motion.cutter_point[i], 4),
-            motion.stretch[i].value,
+            motion.kind[i].value,
             _fixed(motion.contact_position[i], 4),
             *(_fixed(angle, 4) for angle in angles[i]),
             *map(str, pulses[i]),
             *(_fixed(length, 3) for length in positions[i]),
             *(_fixed(angle, 4) for angle in rotations[i]),
-            _fixed(motion.duration[i], 4),
+            _fixed(verified.timed.duration[i], 4),
             _fixed(written.times.get(i, np.nan), 4),
             written.speeds.get(i, ""),
-            _fixed(motion.clearance[i] * 1e3, 3),
+            _fixed(verified.clearance[i] * 1e3, 3),
         )
         for i in range(len(motion))
     ]

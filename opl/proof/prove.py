@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
-from opl.motion.motion import Motion, Stretch
+from opl.motion.motion import TimedMotion
 from opl.program.controller import ControllerProfile
 from opl.program.inform.files import program_jobs
 from opl.program.inform.playback import play
@@ -30,7 +29,7 @@ class Proof:
         files: Names of the files.
         foreign: Names of the user's own jobs that are called and were not looked at.
         moves: Number of moves.
-        motion: The motion as recognised, None if the files do not tell one.
+        timed: The motion as recognised and its times, None if the files do not tell one.
         verification: What the replay found, None without a motion.
         findings: What is wrong.
     """
@@ -38,20 +37,19 @@ class Proof:
     files: tuple[str, ...]
     foreign: tuple[str, ...]
     moves: int
-    motion: Motion | None
+    timed: TimedMotion | None
     verification: Verification | None
     findings: tuple[Finding, ...]
 
     @property
     def ground(self) -> int:
         """Number of cutter points that are ground."""
-        stretches = () if self.motion is None else self.motion.stretch
-        return sum(stretch is Stretch.GRIND for stretch in stretches)
+        return 0 if self.timed is None else len(self.timed.motion.ground_points)
 
     @property
     def proven(self) -> bool:
         """Whether the program is safe and complete."""
-        return self.motion is not None and not self.findings
+        return self.timed is not None and not self.findings
 
 
 def prove(
@@ -80,21 +78,22 @@ def prove(
     rule = Rule(
         search.max_contact_error,
         search.interpolation.max_contact_step,
-        job.pace.approach_length,
-        job.pace.approach_turn,
+        job.process.approach_length,
+        job.process.approach_turn,
     )
     found = recognise(job.cell, points, playback.q, playback.duration, playback.stations, rule)
-    replayed = replay(job.cell, points, found.motion, search.max_contact_error, progress)
-    written = at_stations(found.motion, found.source, playback.stations)
+    replayed = replay(job.cell, points, found.timed, search.max_contact_error, progress)
+    # the written configurations; of one that grinds several cutter points, the last of its rows
+    rows = np.searchsorted(found.source, playback.stations, side="right") - 1
     findings = (
         *refused,
         *doubtful,
         *replayed.findings,
         *found.findings,
-        *written_findings(job, points, written, playback),
+        *written_findings(job, points, found.timed.take(rows), playback),
     )
     moves = len(playback.visits)
-    return Proof(tuple(files), foreign, moves, found.motion, replayed, findings)
+    return Proof(tuple(files), foreign, moves, found.timed, replayed, findings)
 
 
 def profile_of(job: Job) -> ControllerProfile:
@@ -110,25 +109,3 @@ def profile_of(job: Job) -> ControllerProfile:
             f"programs of Yaskawa controllers can be read, not those for {post.title}",
         )
     return post.profile
-
-
-def at_stations(motion: Motion, source: NDArray[np.intp], stations: NDArray[np.intp]) -> Motion:
-    """Return a motion with nothing but the written postures, the time between them summed.
-
-    Args:
-        motion: All postures.
-        source: Index of each in the postures that were played, ascending.
-        stations: Which of those are written.
-    """
-    # of a posture that grinds several cutter points, the last: there its move has come to
-    rows = np.searchsorted(source, stations, side="right") - 1
-    time = np.diff(np.cumsum(motion.duration)[rows], prepend=0.0)
-    return Motion(
-        motion.q[rows],
-        time,
-        tuple(motion.stretch[row] for row in rows),
-        motion.contact_position[rows],
-        motion.cutter_point[rows],
-        motion.pass_index[rows],
-        motion.clearance[rows],
-    )

@@ -18,7 +18,7 @@ from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
-from opl.motion.motion import Motion, VerifiedMotion
+from opl.motion.motion import Motion, TimedMotion, VerifiedMotion
 from opl.program.inform.files import program_jobs
 from opl.program.inform.playback import Playback, play
 from opl.program.inform.render import FILE_SUFFIX
@@ -116,7 +116,7 @@ def read_back(
     if other_ways:
         findings = (*findings, *prove(job, points, files).findings)
     else:
-        written = _with_times(verified.motion, postures, kept)
+        written = TimedMotion(verified.motion.take(postures), kept.duration)
         findings = (
             *findings,
             *limit_findings(job.cell, written),
@@ -157,19 +157,6 @@ def _differences(job: Job, playback: Playback, program: Program) -> Iterator[Fin
             told.append("does not stop")
         for line in told:
             yield Finding(Level.ERROR, "file", visit.place, line)
-
-
-def _with_times(motion: Motion, postures: list[int], playback: Playback) -> Motion:
-    """Return the written postures of a motion with the times that were read back."""
-    return Motion(
-        motion.q[postures],
-        playback.duration,
-        tuple(motion.stretch[k] for k in postures),
-        motion.contact_position[postures],
-        motion.cutter_point[postures],
-        motion.pass_index[postures],
-        motion.clearance[postures],
-    )
 
 
 def _apart(job: Job, q: Array, other: Array) -> float:

@@ -9,29 +9,28 @@ import numpy as np
 from opl.cell.workcell import WorkCell
 from opl.findings import Finding, Level
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.motion import Motion, Stretch
-from opl.verification.place import where
+from opl.motion.motion import Motion, TimedMotion
 
 SPEED_TOLERANCE = 1.001  # programmed speeds have four digits
 
 
-def limit_findings(cell: WorkCell, motion: Motion) -> list[Finding]:
-    """Return a finding for each posture beyond a limit and each move beyond a joint speed."""
-    robot, found = cell.robot, []
+def limit_findings(cell: WorkCell, timed: TimedMotion) -> list[Finding]:
+    """Return a finding for each configuration beyond a limit and each move beyond a speed."""
+    robot, motion, found = cell.robot, timed.motion, []
     beyond = np.maximum(robot.lower - motion.q, motion.q - robot.upper)
     for move, joint in np.argwhere(beyond > 1e-9):
         amount = f"{np.rad2deg(beyond[move, joint]):.3f} deg beyond its limit"
-        place, name = where(motion, move), robot.joint_names[joint]
+        place, name = motion.place(move), robot.joint_names[joint]
         found.append(Finding(Level.ERROR, "limit", place, f"joint {name}: {amount}"))
     found += _limits_of_cell(cell, motion)
     for move in range(1, len(motion)):
         turned = np.abs(motion.q[move] - motion.q[move - 1])
-        allowed = robot.max_speed * motion.duration[move] * SPEED_TOLERANCE
+        allowed = robot.max_speed * timed.duration[move] * SPEED_TOLERANCE
         for joint in np.flatnonzero(turned > allowed + 1e-12):
-            speed = np.rad2deg(turned[joint]) / max(motion.duration[move], 1e-12)
+            speed = np.rad2deg(turned[joint]) / max(timed.duration[move], 1e-12)
             most = np.rad2deg(robot.max_speed[joint])
             told = f"joint {robot.joint_names[joint]}: {speed:.1f} deg/s, {most:.1f} allowed"
-            found.append(Finding(Level.ERROR, "speed", where(motion, move), told))
+            found.append(Finding(Level.ERROR, "speed", motion.place(move), told))
     return found
 
 
@@ -50,16 +49,12 @@ def _limits_of_cell(cell: WorkCell, motion: Motion) -> Iterator[Finding]:
                 f"{limit.name}: {np.rad2deg(total):.3f} deg, must be in "
                 f"{np.rad2deg(limit.lower):g} to {np.rad2deg(limit.upper):g}"
             )
-            yield Finding(Level.ERROR, "limit", where(motion, move), told)
+            yield Finding(Level.ERROR, "limit", motion.place(move), told)
 
 
 def missing_points(points: CutterPoints, motion: Motion) -> list[Finding]:
     """Return a finding unless every cutter point is ground, once and in order."""
-    ground = [
-        int(point)
-        for point, stretch in zip(motion.cutter_point, motion.stretch, strict=True)
-        if stretch is Stretch.GRIND
-    ]
+    ground = motion.ground_points.tolist()
     if ground == list(range(len(points))):
         return []
     expected = next(

@@ -17,10 +17,9 @@ from opl.cell.workcell import WorkCell
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.motion import Motion, Stretch
+from opl.motion.motion import Motion, MoveKind, TimedMotion
 from opl.verification.align import align
 from opl.verification.contact import ALIGNED, Touches, find_touches
-from opl.verification.place import where
 from opl.verification.ways import Way, Ways
 from opl.verification.world import World
 
@@ -55,12 +54,13 @@ class Recognition:
     """A motion with its meaning.
 
     Attributes:
-        motion: The postures, labelled; one that grinds several cutter points at once is repeated.
+        timed: The configurations, labelled; one that grinds several cutter points at once is
+            repeated, the move to itself taking no time.
         source: Index of each of them in the postures that were given, shape (n,).
         findings: Postures that leave the way between two cutter points.
     """
 
-    motion: Motion
+    timed: TimedMotion
     source: NDArray[np.intp]
     findings: tuple[Finding, ...]
 
@@ -108,7 +108,7 @@ class _Labels:
         self._points = points
         self._Ts = Ts_contact0_workpiece
         self._rule = rule
-        self._stretch = [Stretch.HOME] * n
+        self._kind = [MoveKind.HOME] * n
         self._t = np.full(n, np.nan)
         self._place = np.full(n, np.nan)
         self._pass = np.full(n, -1)
@@ -121,10 +121,10 @@ class _Labels:
         t = touches.contact_position[ground]
         pass_index = self._points.pass_index[point]
         for k, i, position in zip(posture, point, t, strict=True):
-            if self._stretch[k] is Stretch.GRIND:
+            if self._kind[k] is MoveKind.GRIND:
                 self._also.setdefault(int(k), []).append((int(i), float(position)))
                 continue
-            self._mark(k, Stretch.GRIND, self._points.pass_index[i], position, i)
+            self._mark(k, MoveKind.GRIND, self._points.pass_index[i], position, i)
         for m in np.flatnonzero(np.diff(pass_index) == 0):
             self._fill_in(ways.between(int(ground[m]), int(ground[m + 1])), int(pass_index[m]))
         first, last = self._lead_ins(posture, point, t, pass_index)
@@ -143,34 +143,32 @@ class _Labels:
                 time[row] = 0.0
         motion = Motion(
             q=q[source],
-            duration=time,
-            stretch=tuple(self._stretch[k] for k in source),
+            kind=tuple(self._kind[k] for k in source),
             contact_position=t,
             cutter_point=place,
             pass_index=self._pass[source],
-            clearance=np.full(len(source), np.nan),
         )
         findings = tuple(
             Finding(
                 Level.ERROR,
                 "contact",
-                where(motion, int(np.searchsorted(source, k))),
+                motion.place(int(np.searchsorted(source, k))),
                 f"{1e3 * amount:.3f} mm off the way to the next cutter point, "
                 f"{1e3 * self._rule.max_contact_error:g} mm allowed",
             )
             for k, amount in self._astray
         )
-        return Recognition(motion, source, findings)
+        return Recognition(TimedMotion(motion, time), source, findings)
 
-    def _mark(self, k: int, stretch: Stretch, pass_index: int, t: float, place: float) -> None:
-        self._stretch[k], self._pass[k] = stretch, pass_index
+    def _mark(self, k: int, kind: MoveKind, pass_index: int, t: float, place: float) -> None:
+        self._kind[k], self._pass[k] = kind, pass_index
         self._t[k], self._place[k] = t, place
 
     def _fill_in(self, way: Way, pass_index: int) -> None:
         """Label the postures between two that grind cutter points."""
         columns = (way.postures, way.place, way.contact_position, way.apart)
         for k, place, t, apart in zip(*columns, strict=True):
-            self._mark(int(k), Stretch.BETWEEN, pass_index, t, place)
+            self._mark(int(k), MoveKind.BETWEEN, pass_index, t, place)
             if apart > self._rule.max_contact_error:
                 self._astray.append((int(k), float(apart)))
 
@@ -188,11 +186,11 @@ class _Labels:
             begin, end = on_pass[0], on_pass[-1]
             reach = self._leading(posture[begin], point[begin], t[begin], -1)
             for k in reach[:-1]:  # the move to the farthest of them is free
-                self._mark(k, Stretch.APPROACH, index, np.nan, np.nan)
+                self._mark(k, MoveKind.APPROACH, index, np.nan, np.nan)
             firsts.append(min(reach, default=int(posture[begin])))
             away = self._leading(posture[end], point[end], t[end], 1)
             for k in away:
-                self._mark(k, Stretch.RETRACT, index, np.nan, np.nan)
+                self._mark(k, MoveKind.RETRACT, index, np.nan, np.nan)
             lasts.append(max(away, default=int(posture[end])))
         return firsts, lasts
 
@@ -202,7 +200,7 @@ class _Labels:
         to_contact = inverse(self._wheel.T_contact0_contact(t))
         farthest, found = 0.0, []
         j = int(k) + step
-        while 0 <= j < len(self._Ts) and self._stretch[j] is Stretch.HOME:
+        while 0 <= j < len(self._Ts) and self._kind[j] is MoveKind.HOME:
             T_contact_cutter = to_contact @ self._Ts[j] @ T_cutter
             along, aside = self._along_lead(T_contact_cutter[:3, 3], step)
             turned = np.linalg.norm(T_contact_cutter[:3, :3] - np.eye(3)) / np.sqrt(2.0)
@@ -231,12 +229,12 @@ class _Labels:
 
     def _name_the_air(self, firsts: list[int], lasts: list[int]) -> None:
         """Tell the ways from and to home from the links between passes."""
-        for k in range(len(self._stretch)):
-            if self._stretch[k] is not Stretch.HOME or not firsts:
+        for k in range(len(self._kind)):
+            if self._kind[k] is not MoveKind.HOME or not firsts:
                 continue
             following = next((m for m, first in enumerate(firsts) if k <= first), None)
             if following is None or k == 0:
                 continue  # on the way home, or at home
             self._pass[k] = self._pass[lasts[following]]
             if following > 0:
-                self._stretch[k] = Stretch.LINK
+                self._kind[k] = MoveKind.LINK

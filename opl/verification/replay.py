@@ -12,7 +12,7 @@ leaves out nothing; it covers the moves between the checked poses as well.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,9 +21,8 @@ from opl.findings import Finding, Level
 from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.motion import Motion, Stretch, VerifiedMotion
+from opl.motion.motion import Motion, MoveKind, TimedMotion, VerifiedMotion
 from opl.verification.limits import limit_findings, missing_points
-from opl.verification.place import where
 from opl.verification.world import World
 
 STEP = 1e-3  # [m]
@@ -36,8 +35,10 @@ AHEAD = 0.03  # [m] beyond what is asked that is measured: so long a pair can be
 GAP_ACCURACY = 1e-4  # [m]
 FARTHEST_GAP = 0.005  # [m] between part and wheel that is measured while grinding
 
-ON_WHEEL = (Stretch.GRIND, Stretch.BETWEEN)
-ALONG_LEAD = (Stretch.APPROACH, Stretch.RETRACT)
+# What a kind of move means for the contact is read here anew: a mistake in what the motion says of
+# itself must not go through the proof unseen.
+ON_WHEEL = (MoveKind.GRIND, MoveKind.BETWEEN)
+ALONG_LEAD = (MoveKind.APPROACH, MoveKind.RETRACT)
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Verification:
 def replay(
     cell: WorkCell,
     points: CutterPoints,
-    motion: Motion,
+    timed: TimedMotion,
     max_contact_error: float,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> Verification:
@@ -78,11 +79,12 @@ def replay(
     Args:
         cell: The cell.
         points: The cutter points that are to be ground.
-        motion: The motion.
+        timed: The motion and its times.
         max_contact_error: Largest distance of the ground point from the wheel's surface allowed,
             in [m].
         progress: Told the part of the motion that is done, 0 to 1.
     """
+    motion = timed.motion
     with World(cell) as world:
         run = _Run(cell, world, points, motion, max_contact_error)
         for move in range(len(motion)):
@@ -91,10 +93,9 @@ def replay(
                 progress(move / len(motion))
         version = world.version
     findings = run.findings.worst()
-    limits = limit_findings(cell, motion)
+    limits = limit_findings(cell, timed)
     missing = missing_points(points, motion)
     findings = (*findings, *limits, *missing)
-    motion = replace(motion, clearance=run.clearance)
     return Verification(
         engine=f"PyBullet {version}",
         poses=run.poses,
@@ -103,7 +104,7 @@ def replay(
         max_contact_error=run.max_contact_error,
         limit_violations=len(limits),
         findings=findings,
-        verified=None if findings else VerifiedMotion(motion),
+        verified=None if findings else VerifiedMotion(timed, run.clearance),
     )
 
 
@@ -159,7 +160,7 @@ class _Run:
         for name in world.surrounding():
             self.collisions += 1
             told = f"robot and {name}"
-            self.findings.add("collision", "start", where(motion, 0), told, 0.0, "one in the other")
+            self.findings.add("collision", "start", motion.place(0), told, 0.0, "one in the other")
 
     def make_move(self, move: int) -> None:
         """Go on to a posture, checking on the way."""
@@ -213,9 +214,9 @@ class _Run:
     def _check_wheel(self, move: int) -> bool:
         """Check part against wheel as bodies; return whether they collide."""
         motion, cell = self._motion, self._cell
-        grinding = motion.stretch[move] in ON_WHEEL
-        touching_down = grinding and motion.stretch[move - 1] is Stretch.APPROACH
-        free = not grinding and motion.stretch[move] not in ALONG_LEAD
+        grinding = motion.kind[move] in ON_WHEEL
+        touching_down = grinding and motion.kind[move - 1] is MoveKind.APPROACH
+        free = not grinding and motion.kind[move] not in ALONG_LEAD
         off_wheel = cell.pairs.required.get(frozenset((PART, WHEEL)), cell.required_clearance)
         needed = off_wheel if free else -cell.max_belt_penetration
         farthest = self._allowed_error + GAP_ACCURACY if grinding and not touching_down else np.inf
@@ -237,10 +238,10 @@ class _Run:
             T_base_workpiece: Where the part is, shape (4, 4).
         """
         motion = self._motion
-        if motion.stretch[move] not in ON_WHEEL:
+        if motion.kind[move] not in ON_WHEEL:
             return
         place = motion.cutter_point[move]
-        if motion.stretch[move - 1] in ON_WHEEL:
+        if motion.kind[move - 1] in ON_WHEEL:
             place -= (1.0 - fraction) * (place - motion.cutter_point[move - 1])
         elif fraction < 1.0:
             return  # touching down
@@ -257,7 +258,7 @@ class _Run:
         self.findings.add(
             "contact",
             self._place(move),
-            where(self._motion, move),
+            self._motion.place(move),
             subject,
             error,
             f"{1e3 * error:.3f} mm from the wheel's surface, "
@@ -273,11 +274,11 @@ class _Run:
         self.findings.add(
             "collision",
             self._place(move),
-            where(self._motion, move),
+            self._motion.place(move),
             f"{first} and {second}",
             needed - distance,
             told,
         )
 
     def _place(self, move: int) -> str:
-        return f"{self._motion.stretch[move].value} {self._motion.pass_index[move]}"
+        return f"{self._motion.kind[move].value} {self._motion.pass_index[move]}"

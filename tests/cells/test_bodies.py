@@ -194,7 +194,7 @@ def test_an_arm_inside_a_solid_is_told_though_no_surface_meets():
     cell = replace(v_job().cell, obstacles=())
     hall = Body("hall", block((20.0, 20.0, 20.0)), np.eye(4))
     ready = replace(cell, obstacles=(hall,))
-    home = v_job().pace.home
+    home = v_job().process.home
     assert CollisionScene(ready).colliding_pairs(home) == []
     assert enclosing_bodies(ready, home) == [("flange", "hall"), ("part", "hall")]
     assert replay_nothing(ready).verified is None

@@ -13,7 +13,7 @@ from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import part_tree
 from opl.motion.check import RESOLUTION, densify, find_faults
-from opl.motion.motion import Stretch
+from opl.motion.motion import MoveKind
 from tests.support.bare_cells import bare_cell, block, free_move, with_obstacle
 from tests.support.fcl_scene import FclScene
 from tests.support.planned import small_motion, small_problem
@@ -44,8 +44,8 @@ def test_a_posture_held_is_one_posture():
     assert move.tolist() == [0, 1, 2]
 
 
-def faults_of(cell, motion):
-    return find_faults(cell, CollisionScene(cell), part_tree(cell.part), motion)
+def faults_of(cell, timed):
+    return find_faults(cell, CollisionScene(cell), part_tree(cell.part), timed.motion)
 
 
 def test_a_planned_motion_has_no_faults():
@@ -114,7 +114,7 @@ def shifted_along_normal(motion, index, depth):
 def test_the_part_may_sink_into_the_belt_by_the_allowance(depth, found):
     problem, motion = small_problem(), small_motion()
     # on the flat: an edge of the wheel can sink in between two samples of the part
-    grind = np.array([stretch is Stretch.GRIND for stretch in motion.stretch])
+    grind = np.array([stretch is MoveKind.GRIND for stretch in motion.kind])
     index = int(np.argmin(np.where(grind, np.abs(motion.contact_position), np.inf)))
     assert abs(motion.contact_position[index]) < 20.0
     moved = shifted_along_normal(motion, index, depth)
@@ -127,8 +127,8 @@ def test_the_part_may_sink_into_the_belt_by_the_allowance(depth, found):
 
 def test_a_free_move_keeps_the_clearance_from_the_wheel():
     problem, motion = small_problem(), small_motion()
-    on_wheel = next(k for k, s in enumerate(motion.stretch) if s is Stretch.GRIND)
-    hold = free_move(motion.q[[on_wheel, on_wheel]])
+    on_wheel = next(k for k, s in enumerate(motion.kind) if s is MoveKind.GRIND)
+    hold = free_move(motion.q[[on_wheel, on_wheel]]).motion
     faults = find_faults(problem.cell, problem.scene, problem.part, hold)
     assert [fault.pair for fault in faults] == [("part", "wheel")] * 2
 

@@ -83,8 +83,8 @@ def test_the_answer_does_not_depend_on_what_was_asked_before():
 def test_the_home_posture_of_the_job_is_free():
     job = v_job()
     scene = CollisionScene(job.cell)
-    assert not scene.collides(job.pace.home[None])[0]
-    assert scene.colliding_pairs(job.pace.home) == []
+    assert not scene.collides(job.process.home[None])[0]
+    assert scene.colliding_pairs(job.process.home) == []
 
 
 def test_no_posture_is_no_answer():

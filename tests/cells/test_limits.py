@@ -13,7 +13,7 @@ from opl.cell.joint_limits import JointLimit
 from opl.field.nodes import build_nodes
 from opl.field.path import BrokenStepError, fill_in
 from opl.motion.air import UnreachableApproachError, whole_motion
-from opl.motion.motion import Stretch
+from opl.motion.motion import MoveKind
 from opl.planning.plan import plan_recursive
 from opl.planning.reasons import explain
 from opl.planning.states import NodeState, node_states
@@ -107,13 +107,13 @@ def test_a_step_and_an_approach_beyond_a_limit_are_refused_by_name():
     problem = tiny_problem()
     plan = plan_recursive(problem)
     motion, path = plan.motion, plan.path
-    leads = [k for k, s in enumerate(motion.stretch) if s is Stretch.RETRACT]
+    leads = [k for k, s in enumerate(motion.kind) if s is MoveKind.RETRACT]
     lead = motion.q[leads[-1]]
     cell = replace(
         problem.cell, limits=(JointLimit("U only", np.eye(6)[2], lead[2] + 1e-3, EVERYWHERE),)
     )
     with pytest.raises(UnreachableApproachError) as refused:
-        whole_motion(cell, problem.points, path, problem.pace)
+        whole_motion(cell, problem.points, path, problem.process)
     assert refused.value.cause == "limits of U only"
 
     nodes = next(n for n in problem.field.branches if n.branch == path.branch)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from opl.files.resources import folder
 from opl.geometry.frames import inverse
 from opl.job.load import load
-from opl.motion.motion import Stretch
+from opl.motion.motion import MoveKind
 from opl.pipeline import cutter_points
 from opl.verification.align import align
 from opl.verification.between import frames_at, place_between
@@ -19,10 +19,21 @@ from opl.verification.contact import Touches, contact_positions, find_touches, m
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import replay
 from opl.verification.ways import Ways
-from tests.support.planned import small_job, small_motion, small_problem, tiny_motion, tiny_problem
+from tests.support.planned import (
+    small_job,
+    small_motion,
+    small_problem,
+    small_timed,
+    tiny_motion,
+    tiny_problem,
+    tiny_timed,
+)
 
 RULE = Rule(
-    1e-4, small_job().search.interpolation.max_contact_step, small_job().pace.approach_length, 0.0
+    1e-4,
+    small_job().search.interpolation.max_contact_step,
+    small_job().process.approach_length,
+    0.0,
 )
 
 
@@ -34,10 +45,10 @@ def recognised(problem, q, duration=None):
 
 def test_the_labels_of_a_planned_motion_are_found_again():
     motion = small_motion()
-    found = recognised(small_problem(), motion.q, motion.duration).motion
-    assert found.stretch == motion.stretch
+    found = recognised(small_problem(), motion.q, small_timed().duration).timed.motion
+    assert found.kind == motion.kind
     np.testing.assert_array_equal(found.pass_index, motion.pass_index)
-    at_points = [k for k, s in enumerate(motion.stretch) if s is Stretch.GRIND]
+    at_points = [k for k, s in enumerate(motion.kind) if s is MoveKind.GRIND]
     np.testing.assert_array_equal(found.cutter_point[at_points], motion.cutter_point[at_points])
     np.testing.assert_allclose(
         found.contact_position[at_points], motion.contact_position[at_points], atol=0.01
@@ -51,16 +62,16 @@ def test_the_labels_of_a_planned_motion_are_found_again():
 
 def test_what_was_recognised_is_proven_by_the_same_replay():
     problem = tiny_problem()
-    found = recognised(problem, tiny_motion().q, tiny_motion().duration)
+    found = recognised(problem, tiny_motion().q, tiny_timed().duration)
     assert found.findings == ()
-    assert replay(problem.cell, problem.points, found.motion, 1e-4).verified is not None
+    assert replay(problem.cell, problem.points, found.timed, 1e-4).verified is not None
 
 
 def about_an_edge():
     """Return a posture about an edge; flat on the flat, those beside it touch the same points."""
     motion, wheel = small_motion(), small_problem().cell.wheel
     at_edge = np.abs(motion.contact_position) > wheel.flat_end + 5.0
-    grinds = [k for k, s in enumerate(motion.stretch) if s is Stretch.GRIND and at_edge[k]]
+    grinds = [k for k, s in enumerate(motion.kind) if s is MoveKind.GRIND and at_edge[k]]
     return grinds[len(grinds) // 4]
 
 
@@ -68,30 +79,29 @@ def test_a_posture_off_the_wheel_costs_its_cutter_point_alone():
     motion, problem, k = small_motion(), small_problem(), about_an_edge()
     q = motion.q.copy()
     q[k, 5] += 0.02
-    found = recognised(problem, q, motion.duration)
-    labels = zip(found.motion.cutter_point, found.motion.stretch, strict=True)
-    ground = [int(point) for point, stretch in labels if stretch is Stretch.GRIND]
-    assert ground == [p for p in range(len(problem.points)) if p != motion.cutter_point[k]]
-    assert found.motion.stretch[k] is Stretch.BETWEEN
+    found = recognised(problem, q, small_timed().duration)
+    others = [p for p in range(len(problem.points)) if p != motion.cutter_point[k]]
+    assert found.timed.motion.ground_points.tolist() == others
+    assert found.timed.motion.kind[k] is MoveKind.BETWEEN
     assert any("off the way" in one.message for one in found.findings)
 
 
 def test_nothing_is_recognised_where_nothing_is_ground():
-    found = recognised(tiny_problem(), tiny_motion().q[:2])
-    assert set(found.motion.stretch) == {Stretch.HOME}
-    assert (found.motion.pass_index == -1).all()
+    found = recognised(tiny_problem(), tiny_motion().q[:2]).timed.motion
+    assert set(found.kind) == {MoveKind.HOME}
+    assert (found.pass_index == -1).all()
 
 
 def test_an_approach_from_the_side_is_no_approach():
     motion, problem = tiny_motion(), tiny_problem()
-    k = next(k for k, s in enumerate(motion.stretch) if s is Stretch.APPROACH)
+    k = next(k for k, s in enumerate(motion.kind) if s is MoveKind.APPROACH)
     q = motion.q.copy()
     q[k, 0] += 0.01
-    found = recognised(problem, q, motion.duration).motion
-    assert found.stretch[k] is Stretch.HOME
+    found = recognised(problem, q, tiny_timed().duration).timed.motion
+    assert found.kind[k] is MoveKind.HOME
     # the next one is now where the approach begins: the move to it is free
-    assert found.stretch[k + 1] is Stretch.HOME
-    assert found.stretch[k + 2 : k + 4] == motion.stretch[k + 2 : k + 4]
+    assert found.kind[k + 1] is MoveKind.HOME
+    assert found.kind[k + 2 : k + 4] == motion.kind[k + 2 : k + 4]
 
 
 @pytest.mark.parametrize("t", [-69.0, -40.0, -25.0, -24.9, 0.0, 3.0, 25.0, 26.0, 70.0])
@@ -242,8 +252,9 @@ def test_postures_that_grind_several_points_are_repeated():
     Ts = problem.points.Ts_workpiece_cutter.copy()
     Ts[point + 1] = Ts[point]
     twice = replace(problem.points, Ts_workpiece_cutter=Ts)
-    found = recognise(problem.cell, twice, motion.q, motion.duration, np.arange(len(motion)), RULE)
+    duration = small_timed().duration
+    found = recognise(problem.cell, twice, motion.q, duration, np.arange(len(motion)), RULE)
     rows = np.flatnonzero(found.source == k)
-    assert found.motion.cutter_point[rows].tolist() == [point, point + 1]
-    assert [found.motion.stretch[row] for row in rows] == [Stretch.GRIND] * 2
-    assert found.motion.duration[rows[1]] == 0.0
+    assert found.timed.motion.cutter_point[rows].tolist() == [point, point + 1]
+    assert [found.timed.motion.kind[row] for row in rows] == [MoveKind.GRIND] * 2
+    assert found.timed.duration[rows[1]] == 0.0

@@ -54,8 +54,8 @@ def test_values_are_in_si(tmp_path):
     assert wheel.max_roll == pytest.approx(math.pi / 4)
     assert job.passes.max_bow_height == pytest.approx(5e-5)
     assert job.search.max_contact_error == pytest.approx(1e-4)
-    assert job.pace.home == pytest.approx(np.deg2rad([15, -45, -50, 0, 50, -180]))
-    assert job.pace.feed == pytest.approx(0.02)
+    assert job.process.home == pytest.approx(np.deg2rad([15, -45, -50, 0, 50, -180]))
+    assert job.process.feed == pytest.approx(0.02)
 
 
 def test_rounded_matrices_are_made_proper(tmp_path):

@@ -36,7 +36,7 @@ def without_files():
 def test_a_mapping_gives_the_job_of_its_file(tmp_path):
     of_file, of_mapping = load_job(write_job(tmp_path)), load_job(document(), folder=V_SHAPE)
     np.testing.assert_array_equal(of_mapping.cell.part.vertices, of_file.cell.part.vertices)
-    np.testing.assert_array_equal(of_mapping.pace.home, of_file.pace.home)
+    np.testing.assert_array_equal(of_mapping.process.home, of_file.process.home)
     assert of_mapping.search.interpolation == of_file.search.interpolation
     assert of_mapping.path == Path("job")
 

@@ -12,7 +12,6 @@ from scipy.sparse.csgraph import dijkstra
 from opl.cell.robot import forward_kinematics
 from opl.motion.check import RESOLUTION, densify
 from opl.motion.figures import figures_of_path
-from opl.motion.timing import timed
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import roughness
 from opl.planning.finer_bound import finer_bound
@@ -29,7 +28,7 @@ from opl.verification.replay import replay
 from tests.support.bare_cells import Ghosts
 from tests.support.fcl_scene import FclScene
 from tests.support.jobs import opl, write_job
-from tests.support.planned import problem_of, small_job, v_job, with_positions
+from tests.support.planned import problem_of, small_job, timed, v_job, with_positions
 
 SETTINGS = v_job().search.optimal
 ONLY_TRAVEL = replace(
@@ -149,9 +148,8 @@ def test_the_motion_is_free_in_two_other_scenes():
     scene = FclScene(problem.cell)
     dense, _ = densify(plan.motion.q, RESOLUTION)
     assert all(min(scene.clearances(q).values(), default=1.0) > 0.0 for q in dense[::4])
-    motion = timed(plan.motion, problem.points, problem.pace, problem.cell.robot)
     allowed = small_job().search.max_contact_error
-    verification = replay(problem.cell, problem.points, motion, allowed)
+    verification = replay(problem.cell, problem.points, timed(problem, plan.motion), allowed)
     assert verification.verified is not None, verification.findings
 
 
@@ -269,11 +267,11 @@ def test_the_least_time_is_a_shortest_path_of_scipy():
     problem = one_row()
     slow = replace(problem.cell.robot, max_speed=problem.cell.robot.max_speed / 40.0)
     problem = replace(problem, cell=replace(problem.cell, robot=slow))
-    arc = np.abs(np.diff(problem.points.arc_length)) / problem.pace.feed
+    arc = np.abs(np.diff(problem.points.arc_length)) / problem.process.feed
 
     def seconds(q_a, q_b, t_a, t_b, column):
         turning = (np.abs(q_b - q_a) / slow.max_speed).max(axis=1)
-        sliding = np.abs(t_b - t_a) / problem.pace.contact_speed
+        sliding = np.abs(t_b - t_a) / problem.process.contact_speed
         return np.maximum(np.maximum(turning, sliding), arc[column])
 
     plan = plan_cheapest(problem, ONLY_TIME, SETTINGS.max_contact_change)
@@ -296,7 +294,7 @@ def weighted(problem, weights, fallback):
 
 def sum_of(problem, plan, weights):
     robot = problem.cell.robot
-    figures = figures_of_path(plan.path, plan.motion, problem.points, problem.pace, robot)
+    figures = figures_of_path(plan.path, plan.motion, problem.points, problem.process, robot)
     return (
         weights.joint_range * np.ptp(on_wheel(plan.motion), axis=0).sum()
         + weights.travel * figures.joint_travel
@@ -320,13 +318,13 @@ def test_a_weighted_sum_is_what_the_motion_has_and_no_more_than_other_methods_ha
 def test_no_track_of_a_tiny_field_has_less_than_the_bound_of_the_weighted_sum(first):
     problem = problem_of(with_positions(small_job(), 7), slice(first, first + 4))
     plan = weighted(problem, WEIGHTS, plan_recursive(problem))
-    robot, pace, points = problem.cell.robot, problem.pace, problem.points
-    arc = np.abs(np.diff(points.arc_length)) / pace.feed
+    robot, process, points = problem.cell.robot, problem.process, problem.points
+    arc = np.abs(np.diff(points.arc_length)) / process.feed
     on = np.diff(points.pass_index) == 0
     least = np.inf
     for q, t in free_tracks(problem):
         turned = np.abs(np.diff(q, axis=0))
-        sliding = np.abs(np.diff(t)) / pace.contact_speed
+        sliding = np.abs(np.diff(t)) / process.contact_speed
         seconds = np.maximum(np.maximum(arc, sliding), (turned / robot.max_speed).max(axis=1))
         total = np.ptp(q, axis=0).sum() + 0.5 * turned[on].sum() + 0.05 * seconds[on].sum()
         least = min(least, total)

@@ -12,7 +12,7 @@ from opl.field.nodes import build_nodes
 from opl.files.resources import folder
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import load
-from opl.motion.timing import timed
+from opl.motion.timing import time_motion
 from opl.pipeline import cutter_points
 from opl.planning.plan import plan_recursive
 from opl.planning.problem import GrindingProblem
@@ -57,7 +57,7 @@ def problem_of(job, points_of=None):
         build_nodes(job.cell, points, positions),
         wheel_layer(job.cell, part, points, positions),
         job.search.interpolation,
-        job.pace,
+        job.process,
     )
 
 
@@ -81,17 +81,24 @@ def small_plan():
     return plan_recursive(small_problem())
 
 
-@cache
+def timed(problem, motion):
+    """Return a motion with its times."""
+    return time_motion(motion, problem.points, problem.process, problem.cell.robot).timed
+
+
 def small_motion():
-    """Return a free and timed motion over the two rows."""
-    problem = small_problem()
-    return timed(small_plan().motion, problem.points, problem.pace, problem.cell.robot)
+    """Return a free motion over the two rows."""
+    return small_plan().motion
 
 
 @cache
-def v_motion():
-    problem = v_problem()
-    return timed(v_plan().motion, problem.points, problem.pace, problem.cell.robot)
+def small_timed():
+    return timed(small_problem(), small_motion())
+
+
+@cache
+def v_timed():
+    return timed(v_problem(), v_plan().motion)
 
 
 @cache
@@ -100,20 +107,22 @@ def tiny_problem():
     problem = problem_of(with_positions(small_job(), 30), points_of=slice(50, 70))
     on_the_way = plan_recursive(problem).motion.q[1]  # where the first approach begins
     home = on_the_way + np.array([0.3, -0.2, 0.0, 0.2, 0.1, 0.2])
-    return replace(problem, pace=replace(problem.pace, home=home))
+    return replace(problem, process=replace(problem.process, home=home))
 
 
 @cache
+def tiny_timed():
+    return timed(tiny_problem(), plan_recursive(tiny_problem()).motion)
+
+
 def tiny_motion():
-    problem = tiny_problem()
-    motion = plan_recursive(problem).motion
-    return timed(motion, problem.points, problem.pace, problem.cell.robot)
+    return tiny_timed().motion
 
 
-def replay_tiny(motion=None, cell=None):
+def replay_tiny(timed=None, cell=None):
     """Replay the tiny motion, or another one, or in another cell."""
     problem, allowed = tiny_problem(), small_job().search.max_contact_error
-    return replay(cell or problem.cell, problem.points, motion or tiny_motion(), allowed)
+    return replay(cell or problem.cell, problem.points, timed or tiny_timed(), allowed)
 
 
 def with_problem_cell(problem, cell):

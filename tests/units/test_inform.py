@@ -103,7 +103,8 @@ def test_stops_and_passes_have_their_levels():
 
 
 def test_programmed_time_of_each_pass_is_the_wanted_one_within_two_percent():
-    motion = verified_motion(n_points=60).motion
+    timed = verified_motion(n_points=60).timed
+    motion = timed.motion
     job = parse(render(sample(n_points=60), ROBOT, DATE))
     pulses = np.array([position.values for position in job.positions])
     q = SCALE.to_angles(pulses)
@@ -113,7 +114,7 @@ def test_programmed_time_of_each_pass_is_the_wanted_one_within_two_percent():
     for pass_index in (0, 1):
         ground = (motion.pass_index == pass_index) & ~np.isnan(motion.contact_position)
         written = times[ground[posture[1:]] & ground[posture[:-1] + 1]].sum()
-        assert written == pytest.approx(motion.duration[ground].sum(), rel=0.02)
+        assert written == pytest.approx(timed.duration[ground].sum(), rel=0.02)
 
 
 def test_unverified_ratios_are_said_at_the_top_of_every_job():

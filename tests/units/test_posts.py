@@ -9,7 +9,6 @@ from click.testing import CliRunner
 from opl.cell.robot import forward_kinematics
 from opl.cli.commands import main
 from opl.errors import InputError, OplError
-from opl.motion.motion import VerifiedMotion
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.inform import find_faults, parse
 from opl.program.inform.layout import VARIABLES, JobLayout, Step
@@ -18,7 +17,14 @@ from opl.program.posts import GROUP, find_post, known_posts
 from opl.program.profiles import PROFILES
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
 from opl.program.write import StraightLimit, write_program
-from tests.support.program_samples import DATE, MAX_SPEED, ROBOT, UNVERIFIED, verified_motion
+from tests.support.program_samples import (
+    DATE,
+    MAX_SPEED,
+    ROBOT,
+    UNVERIFIED,
+    slowed,
+    verified_motion,
+)
 
 YASKAWA = ("NX100", "DX100", "DX200", "YRC1000")
 OTHERS = ("RAPID", "KRL", "FANUC", "URSCRIPT")
@@ -37,16 +43,8 @@ def write(controller, *, robot=ROBOT, name="SAMPLE", n_passes=2, **changes):
     motion = verified_motion(n_passes=n_passes, n_points=6)
     settings = replace(settings, **changes)
     if (controller, settings.motion) == ("KRL", MotionForm.JOINT):
-        motion = at_feed(motion, 0.2)  # else too slow for whole percents
+        motion = slowed(motion, 0.2)  # else too slow for whole percents
     return write_program(motion, name, robot, settings, limit, DATE, ["CELL 7"])
-
-
-def at_feed(verified, factor):
-    """The motion with its passes ground in a part of their time, or in more."""
-    motion = verified.motion
-    on_wheel = ~np.isnan(motion.contact_position)
-    duration = np.where(on_wheel, motion.duration * factor, motion.duration)
-    return VerifiedMotion(replace(motion, duration=duration))
 
 
 def programs(controller, **changes):
@@ -267,7 +265,7 @@ def test_other_makers_read_back_what_a_template_gives(tmp_path, controller, old,
 
 
 def test_pass_too_slow_for_whole_percents_is_refused():
-    program = plan_moves(at_feed(verified_motion(), 2.0), "SAMPLE", MAX_SPEED)
+    program = plan_moves(slowed(verified_motion(), 2.0), "SAMPLE", MAX_SPEED)
     with pytest.raises(OplError, match="pass 1 would take"):
         find_post("KRL").write(program, ROBOT, ProgramSettings(), DATE)
 

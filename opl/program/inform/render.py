@@ -23,7 +23,7 @@ from opl.program.inform.words import ActionWriter
 from opl.program.layout import fill
 from opl.program.moves import Move, Program
 from opl.program.names import short_name
-from opl.program.settings import ByKind, PositionForm, ProgramSettings
+from opl.program.settings import PositionForm, ProgramSettings
 from opl.program.split import split
 
 FILE_SUFFIX = ".JBI"
@@ -124,7 +124,7 @@ def _steps(
                 configuration=configuration if configuration != configuration_before else None,
                 word=word,
                 speed=speed,
-                level=str(STOP_LEVEL if move.exact_stop else _of_kind(settings.levels, move)),
+                level=str(STOP_LEVEL if move.exact_stop else settings.levels.of(move.kind)),
                 ramps=_ramps(move, settings),
                 comment=move.comment,
                 actions=actions.lines(move.actions),
@@ -134,14 +134,9 @@ def _steps(
     return tuple(steps)
 
 
-def _of_kind(numbers: ByKind, move: Move) -> int | None:
-    number: int | None = getattr(numbers, move.kind.value)
-    return number
-
-
 def _ramps(move: Move, settings: ProgramSettings) -> str:
     pairs = (("ACC", settings.acceleration), ("DEC", settings.deceleration))
-    found = ((word, _of_kind(numbers, move)) for word, numbers in pairs)
+    found = ((word, numbers.of(move.kind)) for word, numbers in pairs)
     return "".join(f" {word}={percent}" for word, percent in found if percent is not None)
 
 
