@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from opl import documents
 from opl.cell.wheel_distance import use_threads
 from opl.deliver import deliver
 from opl.errors import InputError, NoPathError, OplError, UnsafeError
+from opl.files import documents
 from opl.job.load import load
 from opl.pipeline import run
 from opl.result import reasons, result

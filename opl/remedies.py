@@ -26,7 +26,7 @@ ASKED_COLUMNS = 8  # cutter points that must have a free posture before a change
 # smallest first: of each kind the first that opens the job is told
 MORE_ROLL_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)
 OTHER_WIDTH_MM = (-5.0, 10.0, -10.0, -20.0, 25.0, -30.0)
-MORE_ALLOWANCE_MM = (0.25, 0.5, 1.0, 2.0)
+MORE_PENETRATION_MM = (0.25, 0.5, 1.0, 2.0)
 ROUND_THE_RIM_DEG = (15.0, -15.0, 30.0, -30.0, 60.0, -60.0, 90.0, -90.0, 180.0)
 TURNED_FIXTURE_DEG = (10.0, -10.0, 20.0, -20.0, 45.0, -45.0, 90.0, -90.0, 180.0)
 
@@ -46,7 +46,7 @@ def find_remedies(job: Job, points: CutterPoints) -> list[str]:
     kinds: list[Callable[[WorkCell], Iterator[Change]]] = [
         _more_roll,
         _other_width,
-        _more_allowance,
+        _more_penetration,
         _other_side,
         _fed_the_other_way,
         _turned_fixture,
@@ -98,11 +98,11 @@ def _other_width(cell: WorkCell) -> Iterator[Change]:
             yield f"wheel.width_mm {now + more:g} instead of {now:g}", replace(cell, wheel=wheel)
 
 
-def _more_allowance(cell: WorkCell) -> Iterator[Change]:
-    now = cell.contact_allowance * MM
-    for more in MORE_ALLOWANCE_MM:
-        told = f"wheel.contact_allowance_mm {now + more:g} instead of {now:g}"
-        yield told, replace(cell, contact_allowance=(now + more) / MM)
+def _more_penetration(cell: WorkCell) -> Iterator[Change]:
+    now = cell.max_belt_penetration * MM
+    for more in MORE_PENETRATION_MM:
+        told = f"wheel.max_belt_penetration_mm {now + more:g} instead of {now:g}"
+        yield told, replace(cell, max_belt_penetration=(now + more) / MM)
 
 
 def _other_side(cell: WorkCell) -> Iterator[Change]:

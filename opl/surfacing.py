@@ -8,12 +8,10 @@ from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.inspection import Inspection, inspect
 from opl.geometry.nurbs import DegenerateNormalError
-from opl.geometry.passes import LaidPasses, lay_passes
+from opl.geometry.passes import LaidPasses, PassesError, lay_passes
 from opl.geometry.toolpath import CutterPoints
+from opl.job import keys
 from opl.job.load import Job
-
-# what errors of the geometry begin with and a job can change
-_KEYS = ("plane_normal", "rows", "kind")
 
 
 @dataclass(frozen=True)
@@ -48,12 +46,11 @@ def cut_surface(job: Job) -> Surfacing:
     try:
         laid = lay_passes(job.surface, job.passes)
     except DegenerateNormalError as error:
-        raise InputError(f"{job.path}: workpiece.surface", str(error)) from error
+        raise InputError(job.source.at(keys.SURFACE), str(error)) from error
+    except PassesError as error:
+        raise InputError(job.source.at(keys.OF_PASSES[error.attribute]), error.message) from error
     except ValueError as error:
-        key, _, message = str(error).partition(": ")
-        if key in _KEYS:
-            raise InputError(f"{job.path}: passes.{key}", message) from error
-        raise InputError(f"{job.path}: passes", str(error)) from error
+        raise InputError(job.source.at(keys.PASSES), str(error)) from error
     cell = job.cell
-    found = inspect(job.surface, job.passes, laid, cell.wheel, cell.contact_allowance)
+    found = inspect(job.surface, job.passes, laid, cell.wheel, cell.max_belt_penetration)
     return Surfacing(laid, found)

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from opl.cell.robot_file import Joint, RobotFile, read_robot_file
-from opl.documents import Document, read
+from opl.files.documents import Document, read
 
 HERE = Path(__file__).parent
 

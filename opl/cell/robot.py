@@ -25,8 +25,8 @@ from opl.cell.robot_file import N_JOINTS, RobotFile, read_robot_file
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.cell.urdf_tree import UrdfTree
 from opl.errors import InputError
+from opl.files.resources import folder
 from opl.geometry.frames import Array, pose
-from opl.resources import folder
 
 # In which a joint is taken to reach its top speed where nobody knows its acceleration, in [s].
 # Integrators guess 0.1 s for arms of this kind; slower is the safe side.

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from opl.documents import Document, read
+from opl.files.documents import Document, read
 
 N_JOINTS = 6
 FROM_URDF = "from the URDF"

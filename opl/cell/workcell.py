@@ -63,7 +63,7 @@ class WorkCell:
         part: The held part, in the workpiece frame.
         fixture: Bodies between flange and part, given in the flange frame.
         T_flange_workpiece: How the fixture holds the part, shape (4, 4).
-        contact_allowance: How deep the part may sink into the belt in [m].
+        max_belt_penetration: How deep the part may sink into the belt in [m].
         required_clearance: Distance to keep from everything else in [m].
         pairs: The pairs that keep another distance, or none.
         limits: Limits of joints and sums of joints beside the robot's own.
@@ -75,25 +75,25 @@ class WorkCell:
     part: TriangleMesh
     fixture: tuple[Body, ...]
     T_flange_workpiece: Array
-    contact_allowance: float
+    max_belt_penetration: float
     required_clearance: float
     pairs: PairRules = field(default_factory=PairRules)
     limits: tuple[JointLimit, ...] = ()
 
     @property
-    def planned_allowance(self) -> float:
+    def planned_penetration(self) -> float:
         """How deep the planner lets the part sink into the belt in [m].
 
-        Less than the contact allowance, so that the second opinion, whose distances differ by up to
+        Less than the largest one, so that the second opinion, whose distances differ by up to
         `SECOND_OPINION`, agrees.
         """
-        return max(self.contact_allowance - SECOND_OPINION, self.contact_allowance / 2.0)
+        return max(self.max_belt_penetration - SECOND_OPINION, self.max_belt_penetration / 2.0)
 
     @property
     def part_from_wheel(self) -> float:
         """Distance that the part keeps from the wheel on free moves in [m]."""
         needed = self.pairs.between(PART, WHEEL, self.required_clearance)
-        assert needed is not None, "the belt has its own allowance"
+        assert needed is not None, "part and wheel may touch"
         return needed
 
     def widened(self, by: float) -> WorkCell:

@@ -21,13 +21,13 @@ from opl.cli.verify import verify
 from opl.console.run import progress_bar, show_batch, show_check, show_outcome
 from opl.deliver import check_folder, deliver
 from opl.errors import InputError, NoPathError, OplError, UnsafeError
-from opl.job.cell import CellFile
+from opl.files.resources import folder as resource
+from opl.job.cell_file import CellFile
 from opl.job.file import JobFile
 from opl.job.load import load
 from opl.job.search import Method
 from opl.outcome import Outcome
 from opl.pipeline import run
-from opl.resources import folder as resource
 from opl.result import reasons, render
 from opl.surfacing import cut_surface
 

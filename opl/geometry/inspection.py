@@ -50,7 +50,7 @@ def inspect(
     passes: Passes,
     laid: LaidPasses,
     wheel: ContactWheel,
-    contact_allowance: float,
+    max_belt_penetration: float,
 ) -> Inspection:
     """Look for what is doubtful about cutter points.
 
@@ -59,10 +59,10 @@ def inspect(
         passes: How it was cut.
         laid: The cutter points.
         wheel: The wheel.
-        contact_allowance: How deep the part may sink into the belt in [m].
+        max_belt_penetration: How deep the part may sink into the belt in [m].
     """
     pointed = [
-        *_hollows(laid, wheel, contact_allowance),
+        *_hollows(laid, wheel, max_belt_penetration),
         *_segments(laid, passes),
         *_jumps(laid),
         *_repeated(laid, passes),
@@ -103,7 +103,7 @@ def _spacing(surface: MachinedSurface, passes: Passes) -> float:
     return max(passes.pitch / _LOOKS_PER_PITCH, longest / _MOST_LOOKS)
 
 
-def _hollows(laid: LaidPasses, wheel: ContactWheel, allowance: float) -> Iterator[_Doubt]:
+def _hollows(laid: LaidPasses, wheel: ContactWheel, penetration: float) -> Iterator[_Doubt]:
     """Yield where the surface is too hollow for the wheel.
 
     Across the path the wheel is round: a hollow of a smaller radius takes neither its flat nor its
@@ -121,7 +121,7 @@ def _hollows(laid: LaidPasses, wheel: ContactWheel, allowance: float) -> Iterato
         )
     # how deep both edges of the flat sink in when its middle touches
     sunk = -along * wheel.width**2 / 8.0
-    bridged = (sunk > allowance) & ~tight
+    bridged = (sunk > penetration) & ~tight
     if bridged.any():
         deepest = int(np.argmax(np.where(bridged, sunk, 0.0)))
         way = (
@@ -134,7 +134,7 @@ def _hollows(laid: LaidPasses, wheel: ContactWheel, allowance: float) -> Iterato
             bridged,
             f"radius {-1e3 / along[deepest]:.1f} mm along the path at cutter point {deepest} "
             f"against the wheel's flat of {1e3 * wheel.width:g} mm, which would cut in "
-            f"{1e3 * sunk[deepest]:.2g} mm ({1e3 * allowance:g} mm allowed): {way}",
+            f"{1e3 * sunk[deepest]:.2g} mm ({1e3 * penetration:g} mm allowed): {way}",
         )
 
 

@@ -26,6 +26,20 @@ from opl.geometry.toolpath import CutterPoints
 _CURVE_ERROR = 1e-3
 
 
+class PassesError(ValueError):
+    """A value of `Passes` does not go with the surface, or is out of its range.
+
+    Attributes:
+        attribute: Which one.
+        message: What is wrong with it.
+    """
+
+    def __init__(self, attribute: str, message: str) -> None:
+        super().__init__(f"{attribute}: {message}")
+        self.attribute = attribute
+        self.message = message
+
+
 class Order(str, Enum):
     """In which order and direction the passes are ground."""
 
@@ -128,12 +142,12 @@ def lay_passes(surface: MachinedSurface, passes: Passes) -> LaidPasses:
 
     Raises:
         DegenerateNormalError: If a pass runs through a place where the surface has no normal.
-        ValueError: If a value is out of its range, if the rows do not fit, or if a plane misses or
-            merely touches the surface.
+        PassesError: If a value is out of its range, or if the rows do not fit.
+        ValueError: If a plane misses or merely touches the surface.
     """
     for name in ("pitch", "max_bow_height", "largest_step", "repeats"):
         if not getattr(passes, name) > 0.0:
-            raise ValueError(f"{name}: must be positive, got {getattr(passes, name):g}")
+            raise PassesError(name, f"must be positive, got {getattr(passes, name):g}")
     low, high, curves_at = _rows_of(surface, passes)
     first = _row_offsets(low, high, passes)
     rounding = 1e-9 * (high - low)
@@ -169,13 +183,13 @@ def _rows_of(surface: MachinedSurface, passes: Passes) -> tuple[float, float, Cu
     if passes.kind is Kind.SECTIONS:
         length = float(np.linalg.norm(passes.plane_normal))
         if not length > 0.0:
-            raise ValueError("plane_normal: must not be zero")
+            raise PassesError("plane_normal", "must not be zero")
         normal = np.asarray(passes.plane_normal, dtype=np.float64) / length
         low, high = surface.extent_along(normal)
         return low, high, lambda offset: surface.curves(normal, offset, tolerance)
 
     if not isinstance(surface, Patchwork) or len(surface.faces) != 1:
-        raise ValueError(f"kind: {passes.kind.value} needs a single NURBS face")
+        raise PassesError("kind", f"{passes.kind.value} needs a single NURBS face")
     face = surface.faces[0]
     axis = 0 if passes.kind is Kind.ALONG_U else 1
     across = (face.grid.v, face.grid.u)[axis]
@@ -197,9 +211,10 @@ def _row_offsets(low: float, high: float, passes: Passes) -> Array:
     n_fitting = int((room + rounding) // pitch) + 1 if room >= -rounding else 0
     if n_fitting == 0 or (rows is not None and not 1 <= rows <= n_fitting):
         wanted = "a row" if rows is None else f"{rows} rows"
-        raise ValueError(
-            f"rows: {wanted} of pitch {1e3 * pitch:g} mm do not fit; between margins of "
-            f"{1e3 * margin:g} mm on {1e3 * (high - low):.6g} mm there is room for {n_fitting}"
+        raise PassesError(
+            "rows",
+            f"{wanted} of pitch {1e3 * pitch:g} mm do not fit; between margins of "
+            f"{1e3 * margin:g} mm on {1e3 * (high - low):.6g} mm there is room for {n_fitting}",
         )
     n = n_fitting if rows is None else rows
     return 0.5 * (low + high) + pitch * (np.arange(n, dtype=np.float64) - 0.5 * (n - 1))

@@ -62,5 +62,5 @@ def row_pitch(
     pitch = scallop_pitch(curvature, height, wheel_radius) * np.maximum(slope, _LEAST_SLOPE)
     least = float(pitch.min(initial=np.inf))
     if not np.isfinite(least):
-        raise ValueError("the surface is nowhere rounder than the wheel: give pitch_mm instead")
+        raise ValueError("the surface is nowhere rounder than the wheel")
     return least

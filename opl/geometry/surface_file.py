@@ -8,8 +8,8 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from opl import documents
 from opl.errors import InputError
+from opl.files import documents
 from opl.geometry.frames import Array
 from opl.geometry.nurbs import NurbsSurface
 from opl.geometry.patchwork import Face

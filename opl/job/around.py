@@ -7,7 +7,6 @@ what two files say would have to be looked up in both.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from opl.geometry.shapes import Body
 from opl.job.bodies import MM, bodies_in_si
 from opl.job.cell import Cell, load_cell, robot_of
 from opl.job.file import JobFile
+from opl.job.source import Source
 from opl.job.wheel import PlacedWheel
 
 
@@ -54,40 +54,40 @@ class Surroundings:
     wheel_key: str
 
 
-def surroundings(path: Path, file: JobFile) -> Surroundings:
+def surroundings(source: Source, file: JobFile) -> Surroundings:
     """Return what is around the part.
 
     Args:
-        path: The job file.
+        source: The job file or mapping.
         file: Its content.
 
     Raises:
         InputError: If something is missing, told twice or unusable; names file and key path.
     """
-    return _own(path, file) if file.cell is None else _from_cell(path, file)
+    return _own(source, file) if file.cell is None else _from_cell(source, file)
 
 
-def _own(path: Path, file: JobFile) -> Surroundings:
+def _own(source: Source, file: JobFile) -> Surroundings:
     """Return what a job without a cell file says of everything but the part."""
     missing = [key for key in ("robot", "wheel") if getattr(file, key) is None]
     missing += ["process.home_deg"] if file.process.home_deg is None else []
     if missing:
-        raise InputError(f"{path}: {missing[0]}", "is missing, and there is no cell file to say it")
+        raise InputError(source.at(missing[0]), "is missing, and there is no cell file to say it")
     if file.wheel_name is not None:
-        raise InputError(f"{path}: wheel_name", "goes with a cell file, whose wheels have names")
+        raise InputError(source.at("wheel_name"), "goes with a cell file, whose wheels have names")
     assert file.robot is not None and file.wheel is not None and file.process.home_deg is not None
-    robot = robot_of(path, file.robot)
+    robot = robot_of(source, file.robot)
     return Surroundings(
         cell=None,
         robot=robot,
-        placed=file.wheel.in_si(path, "wheel", robot, np.eye(4)),
-        obstacles=bodies_in_si(path, "obstacles", file.obstacles),
+        placed=file.wheel.in_si(source, "wheel", robot, np.eye(4)),
+        obstacles=bodies_in_si(source, "obstacles", file.obstacles),
         gripper=(),
         clearance=file.clearance_mm * MM,
         pairs=PairRules(),
         limits=(),
         home=np.deg2rad(file.process.home_deg),
-        home_key=f"{path}: process.home_deg",
+        home_key=source.at("process.home_deg"),
         wheel_key="wheel.T_base_contact0_mm",
     )
 
@@ -95,23 +95,23 @@ def _own(path: Path, file: JobFile) -> Surroundings:
 _OF_THE_CELL = ("robot", "wheel", "obstacles", "clearance_mm")  # with a cell file, only there
 
 
-def _from_cell(path: Path, file: JobFile) -> Surroundings:
+def _from_cell(source: Source, file: JobFile) -> Surroundings:
     """Return what the cell file of a job says of everything but the part."""
-    cell_path = path.parent / str(file.cell)
+    cell_path = source.file(str(file.cell))
     cell = load_cell(cell_path)
     for key in _OF_THE_CELL:
         if key in file.model_fields_set:
-            raise InputError(f"{path}: {key}", f"is for the cell file, {cell_path}, to say")
+            raise InputError(source.at(key), f"is for the cell file, {cell_path}, to say")
     of_job = file.process.home_deg
     if (of_job is None) == (cell.home is None):
         both = f"is given here and as home_deg in {cell_path}; leave one out"
         told = both if of_job is not None else f"is missing here, and home_deg in {cell_path}"
-        raise InputError(f"{path}: process.home_deg", told)
-    placed = cell.pick(file.wheel_name, f"{path}: wheel_name")
+        raise InputError(source.at("process.home_deg"), told)
+    placed = cell.pick(file.wheel_name, source.at("wheel_name"))
     held = tuple(body.name for body in file.fixture.bodies)
     for place, name in enumerate(held):
         if name in cell.said.names.known or name in held[:place]:
-            where = f"{path}: fixture.bodies.{place}.name"
+            where = source.at(f"fixture.bodies.{place}.name")
             raise InputError(where, f"{name!r} is something else in {cell_path} or here")
     return Surroundings(
         cell=cell,
@@ -123,7 +123,11 @@ def _from_cell(path: Path, file: JobFile) -> Surroundings:
         pairs=cell.said.rules(placed.name, held),
         limits=cell.limits,
         home=np.deg2rad(of_job) if of_job is not None else _given(cell.home),
-        home_key=f"{cell_path}: home_deg" if of_job is None else f"{path}: process.home_deg",
+        home_key=(
+            Source.of_file(cell_path).at("home_deg")
+            if of_job is None
+            else source.at("process.home_deg")
+        ),
         wheel_key=f"where the wheel is in {cell_path}",
     )
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
 
 from opl.cell.workcell import PART, WHEEL, PairRules
 from opl.errors import InputError
+from opl.job.source import Source
 
 ROBOT = "robot"  # every link
 FIXTURE = "fixture"  # every body of the job's own fixture
@@ -97,7 +97,7 @@ def is_single(pair: Names) -> bool:
 
 
 def said_of_pairs(
-    path: Path,
+    source: Source,
     names: PairNames,
     allowed: Sequence[Names],
     clearances: Sequence[tuple[Names, float]],
@@ -105,10 +105,10 @@ def said_of_pairs(
     """Check what a cell file says of pairs.
 
     Args:
-        path: The cell file.
+        source: The cell file or mapping.
         names: What there is to be named.
         allowed: Of ``allowed_contacts``.
-        clearances: Of ``clearances``, in [m].
+        clearances: Of ``pair_clearances``, in [m].
 
     Raises:
         InputError: If a name is unknown, or a pair is given twice or makes no sense.
@@ -117,12 +117,12 @@ def said_of_pairs(
         (f"allowed_contacts.{place}", pair, None) for place, pair in enumerate(allowed)
     ]
     said += [
-        (f"clearances.{place}.pair", pair, distance)
+        (f"pair_clearances.{place}.pair", pair, distance)
         for place, (pair, distance) in enumerate(clearances)
     ]
     seen: dict[frozenset[str], str] = {}
     for key, pair, distance in said:
-        where = f"{path}: {key}"
+        where = source.at(key)
         for name in pair:
             if name not in names.known:
                 known = ", ".join(names.known)
@@ -133,7 +133,7 @@ def said_of_pairs(
         elif pair[0] == pair[1]:
             fault = "are one and the same"
         elif distance is None and PART in pair and set(pair) & set(names.wheels):
-            fault = "how deep a part may sink into the belt is the wheel's contact_allowance_mm"
+            fault = "how deep a part may sink into the belt is the wheel's max_belt_penetration_mm"
         elif distance is not None and is_single(pair) and not names.move_apart(*pair):
             fault = (
                 "do not move against each other, or share a bearing: no distance between them is "

@@ -55,8 +55,8 @@ def find_faults(
 ) -> list[Fault]:
     """Return every move of a motion that collides, once each, in order.
 
-    The part may sink into the belt by the contact allowance while it is on the wheel or on its way
-    to and from it; on free moves it keeps the clearance from the wheel as from all else.
+    The part may sink into the belt by its largest penetration while it is on the wheel or on its
+    way to and from it; on free moves it keeps the clearance from the wheel as from all else.
 
     Args:
         cell: The cell.
@@ -67,7 +67,7 @@ def find_faults(
     q, move = densify(motion.q, RESOLUTION)
     Ts_base_flange = forward_kinematics(cell.robot, q)
     free_move = np.array([stretch in FREE_MOVES for stretch in motion.stretch])
-    needed = np.where(free_move[move], cell.part_from_wheel, -cell.planned_allowance)
+    needed = np.where(free_move[move], cell.part_from_wheel, -cell.planned_penetration)
     Ts_contact0_workpiece = cell.Ts_contact0_workpiece(Ts_base_flange)
     cuts = signed_wheel_distance(part, cell.wheel, Ts_contact0_workpiece, needed) < needed
     # a move that is refused for the wheel need not be asked about the rest

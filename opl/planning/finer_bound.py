@@ -14,7 +14,7 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.planning.box_search import BoxSearch, OptimalSettings
 from opl.planning.nodes import NodeMatrix, build_nodes
-from opl.planning.problem import GrindingProblem, wheel_layer
+from opl.planning.problem import GrindingProblem, wheel_distances
 from opl.planning.refine import RefinedProblem
 from opl.search.box import tighten
 from opl.search.smooth import Travel
@@ -49,7 +49,7 @@ def finer_bound(
     finer = replace(
         problem,
         field=replace(field, matrices=tuple(matrices)),
-        wheel_clearance=wheel_layer(problem.scene, points, contact_positions, near),
+        wheel_distance=wheel_distances(problem.scene, points, contact_positions, near),
     )
     whole = RefinedProblem(finer, np.arange(len(points), dtype=float))
     nowhere = Travel(0.0, 0.0)  # no track is sought

@@ -56,7 +56,7 @@ def keep_contact(problem: GrindingProblem) -> FixedContact:
     q = everywhere[track.matrix].nodes.along(track.rows)
     cut = np.flatnonzero(fixed.cuts)
     if len(cut):
-        deepest = -1e3 * float(fixed.wheel_clearance.min())
+        deepest = -1e3 * float(fixed.wheel_distance.min())
         return FixedContact(
             q,
             False,

@@ -27,8 +27,8 @@ class GrindingProblem:
         scene: The cell and its geometry.
         points: N cutter points.
         field: The nodes of every matrix.
-        wheel_clearance: Signed distance of the part to the wheel in [m], exact where it is less
-            than the belt penetration permits, shape (N, M).
+        wheel_distance: Signed distance of the part to the wheel in [m], exact where it is less
+            than the largest belt penetration allows, shape (N, M).
         interpolation: How the path between nodes is filled in.
         pace: Speeds, approach and home.
     """
@@ -36,7 +36,7 @@ class GrindingProblem:
     scene: PlanningScene
     points: CutterPoints
     field: NodeField
-    wheel_clearance: Array
+    wheel_distance: Array
     interpolation: Interpolation
     pace: Pace
 
@@ -53,7 +53,7 @@ class GrindingProblem:
     @property
     def cuts(self) -> np.ndarray:
         """Where the part would sink too deep into the wheel, shape (N, M)."""
-        return np.asarray(self.wheel_clearance < -self.cell.planned_allowance)
+        return np.asarray(self.wheel_distance < -self.cell.planned_penetration)
 
     def free_nodes(self, nodes: NodeMatrix) -> np.ndarray:
         """Return which nodes exist and do not cut into the wheel, shape (N, n_rows)."""
@@ -92,11 +92,11 @@ def build_problem(
     with clock("nodes"):
         field = build_nodes(scene.cell, points, contact_positions)
     with clock("clearance"):
-        layer = wheel_layer(scene, points, contact_positions)
+        layer = wheel_distances(scene, points, contact_positions)
     return GrindingProblem(scene, points, field, layer, interpolation, pace)
 
 
-def wheel_layer(
+def wheel_distances(
     scene: PlanningScene,
     points: CutterPoints,
     contact_positions: Array,
@@ -120,6 +120,6 @@ def wheel_layer(
     # cutter and contact coincide, whatever robot brings the part there
     Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[columns]
     layer = np.full(at.shape, -np.inf)
-    allowed = -cell.planned_allowance
+    allowed = -cell.planned_penetration
     layer[at] = signed_wheel_distance(scene.part, cell.wheel, Ts_contact0_workpiece, allowed)
     return layer

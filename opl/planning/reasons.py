@@ -106,7 +106,7 @@ def _describe_run(problem: GrindingProblem, first: int, last: int) -> str:
     pass_index = int(problem.points.pass_index[first])
     line = f"{_run(first, last)} (pass {pass_index + 1}): nothing is free: {', '.join(parts)}"
     if problem.cuts[first : last + 1].all():
-        at_best = -1e3 * float(problem.wheel_clearance[first : last + 1].max())
+        at_best = -1e3 * float(problem.wheel_distance[first : last + 1].max())
         line += f"; the part cuts {at_best:.2f} mm into the wheel at best"
     return line
 

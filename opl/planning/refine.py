@@ -18,7 +18,7 @@ from opl.motion.path import GrindingPath
 from opl.planning.filling import cutter_frames
 from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
 from opl.planning.open_matrix import OpenMatrix, open_matrices
-from opl.planning.problem import GrindingProblem, wheel_layer
+from opl.planning.problem import GrindingProblem, wheel_distances
 
 
 @dataclass(frozen=True)
@@ -68,9 +68,9 @@ def refine(refined: RefinedProblem, places: Array) -> RefinedProblem:
         np.interp(columns, np.arange(len(points)), points.arc_length),
     )
     t = problem.field.contact_positions
-    known = problem.wheel_clearance > -np.inf
+    known = problem.wheel_distance > -np.inf
     wanted = _between(known[before] | known[before + 1])
-    layer = wheel_layer(problem.scene, added, t, wanted)
+    layer = wheel_distances(problem.scene, added, t, wanted)
     q = np.full((*wanted.shape, *problem.field.q.shape[2:]), np.nan)
     column, row = np.nonzero(wanted)
     q[wanted] = inverse_solutions(problem.cell, added.Ts_workpiece_cutter[column], t[row])
@@ -92,7 +92,7 @@ def refine(refined: RefinedProblem, places: Array) -> RefinedProblem:
                 np.insert(points.arc_length, at, added.arc_length),
             ),
             field=field,
-            wheel_clearance=np.insert(problem.wheel_clearance, at, layer, axis=0),
+            wheel_distance=np.insert(problem.wheel_distance, at, layer, axis=0),
         ),
         np.insert(refined.places, at, new),
     )

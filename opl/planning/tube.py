@@ -15,7 +15,7 @@ from opl.cell.full_turns import nearest_turn
 from opl.geometry.frames import Array
 from opl.motion.path import GrindingPath
 from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
-from opl.planning.problem import wheel_layer
+from opl.planning.problem import wheel_distances
 from opl.planning.refine import RefinedProblem
 
 REACH = 8  # finer contact positions on either side of the path's own
@@ -37,7 +37,7 @@ def tube(refined: RefinedProblem, path: GrindingPath, finer: Array) -> RefinedPr
     near = np.abs(rows - own[:, None]) <= REACH
     used = near.any(axis=0)
     near, t = np.ascontiguousarray(near[:, used]), finer[used]
-    layer = wheel_layer(problem.scene, points, t, near)
+    layer = wheel_distances(problem.scene, points, t, near)
     columns, at = np.nonzero(near)
     q = np.full((*near.shape, 6), np.nan)
     q[near] = inverse_solutions(problem.cell, points.Ts_workpiece_cutter[columns], t[at])[
@@ -50,7 +50,7 @@ def tube(refined: RefinedProblem, path: GrindingPath, finer: Array) -> RefinedPr
     q[np.arange(len(q)), np.searchsorted(np.flatnonzero(used), own)] = q_path
     nodes = NodeMatrix(path.ik_branch, np.ascontiguousarray(q), t, np.arange(len(t)))
     field = NodeField(t, problem.field.q[:0], (nodes,))
-    return RefinedProblem(replace(problem, field=field, wheel_clearance=layer), refined.places)
+    return RefinedProblem(replace(problem, field=field, wheel_distance=layer), refined.places)
 
 
 def halved(contact_positions: Array) -> Array:

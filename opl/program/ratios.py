@@ -16,8 +16,8 @@ from pydantic import Field, model_validator
 
 from opl.cell.robot import Robot
 from opl.cell.spherical_wrist import SphericalWristArm
-from opl.documents import Document, read
 from opl.errors import InputError
+from opl.files.documents import Document, read
 from opl.program.parameters import AxisParameters
 
 # Readings nearer than this in [deg] give a ratio of too few digits: the pendant shows hundredths.

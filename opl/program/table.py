@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from opl import resources
+from opl.files import resources
 from opl.geometry.frames import roll_pitch_yaw
 from opl.motion.motion import VerifiedMotion
 from opl.program.layout import fill

@@ -217,7 +217,7 @@ class _Run:
         touching_down = grinding and motion.stretch[move - 1] is Stretch.APPROACH
         free = not grinding and motion.stretch[move] not in ALONG_LEAD
         off_wheel = cell.pairs.required.get(frozenset((PART, WHEEL)), cell.required_clearance)
-        needed = off_wheel if free else -cell.contact_allowance
+        needed = off_wheel if free else -cell.max_belt_penetration
         farthest = self._allowed_error + GAP_ACCURACY if grinding and not touching_down else np.inf
         gap = self._world.gap(farthest if farthest < np.inf else max(needed, 0.0))
         if gap < needed:

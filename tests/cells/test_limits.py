@@ -139,5 +139,5 @@ def test_reasons_and_states_tell_the_limit():
     assert "beyond the limits of R+T" in line
     states = node_states(shut, 0)
     reached = ~np.isnan(problem.field.q[:, :, 0, 0])
-    cuts = problem.wheel_clearance < -problem.cell.planned_allowance
+    cuts = problem.wheel_distance < -problem.cell.planned_penetration
     assert (states[reached & ~cuts] == list(NodeState).index(NodeState.LIMITS)).all()

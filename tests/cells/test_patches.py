@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import forward_kinematics
+from opl.files.resources import folder
 from opl.geometry.frames import pose
 from opl.geometry.wheel import ContactWheel
 from opl.job.load import load
-from opl.resources import folder
 from opl.verification.drum import Drum
 from opl.verification.engine import pybullet, start
 from opl.verification.patches import MOST, Patches

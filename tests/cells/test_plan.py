@@ -230,11 +230,11 @@ def test_what_is_in_the_way_of_a_free_move_is_led_around():
 
 def test_a_part_that_cannot_touch_without_being_cut_is_told_how_deep():
     problem = small_problem()
-    layer = problem.wheel_clearance.copy()
+    layer = problem.wheel_distance.copy()
     layer[30:40] = -0.003
     layer[35, 4] = -0.0012
     with pytest.raises(NoPathError) as caught:
-        plan_recursive(replace(problem, wheel_clearance=layer))
+        plan_recursive(replace(problem, wheel_distance=layer))
     error = caught.value
     assert error.message == "no path beyond cutter point 29 (30 of 120 reached)"
     assert len(error.reasons) == 1
@@ -261,9 +261,9 @@ def test_points_beyond_the_limits_are_told_with_the_joint():
 
 def test_many_shut_runs_are_not_all_listed():
     problem = one_row_problem()
-    layer = problem.wheel_clearance.copy()
+    layer = problem.wheel_distance.copy()
     layer[::2] = -1.0
-    reasons = explain(replace(problem, wheel_clearance=layer), [])
+    reasons = explain(replace(problem, wheel_distance=layer), [])
     assert len(reasons) == 9
     assert reasons[-1] == "and 2 more runs of cutter points"
 
@@ -304,14 +304,14 @@ def test_states_say_what_rules_a_node_out():
     problem = one_row_problem()
     codes = {state: code for code, state in enumerate(NodeState)}
     branch = small_plan().path.ik_branch
-    layer = problem.wheel_clearance.copy()
+    layer = problem.wheel_distance.copy()
     layer[5, 3] = -0.1
     q = problem.field.q.copy()
     q[6, 4, branch] = np.nan
     nodes = next(n for n in problem.field.matrices if n.ik_branch == branch and n.exists.any())
     column, row = np.argwhere(nodes.exists)[len(np.argwhere(nodes.exists)) // 2]
     haunted = with_scene(problem, collision=Ghosts(nodes.q[column, row], radius=1e-3))
-    changed = replace(haunted, wheel_clearance=layer, field=replace(problem.field, q=q))
+    changed = replace(haunted, wheel_distance=layer, field=replace(problem.field, q=q))
     states = node_states(changed, branch)
     assert states.shape == layer.shape
     assert states[5, 3] == codes[NodeState.WHEEL]

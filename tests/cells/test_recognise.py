@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from opl.files.resources import folder
 from opl.geometry.frames import inverse
 from opl.job.load import load
 from opl.motion.motion import Stretch
 from opl.pipeline import cutter_points
-from opl.resources import folder
 from opl.verification.align import align
 from opl.verification.between import frames_at, place_between
 from opl.verification.contact import Touches, contact_positions, find_touches, misfit

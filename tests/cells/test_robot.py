@@ -11,7 +11,7 @@ import pytest
 
 from opl.cell.robot import forward_kinematics, known_robots, load_robot
 from opl.errors import InputError
-from opl.resources import folder
+from opl.files.resources import folder
 
 MH24 = load_robot("mh24")
 

@@ -19,6 +19,7 @@ from opl import pipeline
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
+from opl.files.resources import folder
 from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.toolpath import CutterPoints
@@ -28,7 +29,6 @@ from opl.program.inform.files import program_jobs
 from opl.program.inform.playback import play
 from opl.program.pulses import PulseScale
 from opl.proof.prove import profile_of, prove
-from opl.resources import folder
 from tests.support.bare_cells import with_obstacle
 from tests.support.jobs import opl
 
@@ -71,7 +71,7 @@ def written(request, tmp_path_factory):
     content = yaml.safe_load((home / "job.yaml").read_text())
     own = PARTS[request.param]
     content["passes"].update(
-        rows=2, largest_step_mm=12, bow_height_mm=0.09, end_margin_mm=own["end_margin_mm"]
+        rows=2, max_step_mm=12, max_chord_error_mm=0.09, end_margin_mm=own["end_margin_mm"]
     )
     content["search"].update(method="recursive", contact_positions=45)
     content["process"].update(approach_mm=20, home_deg=own["home_deg"])

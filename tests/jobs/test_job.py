@@ -106,7 +106,7 @@ def test_a_job_may_name_its_own_joint_accelerations(tmp_path):
         ),
         (
             {"wheel.colour": "red"},
-            "wheel.colour: unknown key; known here: T_base_contact0_mm, contact_allowance_mm, "
+            "wheel.colour: unknown key; known here: T_base_contact0_mm, max_belt_penetration_mm, "
             "max_roll_deg, pendant, radius_mm, touched, width_mm",
         ),
         (
@@ -164,8 +164,8 @@ def test_a_job_may_name_its_own_joint_accelerations(tmp_path):
         ),
         (
             {"search.max_contact_error_mm": 0.3},
-            "search.max_contact_error_mm: must be larger than passes.bow_height_mm, which is part "
-            "of it, got 0.3 and 0.3",
+            "search.max_contact_error_mm: must be larger than passes.max_chord_error_mm, which is "
+            "part of it, got 0.3 and 0.3",
         ),
         ({"name": "my part"}, "name: must be 1 to 28 capital letters, digits, _ or -"),
         ({"name": "A\n"}, "name: must be 1 to 28 capital letters, digits, _ or -"),
@@ -190,7 +190,7 @@ def test_a_unit_in_the_key_that_is_not_known_is_told_with_the_one_that_is(tmp_pa
     assert one_message(job).split("\n") == [
         "2 faults",
         "  wheel.width_mm: is missing",
-        "  wheel.width_cm: unknown key; known here: T_base_contact0_mm, contact_allowance_mm, "
+        "  wheel.width_cm: unknown key; known here: T_base_contact0_mm, max_belt_penetration_mm, "
         "max_roll_deg, pendant, radius_mm, touched, width_mm",
     ]
 

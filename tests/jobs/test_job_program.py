@@ -3,9 +3,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from opl.documents import check, keys
 from opl.errors import InputError
+from opl.files.documents import read
 from opl.job.program import ProgramSection
+from opl.job.source import Source
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.inform import TEMPLATE
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings
@@ -18,8 +19,9 @@ EYE = "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 180], [0, 0, 0, 1]]"
 def settings(tmp_path, text, robot=ROBOT):
     path = tmp_path / "job.yaml"
     path.write_text(text)
-    section = check(keys(path), ProgramSection, path)
-    return section.in_si(path, "SAMPLE", section.robot_as_counted(path, robot), HOME)
+    source = Source.of_file(path)
+    section = read(path, ProgramSection)
+    return section.in_si(source, "SAMPLE", section.robot_as_counted(source, robot), HOME)
 
 
 def test_nothing_asked_for_is_a_pulse_job_of_joint_moves(tmp_path):
@@ -44,9 +46,9 @@ def test_every_key_reaches_the_program_in_si(tmp_path):
         positions: user
         user_frame: {{number: 2, T_base_user_mm: {EYE}}}
         accept_unverified_pulses: [T]
-        levels: {{on_wheel: 2, air: 8}}
+        position_levels: {{on_wheel: 2, free_move: 8}}
         acceleration_percent: {{on_wheel: 50}}
-        deceleration_percent: {{air: 30}}
+        deceleration_percent: {{free_move: 30}}
         comment: PART 4711
         at_start: [{{comment: BELT MUST RUN}}]
         before_pass:
@@ -76,7 +78,10 @@ def test_every_key_reaches_the_program_in_si(tmp_path):
         ("accept_unverified_pulses: [Z]", "no such joint 'Z'; have: S, L, U, R, B, T"),
         ("positions: user", "user_frame goes with positions: user, and only there"),
         ("tool: 2\nmotion: straight", "need T_flange_tool_mm, the data of tool 2"),
-        ("controller: KRL\nlevels: {air: 2}", "levels: is for Yaskawa controllers, not for KUKA"),
+        (
+            "controller: KRL\nposition_levels: {free_move: 2}",
+            "position_levels: is for Yaskawa controllers, not for KUKA",
+        ),
         ("controller: RAPID\npositions: base", "positions: is for Yaskawa controllers"),
         ("at_end: [{output: 3}]", "state .on or off. goes with output and wait_input"),
         ("at_end: [{comment: A, state: on}]", "goes with output and wait_input, and only there"),
@@ -84,7 +89,7 @@ def test_every_key_reaches_the_program_in_si(tmp_path):
         ("at_end: [{}]", "needs exactly one of"),
         ("at_end: [{dwell_s: 1, timeout_s: 2}]", "timeout_s goes with wait_input only"),
         ("at_end: [{dwell: 1}]", "unknown key; known here: call, comment, dwell_s"),
-        ("levels: {on_wheel: 9}", "levels.on_wheel: must be at most 8, got 9"),
+        ("position_levels: {on_wheel: 9}", "position_levels.on_wheel: must be at most 8, got 9"),
         (f"T_flange_tool_mm: {EYE.replace('[1, 0', '[2, 0')}", "away from a rotation"),
     ],
 )

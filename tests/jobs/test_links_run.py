@@ -31,8 +31,8 @@ BACK_UNDER_IT = {
     "search.contact_positions": 12,
     "search.max_contact_step": 20,
     "search.max_contact_error_mm": 1.5,
-    "passes.bow_height_mm": 1.0,
-    "passes.largest_step_mm": 60,
+    "passes.max_chord_error_mm": 1.0,
+    "passes.max_step_mm": 60,
     # so near the wheel that ways in the air graze the plate
     "process.approach_mm": 10,
 }

@@ -7,9 +7,9 @@ import shutil
 import numpy as np
 import yaml
 
+from opl.files.resources import folder
 from opl.job.load import load
 from opl.planning.fixed import keep_contact
-from opl.resources import folder
 from tests.support.jobs import opl
 from tests.support.planned import problem_of, with_positions
 
@@ -39,7 +39,7 @@ def test_with_the_contact_free_it_is_ground_verified_and_calmer_than_the_paper(t
     job = tmp_path / "part" / "job.yaml"
     content = yaml.safe_load(job.read_text())
     # five rows with all their points take a minute
-    content["passes"].update(rows=1, bow_height_mm=0.08, largest_step_mm=10)
+    content["passes"].update(rows=1, max_chord_error_mm=0.08, max_step_mm=10)
     content["search"].update(method="recursive", contact_positions=45)
     job.write_text(yaml.safe_dump(content))
     ended = opl("run", job, "--out", tmp_path / "out")

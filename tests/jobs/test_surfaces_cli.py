@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from opl.files.resources import folder
 from opl.job.load import load
-from opl.resources import folder
 from opl.surfacing import cut_surface
 from tests.support.jobs import GONE, opl, write_job
 
@@ -303,7 +303,7 @@ def test_a_face_without_area_is_refused(tmp_path, changes, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"passes.scallop_mm": 0.01}, "needs either pitch_mm or scallop_mm"),
+        ({"passes.scallop_height_mm": 0.01}, "needs either pitch_mm or scallop_height_mm"),
         ({"passes.kind": "along_u"}, "plane_normal goes with kind: sections"),
         ({"passes.order": "spiral"}, "passes.order: must be"),
         ({"passes.repeats": 0}, "passes.repeats: must be at least 1"),

@@ -29,7 +29,7 @@ from tests.support.jobs import V_SHAPE, opl, write_job, write_robot
 # two rows of the V, few contact positions, long steps, and a home near the wheel
 FEW = {
     "passes.rows": 2,
-    "passes.largest_step_mm": 12,
+    "passes.max_step_mm": 12,
     "search.contact_positions": 40,
     "search.method": "recursive",
     "process.approach_mm": 20,

@@ -5,12 +5,12 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
+from opl.files.resources import folder
 from opl.job.load import load
 from opl.planning.bound import StripProof, raise_bound
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.open_matrix import open_matrices
 from opl.planning.refine import RefinedProblem, refine
-from opl.resources import folder
 from opl.search.certificate import least_box
 from opl.search.ladder import Ladder
 from opl.search.strips import Strips, no_strips, strips_of

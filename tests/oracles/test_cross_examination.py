@@ -13,9 +13,9 @@ from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import part_tree, signed_wheel_distance
+from opl.files.resources import folder
 from opl.job.load import load
 from opl.pipeline import cutter_points
-from opl.resources import folder
 from opl.verification.replay import GAP_ACCURACY
 from opl.verification.world import World
 from tests.support.bare_cells import random_postures

@@ -206,7 +206,7 @@ def test_an_interrupted_search_returns_what_there_was_and_a_bound_that_holds():
 
 
 def test_an_interrupted_proof_still_leaves_a_verified_program(tmp_path):
-    job = write_job(tmp_path / "job", {"search.seconds": 1e-9})
+    job = write_job(tmp_path / "job", {"search.time_limit_s": 1e-9})
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 0, ended.err
     assert "0 collisions" in ended.out

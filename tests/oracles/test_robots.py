@@ -19,8 +19,8 @@ from opl.cell.robot import (
 )
 from opl.cell.robot_file import read_robot_file
 from opl.cell.urdf_import import closure_error
-from opl.documents import read
-from opl.resources import folder
+from opl.files.documents import read
+from opl.files.resources import folder
 from tests.support.closed_forms import opw_solutions
 
 ROBOTS = {name: load_robot(name) for name in known_robots()}

@@ -63,7 +63,7 @@ def bare_cell(part, obstacles=(), clearance=0.005):
         part=part,
         fixture=(),
         T_flange_workpiece=pose(np.eye(3), np.array([0.0, 0.0, 0.1])),
-        contact_allowance=0.0005,
+        max_belt_penetration=0.0005,
         required_clearance=clearance,
     )
 

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 
 from opl.cell.collision import CollisionScene
+from opl.files.resources import folder
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import load
 from opl.motion.timing import timed
@@ -13,7 +14,6 @@ from opl.pipeline import cutter_points
 from opl.planning.problem import build_problem
 from opl.planning.scene import planning_scene
 from opl.planning.starts import plan_recursive
-from opl.resources import folder
 from opl.verification.replay import replay
 
 V_JOB = folder("workpieces") / "v_shape" / "job.yaml"

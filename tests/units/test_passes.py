@@ -5,6 +5,7 @@ import pytest
 from scipy.interpolate import BSpline
 from scipy.spatial import cKDTree
 
+from opl.files.resources import folder
 from opl.geometry.coverage import uncovered
 from opl.geometry.frames import rotation_angle
 from opl.geometry.nurbs import NurbsSurface
@@ -14,7 +15,6 @@ from opl.geometry.patchwork import Face, Patchwork
 from opl.geometry.scallop import row_pitch, scallop_pitch
 from opl.geometry.surface_file import load_faces
 from opl.geometry.trim import Trim
-from opl.resources import folder
 from tests.support.solids import ORIGINS, cylinder, lay, sphere, torus
 from tests.support.surfaces import cylinder_patch, graph, plane_patch
 

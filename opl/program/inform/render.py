@@ -11,9 +11,9 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from opl import resources
 from opl.cell.robot import Robot
 from opl.errors import InputError
+from opl.files import resources
 from opl.program.controller import ControllerProfile
 from opl.program.inform.check import find_faults
 from opl.program.inform.layout import JobLayout, Step, differences

@@ -11,9 +11,9 @@ from datetime import datetime
 
 import numpy as np
 
-from opl import resources
 from opl.cell.robot import Robot
 from opl.errors import InputError
+from opl.files import resources
 from opl.program.actions import Action, Call, Dwell, SetOutput, WaitInput
 from opl.program.makers.text import VARIABLES, Dialect, angles, rounded_times, write_steps, written
 from opl.program.moves import Move, Program

@@ -12,8 +12,8 @@ from datetime import datetime
 
 import numpy as np
 
-from opl import resources
 from opl.cell.robot import Robot, controller_poses
+from opl.files import resources
 from opl.geometry.frames import roll_pitch_yaw
 from opl.program.actions import Action, Call, Dwell, SetOutput, WaitInput
 from opl.program.makers.text import VARIABLES, Dialect, angles, write_steps, written

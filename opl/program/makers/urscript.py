@@ -9,8 +9,8 @@ from datetime import datetime
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from opl import resources
 from opl.cell.robot import Robot, controller_poses
+from opl.files import resources
 from opl.program.actions import Action, Call, Dwell, SetOutput, WaitInput
 from opl.program.makers.text import VARIABLES, Dialect, rounded_times, write_steps, written
 from opl.program.moves import Program

@@ -7,8 +7,9 @@ that names the file, the key path, the value seen and the values allowed.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, ClassVar, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -17,7 +18,13 @@ from opl.errors import InputError
 
 
 class Document(BaseModel):
-    """A mapping in a file: unknown keys, numbers as text, infinities and NaN are refused."""
+    """A mapping in a file: unknown keys, numbers as text, infinities and NaN are refused.
+
+    Attributes:
+        renamed: Keys of earlier versions, and what they are called now.
+    """
+
+    renamed: ClassVar[Mapping[str, str]] = {}
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, ser_json_inf_nan="constants"
@@ -60,7 +67,7 @@ def read(path: Path, model: type[Model]) -> Model:
         InputError: If the file cannot be read, is not YAML, or does not fit the model. All the
             faults of a file are told at once, one a line.
     """
-    return check(_content(path), model, path)
+    return check(content_of(path), model, str(path))
 
 
 def keys(path: Path) -> dict[Any, Any]:
@@ -69,30 +76,50 @@ def keys(path: Path) -> dict[Any, Any]:
     Raises:
         InputError: If the file cannot be read or is not YAML.
     """
-    content = _content(path)
-    return content if isinstance(content, dict) else {}
+    found = content_of(path)
+    return found if isinstance(found, dict) else {}
 
 
-def check(content: object, model: type[Model], path: Path) -> Model:
-    """Return ``content``, as read from ``path``, as a model.
+def check(
+    content: object, model: type[Model], label: str, context: Mapping[str, object] | None = None
+) -> Model:
+    """Return keys and values as a model.
+
+    Args:
+        content: What a file holds, or a mapping that a program has made.
+        model: What it must hold.
+        label: How messages name it.
+        context: What the validators of the model need to know beside it.
 
     Raises:
         InputError: If it does not fit the model.
     """
     if content is None:
-        raise InputError(str(path), "is empty")
+        raise InputError(label, "is empty")
     if not isinstance(content, dict):
-        raise InputError(str(path), f"must hold keys and values, holds {_seen(content)}")
+        raise InputError(label, f"must hold keys and values, holds {_seen(content)}")
     try:
-        return model.model_validate(content)
+        return model.model_validate(content, context=context)
     except ValidationError as error:
-        lines = [_fault(fault, model) for fault in error.errors(include_url=False)]
+        faults = error.errors(include_url=False)
+        # a key under its old name is not missing as well
+        there = {_new_place(fault["loc"], model) for fault in faults if _is_unknown(fault)}
+        lines = [
+            _fault(fault, model)
+            for fault in faults
+            if not (fault["type"] == "missing" and fault["loc"] in there)
+        ]
         if len(lines) > 1:
             lines = [f"{len(lines)} faults", *lines]
-        raise InputError(str(path), "\n".join(lines)) from error
+        raise InputError(label, "\n".join(lines)) from error
 
 
-def _content(path: Path) -> Any:
+def content_of(path: Path) -> Any:
+    """Return what a YAML or JSON file holds, unchecked.
+
+    Raises:
+        InputError: If the file cannot be read or is not YAML.
+    """
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
@@ -136,7 +163,9 @@ def _fault(fault: Any, model: type[BaseModel]) -> str:
     kind, values = fault["type"], fault.get("ctx", {})
     if kind == "missing":
         return f"{place}: is missing"
-    if kind == "extra_forbidden":
+    if _is_unknown(fault):
+        if (new := _new_place(fault["loc"], model)) is not None:
+            return f"{place}: was renamed, write {new[-1]}"
         known = _keys_beside(fault["loc"], model)
         return f"{place}: unknown key" + (f"; known here: {', '.join(known)}" if known else "")
     if kind in ("too_short", "too_long"):
@@ -152,13 +181,28 @@ def _fault(fault: Any, model: type[BaseModel]) -> str:
     return f"{place}: {message}, got {_seen(fault['input'])}"
 
 
-def _keys_beside(loc: tuple[Any, ...], model: Any) -> list[str]:
-    """Return the keys allowed where an unknown one stood, [] where that cannot be told."""
+def _is_unknown(fault: Any) -> bool:
+    return bool(fault["type"] == "extra_forbidden")
+
+
+def _new_place(loc: tuple[Any, ...], model: type[BaseModel]) -> tuple[Any, ...] | None:
+    """Return where an unknown key belongs by its new name, None if it never was a key."""
+    new = getattr(_model_at(loc, model), "renamed", {}).get(loc[-1])
+    return None if new is None else (*loc[:-1], new)
+
+
+def _keys_beside(loc: tuple[Any, ...], model: type[BaseModel]) -> list[str]:
+    """Return the keys allowed where an unknown one stood, [] where that is not known."""
+    return sorted(getattr(_model_at(loc, model), "model_fields", {}))
+
+
+def _model_at(loc: tuple[Any, ...], model: Any) -> Any:
+    """Return the model that a key stands in, None where that is not known."""
     for part in loc[:-1]:
         if isinstance(part, str):  # a number counts within a list of what its key holds
             field = getattr(model, "model_fields", {}).get(part)
             model = _model_in(getattr(field, "annotation", None))
-    return sorted(getattr(model, "model_fields", {}))
+    return model
 
 
 def _model_in(annotation: Any) -> Any:

@@ -10,6 +10,6 @@ def folder(name: str) -> Path:
 
     In an installed wheel they lie inside the package, in a checkout beside it.
     """
-    package = Path(__file__).resolve().parent
+    package = Path(__file__).resolve().parents[1]
     installed = package / name
     return installed if installed.is_dir() else package.parent / name

@@ -1,0 +1,39 @@
+"""Key paths of a job file that messages of the rooms above name."""
+
+from __future__ import annotations
+
+CLEARANCE = "clearance_mm"
+
+WHEEL_POSE = "wheel.T_base_contact0_mm"
+WHEEL_WIDTH = "wheel.width_mm"
+WHEEL_MAX_ROLL = "wheel.max_roll_deg"
+WHEEL_MAX_BELT_PENETRATION = "wheel.max_belt_penetration_mm"
+
+FIXTURE_POSE = "fixture.T_flange_workpiece_mm"
+
+SURFACE = "workpiece.surface"
+PART = "workpiece.mesh"
+
+PASSES = "passes"
+# by the attribute of `opl.geometry.passes.Passes` that an error names
+OF_PASSES = {
+    "plane_normal": "passes.plane_normal",
+    "pitch": "passes.pitch_mm",
+    "max_bow_height": "passes.max_chord_error_mm",
+    "largest_step": "passes.max_step_mm",
+    "rows": "passes.rows",
+    "kind": "passes.kind",
+    "repeats": "passes.repeats",
+}
+
+SEARCH_CONTACT_WEIGHT = "search.weights.contact"
+
+PROCESS_FEED = "process.feed_mm_s"
+PROCESS_CONTACT_SPEED = "process.max_contact_speed"
+PROCESS_MAX_DWELL = "process.max_dwell_s"
+PROCESS_MAX_ACCELERATION = "process.max_acceleration_deg_s2"
+
+PROGRAM_CONTROLLER = "program.controller"
+PROGRAM_MOTION = "program.motion"
+PROGRAM_PULSE_RATIOS = "program.pulse_ratios"
+PROGRAM_ACCEPT_UNVERIFIED_PULSES = "program.accept_unverified_pulses"
