@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from opl.errors import NoPathError
+from opl.job import keys
 from opl.motion.feed import SlowStretch
 from opl.motion.timing import Pace
 
@@ -19,8 +20,8 @@ def dwell_refusal(stretches: tuple[SlowStretch, ...], pace: Pace) -> NoPathError
         return None
     return NoPathError(
         f"the belt would dwell on one spot for more than {pace.max_dwell:g} s beyond the time at "
-        "the feed (process.max_dwell_s); raise process.contact_speed or lower process.feed_mm_s, "
-        "or let the contact move less (search.weights.contact)",
+        f"the feed ({keys.PROCESS_MAX_DWELL}); raise {keys.PROCESS_CONTACT_SPEED} or lower "
+        f"{keys.PROCESS_FEED}, or let the contact move less ({keys.SEARCH_CONTACT_WEIGHT})",
         [
             f"pass {one.pass_index + 1}, cutter point {one.dwell_at:.2f}: {one.dwell:.2f} s"
             for one in too_long
