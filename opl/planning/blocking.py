@@ -106,12 +106,8 @@ def _joined(
 ) -> list[int]:
     """Return the rows whose configurations off the wheel are joined to one of them by free moves.
 
-    Args:
-        problem: What is to be planned.
-        matrix: The matrix.
-        stretch: Whether they are off the wheel before it, approach, or after it, retract.
-        column: The cutter point.
-        row: A row, which is among those returned.
+    Off the wheel before it, where the approach begins, or after it, where the retract ends. The row
+    itself is among them.
     """
     t = matrix.nodes.contact_position
     free = np.flatnonzero(matrix.free[column])

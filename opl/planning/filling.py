@@ -70,21 +70,23 @@ def fill_in(
     """
     columns = np.arange(len(rows))
     q_node, t_node = nodes.along(rows), nodes.contact_position[rows]
-    on_wheel = np.diff(points.pass_index) == 0
     counts = [
-        middle_count(step, rule.max_contact_step) if grinding else 0
-        for step, grinding in zip(np.diff(t_node), on_wheel, strict=True)
+        middle_count(change, rule.max_contact_step) if same_pass else 0
+        for change, same_pass in zip(np.diff(t_node), np.diff(points.pass_index) == 0, strict=True)
     ]
     places = [k + np.arange(n + 1) / (n + 1) for k, n in enumerate(counts)]
     place = np.concatenate([*places, columns[-1:].astype(float)])
     for _ in range(MOST_HALVINGS):
         q = _solve(cell, points, nodes.ik_branch, q_node, t_node, place)
-        _refuse_jumps(q, place, points, rule.max_joint_step)
+        pass_index = points.pass_index[place.astype(int)]
+        on_wheel = np.diff(pass_index) == 0
+        jumps = on_wheel & (np.abs(np.diff(q, axis=0)).max(axis=1) > rule.max_joint_step)
+        if jumps.any():
+            raise BrokenEdgeError(int(place[:-1][jumps][0]), "continuity")
         error = _contact_error_between(cell, points, t_node, place, q)
-        coarse = np.flatnonzero(error > rule.max_contact_error)
+        coarse = np.flatnonzero(on_wheel & (error > rule.max_contact_error))
         if not len(coarse):
             t = np.interp(place, columns, t_node)
-            pass_index = points.pass_index[place.astype(int)]
             return GrindingPath(nodes.ik_branch, q, t, place, pass_index)
         halves = (place[coarse] + place[coarse + 1]) / 2.0
         place = np.insert(place, coarse + 1, halves)
@@ -126,13 +128,6 @@ def _solve(
     return q
 
 
-def _refuse_jumps(q: Array, place: Array, points: CutterPoints, max_joint_step: float) -> None:
-    on_wheel = np.diff(points.pass_index[place.astype(int)]) == 0
-    jumps = (np.abs(np.diff(q, axis=0)).max(axis=1) > max_joint_step) & on_wheel
-    if jumps.any():
-        raise BrokenEdgeError(int(place[:-1][jumps][0]), "continuity")
-
-
 def _contact_error_between(
     cell: WorkCell, points: CutterPoints, t_node: Array, place: Array, q: Array
 ) -> Array:
@@ -146,13 +141,11 @@ def _contact_error_between(
         q: The configurations in [rad], shape (n, 6).
 
     Returns:
-        Distances in [m], shape (n - 1,); 0 where the move leaves the wheel.
+        Distances in [m], shape (n - 1,); without meaning where the move leaves the wheel.
     """
     middle = (place[:-1] + place[1:]) / 2.0
     T_base_flange = forward_kinematics(cell.robot, (q[:-1] + q[1:]) / 2.0)
     p_workpiece = cutter_frames(points, middle)[:, :3, 3]
     p_base = transform(T_base_flange @ cell.T_flange_workpiece, p_workpiece)
     t = np.interp(middle, np.arange(len(t_node)), t_node)
-    error = np.linalg.norm(p_base - cell.wheel.T_base_contact(t)[:, :3, 3], axis=1)
-    on_wheel = np.diff(points.pass_index[place.astype(int)]) == 0
-    return np.where(on_wheel, error, 0.0)
+    return np.asarray(np.linalg.norm(p_base - cell.wheel.T_base_contact(t)[:, :3, 3], axis=1))

@@ -49,6 +49,10 @@ class NodeMatrix:
         """Return the configurations of a track in [rad], its row in each column given."""
         return np.asarray(self.q[np.arange(len(rows)), rows])
 
+    def range_sum(self, rows: np.ndarray) -> float:
+        """Return the joint range sum of a track at its nodes in [rad]."""
+        return float(np.ptp(self.along(rows), axis=0).sum())
+
 
 @dataclass(frozen=True)
 class NodeField:

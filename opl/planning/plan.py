@@ -67,9 +67,8 @@ class Plan:
         checks: How many motions were checked, this one included.
         lower_bound: No path through the cutter points, at the contact positions that it holds for,
             has a smaller joint range sum, in [rad]; None if no bound was wanted.
-        refinement: What contact positions between those of the field have gained; None if they were
-            not tried.
-        weighted: The weighted sum that was kept small; None if none was.
+        refinement: What contact positions between those of the field have gained, if tried.
+        weighted: The weighted sum that was kept small, if one was.
     """
 
     path: GrindingPath

@@ -79,7 +79,7 @@ def build_problem(
     pace: Pace,
     clock: Callable[[str], AbstractContextManager[object]] = nullcontext,
 ) -> GrindingProblem:
-    """Build the node matrices and the clearance layer.
+    """Build the node matrices, and the distances of part and wheel at every node.
 
     Args:
         scene: The cell and its geometry.

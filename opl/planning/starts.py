@@ -90,12 +90,7 @@ def tracks_from_best_start(matrices: list[OpenMatrix]) -> Iterator[Track]:
 
 
 def tracks_from_nearest_start(matrices: list[OpenMatrix], home: Array) -> Iterator[Track]:
-    """Yield tracks from the start node nearest to home, then from the next nearest.
-
-    Args:
-        matrices: All matrices.
-        home: Where the robot starts in [rad], shape (6,).
-    """
+    """Yield tracks from the start node nearest to home in [rad], then from the next nearest."""
     starts = [
         (float(np.linalg.norm(matrix.nodes.q[0, row] - home)), index, row)
         for index, matrix in enumerate(matrices)

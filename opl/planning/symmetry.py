@@ -64,21 +64,17 @@ def twins(matrices: list[OpenMatrix], track: Track, robot: Robot) -> list[Track]
     """
     nodes = matrices[track.matrix].nodes
     positions = nodes.position_index[track.rows]
-    total = _range_sum(nodes, track.rows)
+    total = nodes.range_sum(track.rows)
     found = []
     for index, matrix in enumerate(matrices):
         for rows in _followers(matrix.nodes, positions):
-            if abs(_range_sum(matrix.nodes, rows) - total) < SAME_SUM and matrix.allows(rows):
+            if abs(matrix.nodes.range_sum(rows) - total) < SAME_SUM and matrix.allows(rows):
                 q = matrix.nodes.along(rows)
                 margins = np.minimum(q - robot.lower, robot.upper - q).min(axis=0)
                 nearness = float((1.0 / np.maximum(margins, 1e-3)).sum())
                 found.append((nearness, Track(index, rows)))
     found.sort(key=lambda item: item[0])
     return [twin for _, twin in found] or [track]
-
-
-def _range_sum(nodes: NodeMatrix, rows: np.ndarray) -> float:
-    return float(np.ptp(nodes.along(rows), axis=0).sum())
 
 
 def _followers(nodes: NodeMatrix, positions: np.ndarray) -> Iterator[np.ndarray]:

@@ -17,12 +17,7 @@ from opl.planning.problem import GrindingProblem
 
 @dataclass(frozen=True)
 class Free:
-    """The motion of a track is free.
-
-    Attributes:
-        path: The track with its intermediate nodes.
-        motion: The whole motion.
-    """
+    """The whole motion of a track is free."""
 
     path: GrindingPath
     motion: Motion
@@ -30,23 +25,14 @@ class Free:
 
 @dataclass(frozen=True)
 class NoMotion:
-    """A track becomes no motion.
-
-    Attributes:
-        error: The edge that cannot be filled in, or the approach or retract that does not exist.
-    """
+    """An edge of the track cannot be filled in, or an approach or retract does not exist."""
 
     error: BrokenEdgeError | UnreachableApproachError
 
 
 @dataclass(frozen=True)
 class Collides:
-    """The motion of a track collides.
-
-    Attributes:
-        motion: The motion, its free moves straight.
-        faults: The moves that collide.
-    """
+    """Moves of the motion collide; its free moves are straight."""
 
     motion: Motion
     faults: tuple[Fault, ...]
@@ -54,12 +40,7 @@ class Collides:
 
 @dataclass(frozen=True)
 class NoLink:
-    """Nothing but a free move stops the motion of a track.
-
-    Attributes:
-        motion: The motion, its free moves straight.
-        error: Which of them was not found, and why.
-    """
+    """Nothing but a free move that was not found stops the motion; its free moves are straight."""
 
     motion: Motion
     error: BlockedLinkError

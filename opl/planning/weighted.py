@@ -112,8 +112,8 @@ class _Sweep:
                 inside = self.matrix.free_inside(self.box.widened(amount * self.box.size))
             track = smoothest(self.ladder, self.matrix.blocked_edges, inside, self.cost)
             if track is not None:
-                ranges = np.ptp(self.matrix.nodes.along(track.rows), axis=0)
-                total = self.weights.joint_range * float(ranges.sum()) + track.cost
+                range_sum = self.matrix.nodes.range_sum(track.rows)
+                total = self.weights.joint_range * range_sum + track.cost
                 yield total, self.index, widening, tuple(track.rows.tolist())
 
 
