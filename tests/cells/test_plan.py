@@ -14,8 +14,9 @@ from opl.motion.motion import Motion, Stretch
 from opl.motion.timing import timed
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.fixed import keep_contact, runs_of
+from opl.planning.plan import Exhausted, Found, OutOfBudget
 from opl.planning.reasons import explain, unreachable_points
-from opl.planning.starts import Start, plan_recursive
+from opl.planning.starts import Start, plan_recursive, try_recursive
 from opl.planning.states import NodeState, node_states
 from tests.support.bare_cells import Ghosts, with_obstacle
 from tests.support.brute_force import printed_recursion
@@ -181,6 +182,23 @@ def test_a_path_goes_round_an_obstacle():
     plan = plan_recursive(with_problem_cell(problem, cell))
     assert plan.checks > 1
     assert not hits_anything(cell, plan.motion, every=3)
+
+
+def test_a_search_ends_with_a_plan_or_without_proposals_or_with_its_budget_spent():
+    problem = one_row_problem()
+    found = try_recursive(problem, Start.NEAREST, most_checks=1)
+    assert isinstance(found, Found) and found.plan.checks == 1
+    shut = with_scene(problem, collision=Ghosts(np.zeros(6), radius=100.0))
+    assert isinstance(try_recursive(shut, Start.NEAREST, most_checks=1), OutOfBudget)
+    assert isinstance(try_recursive(shut, Start.NEAREST, most_checks=1000), Exhausted)
+
+
+def test_another_scene_finds_free_moves_of_its_own():
+    scene = small_problem().scene
+    other = replace(scene, collision=Ghosts(np.zeros(6), radius=0.1))
+    assert scene.links is scene.links
+    assert other.links is not scene.links
+    assert other.links.scene is other.collision
 
 
 def test_a_wall_at_the_wheel_is_named_with_the_points_it_shuts():
