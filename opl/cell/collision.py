@@ -1,6 +1,6 @@
 """Whether robot, held part or fixture touch anything at a posture, by pinocchio and coal.
 
-Part against wheel is not asked here: that pair may touch, and has a closed form in
+Part against wheel is not checked here: that pair may touch, and has a closed form in
 `opl.cell.wheel_distance`. A collision is a yes or a no, never a cost.
 """
 
@@ -13,7 +13,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.robot import forward_kinematics
+from opl.cell.robot import collision_shapes, forward_kinematics
 from opl.cell.workcell import (
     PART,
     SECOND_OPINION,
@@ -29,27 +29,20 @@ Pair = tuple[str, str]
 
 
 class CollisionScene:
-    """The cell as geometry, ready to be asked.
+    """The cell as geometry, ready for collision checks.
 
-    Asked for collision is every pair that could meet: links that are not neighbours, held bodies
-    against all links but the flange's, and links and held bodies against wheel and obstacles. Pairs
-    with something that is not the robot must stay apart by the clearance of the cell; links of the
-    robot must not touch each other (their primitives already enclose the real castings). Meshes of
-    links count as their convex hulls.
-    The cell may say otherwise of single pairs.
+    Checked is every pair that could meet: links that are not neighbours, held bodies against all
+    links but the flange's, and links and held bodies against wheel and obstacles. Pairs with
+    something that is not the robot must keep the required clearance of the cell; links of the robot
+    must not touch each other (their primitives already enclose the real castings). Meshes of links
+    count as their convex hulls. The cell may have other rules for single pairs.
     """
 
     def __init__(self, cell: WorkCell) -> None:
-        self._model = pin.buildModelFromUrdf(str(cell.robot.urdf))
-        self._geometry = pin.buildGeomFromUrdf(
-            self._model,
-            str(cell.robot.urdf),
-            pin.GeometryType.COLLISION,
-            package_dirs=[str(cell.robot.urdf.parent)],  # where relative names of meshes start
-        )
+        self._model, self._geometry = collision_shapes(cell.robot)
         for link in self._geometry.geometryObjects:
             if isinstance(link.geometry, coal.BVHModelBase):
-                # as the replay takes it, which else would refuse what is planned
+                # as in the replay, which otherwise would refuse what is planned
                 link.geometry.buildConvexHull(False, "Qt")
                 link.geometry = link.geometry.convex
         self._n_links = self._geometry.ngeoms
@@ -59,8 +52,8 @@ class CollisionScene:
         self._margins = np.array(margins)
         self._prepare(self._margins, range(0))
 
-    def _prepare(self, margins: Array, unasked: Iterable[int]) -> None:
-        """Make ready to ask with these margins in [m], but not about some of the pairs."""
+    def _prepare(self, margins: Array, unchecked: Iterable[int]) -> None:
+        """Make ready for checks with these margins in [m], without some of the pairs."""
         self._data = self._model.createData()
         self._geometry_data = self._geometry.createData()
         for request, margin in zip(self._geometry_data.collisionRequests, margins, strict=True):
@@ -68,16 +61,16 @@ class CollisionScene:
             request.enable_contact = False
             # the default of 1 mm goes on to measure distances of pairs nearly in contact
             request.break_distance = 0.0
-        for index in unasked:
+        for index in unchecked:
             self._geometry_data.deactivateCollisionPair(index)
-        # asks a pair only where the bounding boxes, widened by its margin, overlap; measured
+        # checks a pair only where the bounding boxes, widened by its margin, overlap; measured
         # faster here than the managers that sort or nest the boxes
         self._manager = pin.BroadPhaseManager_NaiveCollisionManager(
             self._model, self._geometry, self._geometry_data
         )
 
     def for_second_opinion(self) -> CollisionScene:
-        """Return the scene with as much more clearance as a second opinion may take away.
+        """Return the scene with as much more clearance as the replay may find less.
 
         What this scene calls free, the replay of the verification calls free too.
         """
@@ -92,7 +85,7 @@ class CollisionScene:
         return scene
 
     def against_surroundings(self, reserve: float) -> CollisionScene:
-        """Return the scene with more clearance, asked only about what does not move.
+        """Return the scene with more clearance, only for pairs with something that does not move.
 
         Args:
             reserve: Distance in [m] to keep beyond the margin of each pair.
@@ -144,18 +137,18 @@ class CollisionScene:
         Returns:
             Shape (n,) of bool.
         """
-        return np.array([self._ask(posture, True) for posture in q], dtype=bool)
+        return np.array([self._compute(posture, True) for posture in q], dtype=bool)
 
     def colliding_pairs(self, q: Array) -> list[Pair]:
         """Return the names of every pair in collision at one posture, shape (6,)."""
         results = self._geometry_data.collisionResults
         for result in results:
             result.clear()  # the broad phase leaves those of the pairs it passes over as they were
-        self._ask(q, False)
+        self._compute(q, False)
         hits = [pair for pair, hit in zip(self._pairs, results, strict=True) if hit.isCollision()]
         return list(dict.fromkeys(hits))
 
-    def _ask(self, q: Array, stop_at_first: bool) -> bool:
+    def _compute(self, q: Array, stop_at_first: bool) -> bool:
         return bool(pin.computeCollisions(self._model, self._data, self._manager, q, stop_at_first))
 
     def _add_bodies(self, cell: WorkCell) -> None:
@@ -177,7 +170,7 @@ class CollisionScene:
         )
 
     def _choose_pairs(self, cell: WorkCell) -> list[float]:
-        """Enter the pairs to be asked and return the margin of each in [m]."""
+        """Enter the pairs to be checked and return the margin of each in [m]."""
         joints = [geometry.parentJoint for geometry in self._geometry.geometryObjects]
         margins = []
         for second in range(len(joints)):

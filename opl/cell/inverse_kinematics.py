@@ -76,14 +76,14 @@ def ik_branch_name(slot: int) -> str:
 
     Front: the wrist centre lies ahead of axis 1, in the plane of the arm. Elbow up: axis 3 lies
     above the line from axis 2 to the wrist centre (behind that line, where the wrist is between
-    axes 1 and 2). No flip: theta5 is not negative; B of a Motoman arm counts the other way and is
-    not positive, so that the hand bows down where R is zero.
+    axes 1 and 2). No flip: theta5 is not negative; B of a Motoman arm counts in the other direction
+    and is not positive, so that the hand bows down where R is zero.
     """
     flip, back, elbow = slot // 4, slot // 2 % 2, slot % 2
     return ", ".join(
         [
             "back" if back else "front",
-            # the same bend of axis 3 points the other way once the arm reaches over backwards
+            # the same bend of axis 3 points to the other side once the arm reaches over backwards
             "elbow down" if elbow != back else "elbow up",
             "flip" if flip else "no flip",
         ]

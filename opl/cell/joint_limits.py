@@ -1,6 +1,6 @@
 """Limits that a cell adds to those of the joints, such as for the dress pack.
 
-The robot keeps its own ranges, because its controller tells full turns apart by them. A cell
+The robot keeps its own ranges, because its controller distinguishes full turns by them. A cell
 narrows the range of a joint, or of a sum of joints: the hose along the forearm does not care which
 of two axes winds it up, R + T together may turn only so far. Such a limit is linear in the joints,
 so where both ends of a linear joint move keep it, the whole move does.
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, read_only
 
 # [rad] postures are rounded to what a program can express before they are proven; pulses and digits
 # are finer than this, for each joint in the sum
@@ -38,9 +38,7 @@ class JointLimit:
     upper: float
 
     def __post_init__(self) -> None:
-        copy = np.array(self.coefficients, dtype=float)
-        copy.setflags(write=False)
-        object.__setattr__(self, "coefficients", copy)
+        object.__setattr__(self, "coefficients", read_only(self.coefficients))
 
     def holds(self, q: Array) -> np.ndarray:
         """Return which postures, shape (..., 6) in [rad], keep it; none with NaN; shape (...)."""

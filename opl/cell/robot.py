@@ -26,7 +26,7 @@ from opl.cell.spherical_wrist import SphericalWristArm
 from opl.cell.urdf_tree import UrdfTree
 from opl.errors import InputError
 from opl.files.resources import folder
-from opl.geometry.frames import Array, pose
+from opl.geometry.frames import Array, pose, read_only
 
 # In which a joint is taken to reach its top speed where nobody knows its acceleration, in [s].
 # Integrators guess 0.1 s for arms of this kind; slower is the safe side.
@@ -78,10 +78,9 @@ class Robot:
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper", "max_speed", "max_acceleration", "pulses_per_radian"):
-            copy = np.array(getattr(self, name), dtype=float)
+            copy = read_only(getattr(self, name))
             if copy.shape != (N_JOINTS,):
                 raise ValueError(f"{name} has shape {copy.shape}, must have ({N_JOINTS},)")
-            copy.setflags(write=False)
             object.__setattr__(self, name, copy)
 
     @property
@@ -184,13 +183,25 @@ def link_names(robot: Robot) -> tuple[str, ...]:
     )
 
 
+def collision_shapes(robot: Robot) -> tuple[pin.Model, pin.GeometryModel]:
+    """Return the joints of a robot and the shapes they move, new ones at each call."""
+    model = pin.buildModelFromUrdf(str(robot.urdf))
+    shapes = pin.buildGeomFromUrdf(
+        model,
+        str(robot.urdf),
+        pin.GeometryType.COLLISION,
+        package_dirs=[str(robot.urdf.parent)],  # where relative names of meshes start
+    )
+    return model, shapes
+
+
 @cache
 def _model(urdf: Path) -> pin.Model:
     return pin.buildModelFromUrdf(str(urdf))
 
 
 def _check_urdf(robot: Robot) -> None:
-    """Refuse a URDF that speaks of other joints, lacks a frame, or hides shapes from the replay."""
+    """Refuse a URDF that has other joints, lacks a frame, or hides shapes from the replay."""
     try:
         model = _model(robot.urdf)
     except ValueError as error:

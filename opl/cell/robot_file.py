@@ -30,7 +30,7 @@ class Base(Sourced):
     """Where the base frame is: on axis 1, so far above the mounting face.
 
     The maker's controller may count from elsewhere on axis 1, or from a frame turned about it;
-    ``controller_height_mm`` and ``controller_turn_deg`` say so.
+    see ``controller_height_mm`` and ``controller_turn_deg``.
     """
 
     height_mm: float

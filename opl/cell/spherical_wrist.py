@@ -123,8 +123,8 @@ def _orientation(
     Theta6 is measured against that axis 5, not found from z: near the straight wrist theta4 is
     hardly known, and their sum comes out right only if both rest on the same theta4.
 
-    Turning axis 4 by half a turn and bending the wrist the other way gives the same axes. A
-    straight wrist has no other way; both slots then keep theta4_free.
+    Turning axis 4 by half a turn and bending the wrist to the other side gives the same axes. A
+    straight wrist has no other side; both slots then keep theta4_free.
 
     Args:
         theta1: Angle of axis 1 in [rad], shape (2 back, 1, n).
@@ -141,16 +141,16 @@ def _orientation(
     cos1, sin1, cos_tilt, sin_tilt = np.cos(theta1), np.sin(theta1), np.cos(tilt), np.sin(tilt)
 
     def in_plane(v: Array) -> Array:
-        return cos1 * v[0] + sin1 * v[1]  # along the heading of the arm
+        return np.asarray(cos1 * v[0] + sin1 * v[1])  # along the heading of the arm
 
     def along_e1(v: Array) -> Array:
-        return cos_tilt * in_plane(v) - sin_tilt * v[2]
+        return np.asarray(cos_tilt * in_plane(v) - sin_tilt * v[2])
 
     def along_e2(v: Array) -> Array:
-        return cos1 * v[1] - sin1 * v[0]
+        return np.asarray(cos1 * v[1] - sin1 * v[0])
 
     def along_e3(v: Array) -> Array:
-        return sin_tilt * in_plane(v) + cos_tilt * v[2]
+        return np.asarray(sin_tilt * in_plane(v) + cos_tilt * v[2])
 
     z1, z2 = along_e1(z), along_e2(z)
     sin5 = np.sqrt(z1**2 + z2**2)

@@ -53,7 +53,7 @@ def arm_of_urdf(urdf: Path, source: Path | None = None) -> UrdfArm:
 
     Raises:
         InputError: If the file is no URDF of six revolute joints in a row with a link tool0, or the
-            arm has another build than the closed forms; says which axes.
+            arm has another build than the closed forms; names the axes.
     """
     where = str(source or urdf)
     try:
@@ -149,8 +149,8 @@ def _parallel_axes(where: str, axes: Array, points: Array, T_root_flange: Array)
     hand = _across(meeting - points[3], y)
     sideways = float(np.linalg.norm(np.cross(hand, axes[4])))
     if sideways > _LENGTH:
-        told = f"seen along axis 4, axis 5 must meet it, it passes by {1e3 * sideways:.3g} mm"
-        raise InputError(where, told)
+        message = f"seen along axis 4, axis 5 must meet it, it passes by {1e3 * sideways:.3g} mm"
+        raise InputError(where, message)
     # the meeting of axes 5 and 6 lies ahead along axis 5
     sign5 = _sign(axes[4] @ hand)
     e3 = sign5 * axes[4]
@@ -183,7 +183,7 @@ def _require_build(where: str, axes: Array, parallel: tuple[int, ...]) -> None:
 
 
 def _from_wrist(where: str, axes: Array, wrist: Array, T_root_flange: Array) -> Array:
-    """Return the way from the wrist to the flange, which must lie on axis 6."""
+    """Return the vector from the wrist to the flange, which must lie on axis 6."""
     from_wrist, z_tool = T_root_flange[:3, 3] - wrist, T_root_flange[:3, 2]
     if not _parallel(z_tool, axes[5]) or np.linalg.norm(np.cross(from_wrist, z_tool)) > _LENGTH:
         raise InputError(where, f"{FLANGE} must lie on axis 6, its z along that axis")

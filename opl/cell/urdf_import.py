@@ -26,9 +26,9 @@ from opl.cell.xacro_file import SUFFIX, expand
 from opl.errors import InputError
 
 N_CHECKED = 500
-# Farthest that a posture found may be from the pose asked for: what rounded right angles cost.
+# Farthest that a posture found may be from its pose: what rounded right angles cost.
 CLOSURE = 2e-5  # [m], and as much in the entries of the rotation matrix
-# Stands for a speed that the URDF does not give: slow, for programs ask for a share of it.
+# Stands for a speed that the URDF does not give: slow, for programs use a share of it.
 SLOW = np.deg2rad(10.0)
 # Height [m] and turn [rad] of the controller's own base frame, where the URDF has one.
 Controller = tuple[float, float] | None
@@ -119,7 +119,7 @@ def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:
     """Return the largest error of FK(IK) over random postures within the limits.
 
     Infinite if a posture is not found again at all, apart from full turns; next to singularities,
-    where rounded right angles move joints far, that is not asked.
+    where rounded right angles move joints far, that does not count.
     """
     q = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (n, 6))
     Ts_base_flange = forward_kinematics(robot, q)
@@ -166,7 +166,7 @@ def _robot_yaml(
             counts.append(f"controller_turn_deg: {_deg(controller[1])}")
     lines = [
         f"# {name}, made by opl robots import-urdf from {urdf}.",
-        "# Check limits and speeds against the data sheet, and say so under source and certainty",
+        "# Check limits and speeds against the data sheet, and state it under source and certainty",
         "# (high, medium, low).",
         f"name: {name}",
         f"title: {name}",
@@ -186,16 +186,16 @@ def _robot_yaml(
         "joints:",
     ]
     for k, joint in enumerate(found.joint_names):
-        speed, spoken = found.max_speed[k], origin
+        speed, speed_origin = found.max_speed[k], origin
         if speed <= 0.0:
-            speed, spoken = SLOW, ["source: none, a slow placeholder", "certainty: low"]
+            speed, speed_origin = SLOW, ["source: none, a slow placeholder", "certainty: low"]
         limits = [
             f"lower_deg: {_deg(found.lower[k])}",
             f"upper_deg: {_deg(found.upper[k])}",
             *origin,
         ]
         lines += [f"  - name: {joint}", "    limits:", *_indented(6, limits)]
-        lines += ["    speed:", *_indented(6, [f"max_deg_s: {_deg(speed)}", *spoken])]
+        lines += ["    speed:", *_indented(6, [f"max_deg_s: {_deg(speed)}", *speed_origin])]
     return "\n".join([*lines, ""])
 
 

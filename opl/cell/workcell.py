@@ -26,7 +26,7 @@ PairOfNames = frozenset[str]
 
 @dataclass(frozen=True)
 class PairRules:
-    """What is said of single pairs, by the names of links and bodies.
+    """Rules for single pairs, by the names of links and bodies.
 
     Attributes:
         allowed: Pairs that may touch; they are not looked at.
@@ -42,13 +42,13 @@ class PairRules:
         Args:
             first: Name of one.
             second: Name of the other.
-            otherwise: The distance if nothing is said of this pair, in [m].
+            otherwise: The distance if there is no rule for this pair, in [m].
         """
         pair = frozenset((first, second))
         return None if pair in self.allowed else self.required.get(pair, otherwise)
 
     def widened(self, by: float) -> PairRules:
-        """Return rules that ask for so much more distance in [m]."""
+        """Return rules that require so much more distance in [m]."""
         return replace(self, required={pair: far + by for pair, far in self.required.items()})
 
 

@@ -22,6 +22,7 @@ from opl.console.run import progress_bar, show_batch, show_check, show_outcome
 from opl.deliver import check_folder, deliver
 from opl.errors import InputError, NoPathError, OplError, UnsafeError
 from opl.files.resources import folder as resource
+from opl.job import reference
 from opl.job.cell_file import CellFile
 from opl.job.file import JobFile
 from opl.job.load import load
@@ -184,12 +185,16 @@ def init(directory: Path) -> None:
 
 @main.command()
 @click.option("--cell", "of_cells", is_flag=True, help="Of cell files instead.")
-def schema(of_cells: bool) -> None:
+@click.option("--markdown", is_flag=True, help="Print a page of all keys of both instead.")
+def schema(of_cells: bool, markdown: bool) -> None:
     """Print the JSON schema of job files, for editors that check YAML while one types.
 
     Example: opl schema > job.schema.json
     """
-    click.echo(json.dumps((CellFile if of_cells else JobFile).model_json_schema(), indent=2))
+    if markdown:
+        click.echo(reference.page(), nl=False)
+    else:
+        click.echo(json.dumps(reference.schema(CellFile if of_cells else JobFile), indent=2))
 
 
 for _command in (cell, robots, show, templates, faces, points, verify):

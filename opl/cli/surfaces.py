@@ -10,7 +10,7 @@ import numpy as np
 
 from opl.deliver import check_folder, write_texts
 from opl.geometry.faces import FaceSummary, list_faces, preview
-from opl.geometry.order import air_way
+from opl.geometry.order import link_length
 from opl.job.load import load
 from opl.report.part_view import part_view
 from opl.surfacing import cut_surface
@@ -40,7 +40,7 @@ def points(job: Path, out: Path | None, as_json: bool) -> None:
         "passes": laid.n_passes,
         "pitch_mm": round(1e3 * loaded.passes.pitch, 4),
         "path_mm": round(1e3 * float(laid.arc_length[last].sum()), 2),
-        "air_mm": round(1e3 * air_way(laid.Ts_workpiece_cutter, laid.pass_index), 2),
+        "air_mm": round(1e3 * link_length(laid.Ts_workpiece_cutter, laid.pass_index), 2),
         "uncovered_percent": round(100.0 * inspection.uncovered_fraction, 2),
         "warnings": [str(finding) for finding in surfacing.warnings],
     }

@@ -201,15 +201,15 @@ def _model_at(loc: tuple[Any, ...], model: Any) -> Any:
     for part in loc[:-1]:
         if isinstance(part, str):  # a number counts within a list of what its key holds
             field = getattr(model, "model_fields", {}).get(part)
-            model = _model_in(getattr(field, "annotation", None))
+            model = model_in(getattr(field, "annotation", None))
     return model
 
 
-def _model_in(annotation: Any) -> Any:
+def model_in(annotation: Any) -> Any:
     """Return the model in ``list[Model]`` or ``Model | None``, None if there is none."""
     if hasattr(annotation, "model_fields"):
         return annotation
-    inside = (_model_in(argument) for argument in get_args(annotation))
+    inside = (model_in(argument) for argument in get_args(annotation))
     return next((model for model in inside if model is not None), None)
 
 

@@ -165,4 +165,4 @@ def _depth(one: Array, other: Array, axes: Array) -> Array:
     overlap = np.minimum(a.max(axis=2) - b.min(axis=2), b.max(axis=2) - a.min(axis=2))
     # parallel edges have no axis of their own
     none = lengths <= 1e-12 * lengths.max(axis=1, initial=0.0, keepdims=True)
-    return np.where(none, np.inf, overlap / np.where(none, 1.0, lengths)).min(axis=1)
+    return np.asarray(np.where(none, np.inf, overlap / np.where(none, 1.0, lengths)).min(axis=1))

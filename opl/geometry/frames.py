@@ -7,10 +7,19 @@ of poses is ``Ts_a_b``. Every function takes and returns arrays of shape (..., 4
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+
+
+def read_only(values: ArrayLike, dtype: type = float) -> NDArray[Any]:
+    """Return a copy of an array that cannot be written to."""
+    copy: NDArray[Any] = np.array(values, dtype=dtype)
+    copy.setflags(write=False)
+    return copy
 
 
 class NotARotationError(ValueError):
@@ -37,7 +46,7 @@ def inverse(T_a_b: Array) -> Array:
 
 def transform(T_a_b: Array, p_b: Array) -> Array:
     """Return points given in frame b, shape (..., 3), in coordinates of frame a."""
-    return np.einsum("...ij,...j->...i", T_a_b[..., :3, :3], p_b) + T_a_b[..., :3, 3]
+    return np.asarray(np.einsum("...ij,...j->...i", T_a_b[..., :3, :3], p_b) + T_a_b[..., :3, 3])
 
 
 def pose(R: Array, p: Array) -> Array:
@@ -93,7 +102,7 @@ def rotation_angle(T_a_b: Array, T_a_c: Array) -> Array:
     difference = T_a_b[..., :3, :3] - T_a_c[..., :3, :3]
     # |R_b - R_c| = 2 sqrt(2) sin(angle / 2): well conditioned where arccos of the trace is not
     chord = np.linalg.norm(difference, axis=(-2, -1)) / (2.0 * np.sqrt(2.0))
-    return 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0))
+    return np.asarray(2.0 * np.arcsin(np.clip(chord, 0.0, 1.0)))
 
 
 def interpolate(T_a_b: Array, T_a_c: Array, fraction: Array) -> Array:

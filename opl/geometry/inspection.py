@@ -124,7 +124,7 @@ def _hollows(laid: LaidPasses, wheel: ContactWheel, penetration: float) -> Itera
     bridged = (sunk > penetration) & ~tight
     if bridged.any():
         deepest = int(np.argmax(np.where(bridged, sunk, 0.0)))
-        way = (
+        hint = (
             "only an edge of the wheel can grind there"
             if wheel.max_roll > 0.0
             else "it cannot be ground: the part may not roll about the wheel's edges (max_roll_deg)"
@@ -134,7 +134,7 @@ def _hollows(laid: LaidPasses, wheel: ContactWheel, penetration: float) -> Itera
             bridged,
             f"radius {-1e3 / along[deepest]:.1f} mm along the path at cutter point {deepest} "
             f"against the wheel's flat of {1e3 * wheel.width:g} mm, which would cut in "
-            f"{1e3 * sunk[deepest]:.2g} mm ({1e3 * penetration:g} mm allowed): {way}",
+            f"{1e3 * sunk[deepest]:.2g} mm ({1e3 * penetration:g} mm allowed): {hint}",
         )
 
 
@@ -176,18 +176,18 @@ def _jumps(laid: LaidPasses) -> Iterator[_Doubt]:
 
 
 def _repeated(laid: LaidPasses, passes: Passes) -> Iterator[_Doubt]:
-    """Yield passes that lie on another one though the job asks for none twice."""
+    """Yield passes that lie on another one though the job grinds none twice."""
     if passes.order is Order.BOTH or passes.repeats > 1:
         return
     points, pass_index = laid.points.Ts_workpiece_cutter[:, :3, 3], laid.points.pass_index
     pairs = lying_on_others(points, pass_index, passes.pitch, passes.max_bow_height)
     if pairs:
-        told = [f"pass {again + 1} lies on pass {first + 1}" for first, again in pairs[:4]]
-        told += [f"{len(pairs) - 4} more"] if len(pairs) > 4 else []
+        listed = [f"pass {again + 1} lies on pass {first + 1}" for first, again in pairs[:4]]
+        listed += [f"{len(pairs) - 4} more"] if len(pairs) > 4 else []
         yield (
             "duplicate",
             np.isin(pass_index, [again for _, again in pairs]),
-            f"{', '.join(told)}: do faces of the surface lie on each other?",
+            f"{', '.join(listed)}: do faces of the surface lie on each other?",
         )
 
 
@@ -199,7 +199,7 @@ def _points(chosen: np.ndarray) -> str:
     """Return which cutter points are chosen, e.g. ``cutter points 0-12, 40 (14 of 99)``."""
     places = np.flatnonzero(chosen)
     runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
-    told = [f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs[:8]]
+    listed = [f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs[:8]]
     if len(runs) > 8:
-        told.append("...")
-    return f"cutter points {', '.join(told)} ({len(places)} of {len(chosen)})"
+        listed.append("...")
+    return f"cutter points {', '.join(listed)} ({len(places)} of {len(chosen)})"

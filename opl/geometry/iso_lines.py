@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from opl.geometry.curves import SurfaceCurve, curvature_jumps
+from opl.geometry.curves import SurfaceCurve, between_nodes, curvature_jumps, hermite_through
 from opl.geometry.frames import Array, from_axes
 from opl.geometry.patchwork import Face
 from opl.geometry.trim import parts_inside
@@ -62,8 +62,7 @@ class IsoLine:
     def parameters(self, arc_length: Array) -> Array:
         """Return (u, v) at given arc lengths in [m], shape (k, 2)."""
         x = np.interp(arc_length, self.arc_length, self.nodes)
-        after = np.minimum(self.arc_length.searchsorted(arc_length), len(self.arc_length) - 1)
-        inner = self.arc_length[after] != arc_length
+        inner = between_nodes(self.arc_length, arc_length)
         targets, tangents = self.positions(arc_length), self.positions(arc_length, nu=1)
         for _ in range(4):  # Newton: the point abreast of the target
             S = self.face.surface.derivatives(self._uv(x), 1)
@@ -100,13 +99,11 @@ def iso_curves(face: Face, axis: int, value: float, tolerance: float) -> Sequenc
         Ts = _frames(face, _uv(nodes, axis, value), axis)
         points, tangents = Ts[:, :3, 3], Ts[:, :3, 0]
         chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        turns = np.arccos(np.clip(np.sum(tangents[1:] * tangents[:-1], axis=1), -1.0, 1.0))
-        arcs = chords / np.sinc(turns / (2.0 * np.pi))
+        positions, turns = hermite_through(points, tangents)
         # quarter of the sagitta's error of a circle in cubic interpolation, and for odd errors
         middle = 0.5 * (nodes[1:] + nodes[:-1])
-        positions = CubicHermiteSpline(np.append(0.0, np.cumsum(arcs)), points, tangents)
         exact = _frames(face, _uv(middle, axis, value), axis)[:, :3, 3]
-        halfway = positions.x[:-1] + arcs * np.linalg.norm(
+        halfway = positions.x[:-1] + np.diff(positions.x) * np.linalg.norm(
             exact - points[:-1], axis=1
         ) / np.maximum(
             np.linalg.norm(exact - points[:-1], axis=1)

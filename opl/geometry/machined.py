@@ -10,12 +10,28 @@ from typing import Literal
 from opl.errors import InputError
 from opl.geometry.mesh_surface import load_mesh_surface
 from opl.geometry.passes import MachinedSurface
-from opl.geometry.patchwork import Patchwork
+from opl.geometry.patchwork import Face, Patchwork
 from opl.geometry.surface_file import load_faces
 
 NURBS = (".json", ".yaml", ".yml")
 MESHES = (".stl", ".ply", ".obj")
 CAD = (".step", ".stp", ".iges", ".igs")
+
+
+def load_smooth_faces(path: Path) -> tuple[Face, ...]:
+    """Read the faces of a file that is not a mesh.
+
+    Raises:
+        InputError: If the file cannot be used.
+    """
+    suffix = path.suffix.lower()
+    if suffix in CAD:
+        from opl.geometry import cad  # the extra is only needed by those who have such files
+
+        return cad.load_cad_faces(path)
+    if suffix in NURBS:
+        return load_faces(path)
+    raise InputError(str(path), f"must be one of {', '.join((*NURBS, *MESHES, *CAD))}")
 
 
 def load_machined(
@@ -28,7 +44,7 @@ def load_machined(
     """Read the surface to be ground.
 
     Args:
-        path: A NURBS file, a mesh, or a STEP or IGES file, told by the end of its name.
+        path: A NURBS file, a mesh, or a STEP or IGES file, recognised by its suffix.
         ids: Faces to be ground, counted from 1 as `opl faces` lists them; None for all. In a mesh
             they are regions between creases.
         reversed_normal: Whether the outside is where the file has the inside.
@@ -39,18 +55,9 @@ def load_machined(
         InputError: If the file cannot be used.
         ValueError: If it has no face of an id.
     """
-    suffix = path.suffix.lower()
-    if suffix in MESHES:
+    if path.suffix.lower() in MESHES:
         return load_mesh_surface(path, unit, crease, ids)
-    if suffix in CAD:
-        from opl.geometry import cad  # the extra is only needed by those who have such files
-
-        faces = tuple(cad_face.face for cad_face in cad.load_cad_faces(path))
-    elif suffix in NURBS:
-        faces = load_faces(path)
-    else:
-        known = ", ".join((*NURBS, *MESHES, *CAD))
-        raise InputError(str(path), f"must be one of {known}")
+    faces = load_smooth_faces(path)
     if ids is not None:
         for number in ids:
             if number > len(faces):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from opl.errors import InputError
 from opl.geometry.crossings import crossing_triangles
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, read_only
 
 _METRES = {"mm": 1e-3, "m": 1.0}
 _SUFFIXES = (".stl", ".ply", ".obj")
@@ -40,17 +40,15 @@ class TriangleMesh:
     faces: NDArray[np.int64]
 
     def __post_init__(self) -> None:
-        vertices = np.array(self.vertices, dtype=float)
-        faces = np.array(self.faces, dtype=np.int64)
+        vertices, faces = read_only(self.vertices), read_only(self.faces, np.int64)
         if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
             raise ValueError(f"vertices: must be finite, of shape (n, 3), got {vertices.shape}")
         if faces.ndim != 2 or faces.shape[1] != 3:
             raise ValueError(f"faces: must have shape (m, 3), got {faces.shape}")
         if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
             raise ValueError(f"faces: indices must lie between 0 and {len(vertices) - 1}")
-        for name, array in (("vertices", vertices), ("faces", faces)):
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces)
 
     @property
     def triangles(self) -> Array:
@@ -58,9 +56,14 @@ class TriangleMesh:
         return self.vertices[self.faces]
 
     @property
+    def edges(self) -> NDArray[np.int64]:
+        """Return the vertices at both ends of the three edges of each triangle, shape (m, 3, 2)."""
+        return self.faces[:, [[0, 1], [1, 2], [2, 0]]]
+
+    @property
     def is_closed(self) -> bool:
         """Return whether every edge belongs to an even number of triangles: there is an inside."""
-        edges = np.sort(self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        edges = np.sort(self.edges.reshape(-1, 2), axis=1)
         return bool((np.unique(edges, axis=0, return_counts=True)[1] % 2 == 0).all())
 
     @property
@@ -91,7 +94,7 @@ def winding_number(mesh: TriangleMesh, point: Array) -> float:
 def box_corners(points: Array) -> Array:
     """Return the corners of the box around points in [m], along the axes, shape (8, 3)."""
     low, high = points.min(axis=0), points.max(axis=0)
-    return np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+    return np.asarray(np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T)
 
 
 def load_mesh(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
@@ -102,7 +105,7 @@ def load_mesh(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
 
     Args:
         path: The file.
-        unit: What one unit of the file is; mesh files do not say.
+        unit: What one unit of the file is; mesh files do not state it.
 
     Raises:
         InputError: If the file cannot be read, has no triangles, or if they do not enclose a
@@ -123,33 +126,25 @@ def load_mesh(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
 
 
 def load_triangles(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
-    """Read triangles, which need not enclose anything, from an STL, PLY or OBJ file.
+    """Read triangles, which need not enclose anything; arguments as of `load_mesh`.
 
     Corners at the same place become one vertex; triangles without area are left out.
-
-    Args:
-        path: The file.
-        unit: What one unit of the file is; mesh files do not say.
 
     Raises:
         InputError: If the file cannot be read, has no triangles with an area, or if neighbouring
             triangles face opposite sides.
     """
     mesh = load_shell(path, unit)
-    directed = mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    directed = mesh.edges.reshape(-1, 2)
     if len(np.unique(directed, axis=0)) < len(directed):
         raise InputError(str(path), "has neighbouring triangles that face opposite sides")
     return mesh
 
 
 def load_shell(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
-    """Read triangles that only stand in the way: they may be open, cross and face either side.
+    """Read triangles that may be open, cross and face either side; arguments as of `load_mesh`.
 
     Corners at the same place become one vertex; triangles without area are left out.
-
-    Args:
-        path: The file.
-        unit: What one unit of the file is; mesh files do not say.
 
     Raises:
         InputError: If the file cannot be read or has no triangles with an area.

@@ -69,7 +69,7 @@ class MeshCurve:
 
     @property
     def breaks(self) -> Array:
-        """Return no place: triangles do not tell where the curvature of their surface jumps."""
+        """Return no place: triangles do not show where the curvature of their surface jumps."""
         return np.empty(0)
 
     def frames(self, arc_length: Array) -> Array:
@@ -113,15 +113,15 @@ def plane_polylines(
         offset: Distance of the plane from the origin along n in [m].
 
     Returns:
-        For each polyline its nodes as points of edges: both vertices and the fraction of the way
-        between them, shapes (k,). A closed one ends with its first node.
+        For each polyline its nodes as points of edges: both vertices and the fraction of the
+        distance between them, shapes (k,). A closed one ends with its first node.
     """
     heights = mesh.vertices @ plane_normal - offset
     scale = _ON_PLANE * float(np.ptp(mesh.vertices, axis=0).max(initial=0.0))
     # so every cut edge is cut in its inside, and each polyline is a chain of whole triangles
     heights = np.where(np.abs(heights) < scale, scale, heights)
     above = heights > 0.0
-    edges = mesh.faces[:, [[0, 1], [1, 2], [2, 0]]]  # (m, 3, 2)
+    edges = mesh.edges
     cut = above[edges[..., 0]] != above[edges[..., 1]]
     crossed = np.flatnonzero(cut.any(axis=1))  # each in two edges
     if not len(crossed):

@@ -174,7 +174,7 @@ def load_mesh_surface(
 
 def _unit(vectors: Array) -> Array:
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, lengths, out=np.zeros_like(vectors), where=lengths > 0.0)
+    return np.asarray(vectors / np.where(lengths > 0.0, lengths, 1.0))
 
 
 def _mirrored_to_border(normals: Array, mesh: TriangleMesh) -> Array:
@@ -183,8 +183,8 @@ def _mirrored_to_border(normals: Array, mesh: TriangleMesh) -> Array:
     The normals at both ends of an arc are mirror images in the plane halfway between; so those of
     the border follow from their neighbours inside.
     """
-    edges = mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    ends, counts = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    edges = np.sort(mesh.edges.reshape(-1, 2), axis=1)
+    ends, counts = np.unique(edges, axis=0, return_counts=True)
     border = np.zeros(len(normals), dtype=bool)
     border[ends[counts == 1]] = True
     inward = np.concatenate([ends, ends[:, ::-1]])

@@ -11,7 +11,7 @@ from math import comb
 import numpy as np
 from scipy.interpolate import NdBSpline
 
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, read_only
 
 # du x dv below this fraction of its average over the surface is taken for zero
 _DEGENERATE_AREA = 1e-9
@@ -62,10 +62,9 @@ class NurbsSurface:
 
     def __post_init__(self) -> None:
         for name in ("knots_u", "knots_v", "control_points", "weights"):
-            array = np.array(getattr(self, name), dtype=float)
+            array = read_only(getattr(self, name))
             if not np.isfinite(array).all():
                 raise ValueError(f"{name}: must be finite")
-            array.flags.writeable = False
             object.__setattr__(self, name, array)
         points, weights = self.control_points, self.weights
         if points.ndim != 3 or points.shape[2] != 3:
@@ -108,7 +107,7 @@ class NurbsSurface:
             uv: Parameters, shape (..., 2).
         """
         homogeneous = self._homogeneous(uv)
-        return homogeneous[..., :3] / homogeneous[..., 3:]
+        return np.asarray(homogeneous[..., :3] / homogeneous[..., 3:])
 
     def derivatives(self, uv: Array, order: int = 1) -> Array:
         """Return the point and its partial derivatives, eq. (4.20).
@@ -151,8 +150,7 @@ class NurbsSurface:
             DegenerateNormalError: Where du x dv is zero, at a pole or a cusp, and for parameters
                 outside the domain.
         """
-        S = self.derivatives(uv, 1)
-        return self.unit_normal(uv, S)
+        return self.unit_normal(uv, self.derivatives(uv, 1))
 
     def curvature_tensor(self, uv: Array, x: Array, y: Array) -> Array:
         """Return the second fundamental form in two orthonormal tangent directions.
@@ -180,7 +178,7 @@ class NurbsSurface:
         mixed = np.linalg.solve(first, tangents @ np.stack([x, y], axis=-1))
         L, M, N = (-np.sum(S[..., k, m, :] * n, axis=-1) for k, m in ((2, 0), (1, 1), (0, 2)))
         second = np.stack([np.stack([L, M], axis=-1), np.stack([M, N], axis=-1)], axis=-2)
-        return np.swapaxes(mixed, -1, -2) @ second @ mixed
+        return np.asarray(np.swapaxes(mixed, -1, -2) @ second @ mixed)
 
     def unit_normal(self, uv: Array, S: Array) -> Array:
         """Return the unit normals of known derivatives.
@@ -198,7 +196,7 @@ class NurbsSurface:
         if degenerate.any():
             first = np.unravel_index(np.argmax(degenerate), degenerate.shape)
             raise DegenerateNormalError(np.asarray(uv)[first], S[..., 0, 0, :][first])
-        return normal / area
+        return np.asarray(normal / area)
 
 
 def _check_knots(axis: str, degree: int, knots: Array, n_points: int) -> None:

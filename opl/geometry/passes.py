@@ -17,7 +17,7 @@ from opl.geometry.coverage import AreaSamples
 from opl.geometry.curves import MEETING, SurfaceCurve, clipped, is_closed
 from opl.geometry.frames import Array
 from opl.geometry.iso_lines import iso_curves
-from opl.geometry.order import shortest_air
+from opl.geometry.order import shortest_links
 from opl.geometry.patchwork import Patchwork
 from opl.geometry.steps import balanced_steps
 from opl.geometry.toolpath import CutterPoints
@@ -46,7 +46,7 @@ class Order(str, Enum):
     ONE_WAY = "one_way"  # row by row, all in the direction of axis x
     ZIGZAG = "zigzag"  # row by row, every second one backwards
     BOTH = "both"  # row by row, each there and back
-    SHORTEST = "shortest"  # in whatever order and direction leaves the shortest way in the air
+    SHORTEST = "shortest"  # in whatever order and direction leaves the shortest links
 
 
 class Kind(str, Enum):
@@ -77,7 +77,7 @@ class MachinedSurface(Protocol):
 
 def bounding_box(surface: MachinedSurface) -> Array:
     """Return the least and the largest x, y, z of a surface in [m], shape (2, 3)."""
-    return np.array([surface.extent_along(axis) for axis in np.eye(3)]).T
+    return np.asarray(np.array([surface.extent_along(axis) for axis in np.eye(3)]).T)
 
 
 @dataclass(frozen=True)
@@ -253,7 +253,7 @@ def _ordered(
 ) -> Iterator[tuple[int, int]]:
     """Yield which curve comes next, and 1 if it is travelled forwards, -1 if backwards."""
     if order is Order.SHORTEST:
-        yield from shortest_air(np.stack([one.frames[[0, -1]] for one in laid]))
+        yield from shortest_links(np.stack([one.frames[[0, -1]] for one in laid]))
         return
     first = 0
     for number, row in enumerate(rows):

@@ -35,6 +35,7 @@ class Face:
         surface: The surface.
         outward: 1.0 if du x dv points outward, -1.0 if inward.
         trim: What of it there is, None for all.
+        type: What kind of surface it is in its file, such as ``plane`` or ``b-spline``.
 
     Raises:
         ValueError: If it has no area; the message begins with what is to blame.
@@ -43,6 +44,7 @@ class Face:
     surface: NurbsSurface
     outward: float = 1.0
     trim: Trim | None = None
+    type: str = "nurbs"
 
     def __post_init__(self) -> None:
         across, along = (np.diff(self.grid.points, axis=axis) for axis in (0, 1))
@@ -52,6 +54,11 @@ class Face:
             raise ValueError("control_points: span no area")
         if self.trim is not None:
             self.trim.check_against(self.surface.domain)
+
+    @property
+    def n_holes(self) -> int:
+        """Return the number of borders beyond the outer one."""
+        return 0 if self.trim is None else len(self.trim.loops) - 1
 
     @cached_property
     def grid(self) -> SurfaceGrid:
@@ -193,8 +200,8 @@ def in_order(curves: Sequence[SurfaceCurve]) -> list[SurfaceCurve]:
     if np.linalg.norm(along) > MEETING * len(curves):
         return sorted(curves, key=lambda curve: float(along @ curve.positions(0.5 * curve.length)))
 
-    def place(curve: SurfaceCurve) -> list[float]:
+    def place(curve: SurfaceCurve) -> tuple[float, ...]:
         middle = curve.positions(np.linspace(0.0, curve.length, 33)).mean(axis=0)
-        return np.round(np.array([-curve.length, *middle]), 4).tolist()
+        return tuple(np.round(np.array([-curve.length, *middle]), 4))
 
     return sorted(curves, key=place)

@@ -15,12 +15,12 @@ from contourpy import LineType, contour_generator
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from opl.geometry.curves import curvature_jumps
+from opl.geometry.curves import between_nodes, curvature_jumps, hermite_through
 from opl.geometry.frames import Array
 from opl.geometry.section import CONVERGED, MAX_NEWTON_STEPS, ON_PLANE, Section
 from opl.geometry.surface_grid import SurfaceGrid
 
-# how far beside a knot its two sides are looked at, as a fraction of the way to the next node
+# how far beside a knot its two sides are looked at, as a fraction of the distance to the next node
 _BESIDE = 1e-6
 
 # normals on both sides of a knot that differ by more than this make a kink [rad]
@@ -57,8 +57,7 @@ class SectionCurve:
         """Return the exact (u, v) at given arc lengths [m], shape (k, 2)."""
         uv = np.stack([np.interp(arc_length, self.arc_length, p) for p in self.uv.T], axis=1)
         # a node may not be moved: not across the border, nor off the knot on which a break lies
-        after = np.minimum(self.arc_length.searchsorted(arc_length), len(self.arc_length) - 1)
-        inner = self.arc_length[after] != arc_length
+        inner = between_nodes(self.arc_length, arc_length)
         targets, tangents = self.positions(arc_length), self.positions(arc_length, nu=1)
         uv[inner] = self.section.closest(uv[inner], targets[inner], tangents[inner])
         return uv
@@ -157,12 +156,8 @@ def _refined(section: Section, uv: Array, tolerance: float) -> SectionCurve:
         frames = section.frames(uv)
         points, tangents = frames[:, :3, 3], frames[:, :3, 0]
         chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        cosine = np.clip(np.sum(tangents[1:] * tangents[:-1], axis=1), -1.0, 1.0)
-        turns = np.arccos(cosine)
-        # length of the circular arc that has this chord and this turn
-        arcs = chords / np.sinc(turns / (2.0 * np.pi))
-        arc_length = np.append(0.0, np.cumsum(arcs))
-        positions = CubicHermiteSpline(arc_length, points, tangents)
+        positions, turns = hermite_through(points, tangents)
+        arc_length = np.asarray(positions.x)
 
         between = 0.5 * (arc_length[1:] + arc_length[:-1])
         targets, directions = positions(between), positions(between, nu=1)
@@ -171,7 +166,7 @@ def _refined(section: Section, uv: Array, tolerance: float) -> SectionCurve:
         exact = section.frames(middles)
         error = np.linalg.norm(exact[:, :3, 3] - targets, axis=1)
         # an error odd about the middle shows in the tangent there
-        error += 0.25 * arcs * np.linalg.norm(exact[:, :3, 0] - directions, axis=1)
+        error += 0.25 * np.diff(arc_length) * np.linalg.norm(exact[:, :3, 0] - directions, axis=1)
         # a segment as short as the tolerance is a kink of the surface: nothing to refine
         bad = ((error > tolerance) | (turns > _LARGEST_TURN)) & (chords > tolerance)
         if not bad.any():
@@ -188,7 +183,7 @@ def _refined(section: Section, uv: Array, tolerance: float) -> SectionCurve:
 def _breaks(section: Section, uv: Array) -> NDArray[np.int64]:
     """Return which inner nodes lie on a knot where the curvature of the curve jumps, shape (b,).
 
-    Every crossing of a knot is a node. A knot tells nothing by itself: that of an exact circle in
+    Every crossing of a knot is a node. A knot alone is no evidence: that of an exact circle in
     several rational pieces is smooth.
     """
     surface = section.surface
@@ -212,7 +207,7 @@ def _breaks(section: Section, uv: Array) -> NDArray[np.int64]:
     after = uv[nodes] + _BESIDE * (uv[nodes + 1] - uv[nodes])
     jumps = curvature_jumps(section.bending(before)[:, 0, 0], section.bending(after)[:, 0, 0])
     turns = np.linalg.norm(surface.normal(after) - surface.normal(before), axis=1)
-    return nodes[jumps | (turns > _KINK)]
+    return np.asarray(nodes[jumps | (turns > _KINK)])
 
 
 def _weak_knots(knots: Array, degree: int) -> Array:

@@ -1,6 +1,6 @@
 """Where to put points on a curve so that the straight lines between them stay near to it.
 
-The step follows the curvature by way of the bow height, the largest distance of the curve from the
+The step follows the curvature through the bow height, the largest distance of the curve from the
 chord of a step. It is measured rather than taken from a formula, so it holds where the curvature
 changes within a step.
 """
@@ -75,7 +75,7 @@ def _shared_out(
     """Return balanced steps where a few looks at all of them at once are enough, else None.
 
     A step's size is what it uses of the limits. On a circle, and nearly so elsewhere, sizes add up
-    along the curve: their sum tells the number of steps, and steps that share it evenly are
+    along the curve: their sum gives the number of steps, and steps that share it evenly are
     balanced.
     """
     nodes = np.linspace(start, stop, _count((stop - start) / largest_step) + 1)
@@ -189,7 +189,7 @@ def _bow_heights(curve: SurfaceCurve, nodes: Array) -> Array:
     inner = own[own.searchsorted(nodes[0], "right") : own.searchsorted(nodes[-1])]
     step = nodes.searchsorted(inner, "right") - 1
     np.maximum.at(away, step, _away(curve.positions(inner) - origins[step], chords[step]))
-    return np.sqrt(away)
+    return np.asarray(np.sqrt(away))
 
 
 def _away(points: Array, chords: Array) -> Array:
@@ -198,4 +198,4 @@ def _away(points: Array, chords: Array) -> Array:
     square = np.maximum(np.sum(chords * chords, axis=-1), np.finfo(float).tiny)
     fraction = np.clip(np.sum(points * chords, axis=-1) / square, 0.0, 1.0)
     away = points - fraction[..., None] * chords
-    return np.sum(away * away, axis=-1)
+    return np.asarray(np.sum(away * away, axis=-1))

@@ -72,7 +72,7 @@ def check_sizes(surface: MachinedSurface, part: TriangleMesh) -> None:
 def facing_inward(surface: MachinedSurface, part: TriangleMesh) -> float:
     """Return the part of a surface whose normals point into the solid, 0 to 1.
 
-    Places where the solid lies on both sides of the surface or on neither tell nothing: it is
+    Places where the solid lies on both sides of the surface or on neither do not count: it is
     thinner there than the looks are deep, or stands off the surface.
     """
     samples = surface.area_samples(_size(bounding_box(surface)) / _SAMPLES)

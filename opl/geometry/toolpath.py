@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, read_only
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +30,8 @@ class CutterPoints:
     arc_length: Array
 
     def __post_init__(self) -> None:
-        Ts = np.array(self.Ts_workpiece_cutter, dtype=float)
-        pass_index = np.array(self.pass_index, dtype=np.int64)
-        arc_length = np.array(self.arc_length, dtype=float)
+        Ts, arc_length = read_only(self.Ts_workpiece_cutter), read_only(self.arc_length)
+        pass_index = read_only(self.pass_index, np.int64)
         n = len(Ts)
         if Ts.shape != (n, 4, 4) or pass_index.shape != (n,) or arc_length.shape != (n,):
             raise ValueError(
@@ -41,13 +40,9 @@ class CutterPoints:
             )
         if not np.isin(np.diff(pass_index, prepend=-1), (0, 1)).all() or pass_index[:1].any():
             raise ValueError("pass_index: must count up from 0 without a gap")
-        for name, array in (
-            ("Ts_workpiece_cutter", Ts),
-            ("pass_index", pass_index),
-            ("arc_length", arc_length),
-        ):
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        object.__setattr__(self, "Ts_workpiece_cutter", Ts)
+        object.__setattr__(self, "pass_index", pass_index)
+        object.__setattr__(self, "arc_length", arc_length)
 
     def __len__(self) -> int:
         return len(self.pass_index)

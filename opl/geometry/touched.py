@@ -1,6 +1,6 @@
 """Contact frame 0 of a wheel from points that the robot touched with a calibrated tip.
 
-Each kind of point says how it lies in contact frame 0, where z points into the wheel and x along
+Each kind of point has its place in contact frame 0, where z points into the wheel and x along
 its axle to the left, as seen from the front with y up:
 
     left_edge, right_edge   corner of rim and side, at the height where the part shall touch
@@ -33,11 +33,11 @@ _FEEBLE = 0.01
 MOST_STEPS = 40  # of a fit; from a start within 60 degrees ten are usual
 # [m], [rad] places of the wheel that are no nearer to each other are two
 _OTHER_PLACE = 1e-3
-_WAYS = [f"{how} {axis}" for how in ("turned about", "moved along") for axis in "xyz"]
+_MOTIONS = [f"{how} {axis}" for how in ("turned about", "moved along") for axis in "xyz"]
 
 
 class TouchedError(ValueError):
-    """Touched points do not tell where the wheel is."""
+    """Touched points do not determine where the wheel is."""
 
 
 @dataclass(frozen=True)
@@ -90,21 +90,21 @@ def fit_touched(
     best = int(np.argmin([np.square(residuals).sum() for residuals in off]))
     T_base_contact0, residuals = fits[best], off[best]
     p_contact0 = rows.seen_from(T_base_contact0)
-    # an undetermined frame is told first: what it fits by chance says nothing
+    # an undetermined frame is refused first: that it fits may be chance
     jacobian = rows.jacobian(p_contact0)
     scale = np.array([radius] * 3 + [1.0] * 3)
     _, strength, directions = np.linalg.svd(jacobian / scale)
     if strength[-1] < _FEEBLE:
-        free = _WAYS[int(np.abs(directions[-1]).argmax())]
+        free = _MOTIONS[int(np.abs(directions[-1]).argmax())]
         raise TouchedError(f"the points leave open how far the wheel is {free} of contact frame 0")
     worst = int(np.round(residuals, 9).argmax())  # of equal ones the first
     if residuals[worst] > largest_residual:
-        told = ", ".join(
+        listed = ", ".join(
             f"{label} {1e3 * away:.2f}" for label, away in zip(rows.labels, residuals, strict=True)
         )
         raise TouchedError(
             f"{rows.labels[worst]} is {1e3 * residuals[worst]:.2f} mm from where the other points "
-            f"put it, {1e3 * largest_residual:g} mm allowed; residuals in mm: {told}"
+            f"put it, {1e3 * largest_residual:g} mm allowed; residuals in mm: {listed}"
         )
     for other, residuals_there in zip(fits, off, strict=True):
         apart = max(
@@ -127,13 +127,13 @@ def fit_touched(
 
 
 class _Equations:
-    """What the points say: each row one value, 0 where the frame fits."""
+    """The equations of the points: each row one value, 0 where the frame fits."""
 
     def __init__(
         self, points: Mapping[str, Sequence[Sequence[float]]], width: float, radius: float
     ) -> None:
         self._half = half = width / 2.0
-        # offsets of x, y, z from the place of the point; None where it says nothing
+        # offsets of x, y, z from the place of the point; None where it is free
         self._places: dict[str, tuple[float | None, float | None, float | None]] = {
             "left_edge": (half, 0.0, 0.0),
             "right_edge": (-half, 0.0, 0.0),
@@ -187,7 +187,7 @@ class _Equations:
         p = p_contact0[self.of_point]
         from_axle = np.hypot(p[:, 1], p[:, 2] - self._radius)
         along = np.take_along_axis(p, np.maximum(self.axis, 0)[:, None], axis=1)[:, 0]
-        return np.where(self.axis < 0, from_axle, along) - self.target
+        return np.asarray(np.where(self.axis < 0, from_axle, along) - self.target)
 
     def jacobian(self, p_contact0: Array) -> Array:
         """Return the change of each value with turns about and moves along x, y, z: (count, 6)."""
@@ -202,17 +202,17 @@ class _Equations:
         """Return how far each point is from its place in [m], shape (n,).
 
         A point on the rim lies within the width, one on a side within the radius. That is no
-        equation, but tells the two sides of a plane apart.
+        equation, but distinguishes the two sides of a plane.
         """
         squares = np.bincount(self.of_point, np.square(self.values(p_contact0)), len(self.labels))
         beside = np.abs(p_contact0[:, 0]) - self._half
         beyond = np.hypot(p_contact0[:, 1], p_contact0[:, 2] - self._radius) - self._radius
         outside = np.select([self._on_rim, self._on_side], [beside, beyond], 0.0)
-        return np.sqrt(squares + np.square(np.maximum(outside, 0.0)))
+        return np.asarray(np.sqrt(squares + np.square(np.maximum(outside, 0.0))))
 
 
 def _starts(rows: _Equations) -> list[Array]:
-    """Return 24 poses to start from: frames along the axes, their origins as the points say."""
+    """Return 24 poses to start from: frames along the axes, their origins from the points."""
     starts = []
     for order, signs in product(
         ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.curves import SurfaceCurve, clipped
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, read_only
 
 # loops with less than this fraction of the area of all parameters enclose nothing
 _LEAST_AREA = 1e-12
@@ -35,10 +35,9 @@ class Trim:
     def __post_init__(self) -> None:
         loops = []
         for loop in self.loops:
-            own = np.array(loop, dtype=float)
+            own = read_only(loop)
             if own.ndim != 2 or own.shape[1] != 2 or len(own) < 3 or not np.isfinite(own).all():
                 raise ValueError(f"a loop must be three or more (u, v), got shape {own.shape}")
-            own.flags.writeable = False
             loops.append(own)
         object.__setattr__(self, "loops", tuple(loops))
 
@@ -51,11 +50,9 @@ class Trim:
         Raises:
             ValueError: If no loop has an area, or none reaches into the domain.
         """
-        areas = [
-            0.5 * abs(float(np.sum(u * np.roll(v, -1) - np.roll(u, -1) * v)))
-            for u, v in (loop.T for loop in self.loops)
-        ]
-        if not max(areas) > _LEAST_AREA * float(np.ptp(domain, axis=0).prod()):
+        if not max(map(polygon_area, self.loops)) > _LEAST_AREA * float(
+            np.ptp(domain, axis=0).prod()
+        ):
             raise ValueError("trim_loops: enclose no area")
         low, high = (of(np.concatenate(self.loops), axis=0) for of in (np.min, np.max))
         if (low >= domain[1]).any() or (high <= domain[0]).any():
@@ -80,6 +77,12 @@ class Trim:
                 crossed = beside & (u < starts[:, 0] + (v - starts[:, 1]) * slopes)
                 inside[first : first + _BLOCK] = np.count_nonzero(crossed, axis=1) % 2 == 1
         return inside.reshape(np.asarray(uv).shape[:-1])
+
+
+def polygon_area(loop: Array) -> float:
+    """Return the area inside a closed polygon in a plane, corners of shape (k, 2)."""
+    x, y = loop.T
+    return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
 
 
 def parts_inside(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, read_only
 
 MM_PER_M = 1000.0
 
@@ -34,9 +34,7 @@ class ContactWheel:
     T_base_contact0: Array
 
     def __post_init__(self) -> None:
-        T = self.T_base_contact0.copy()
-        T.setflags(write=False)
-        object.__setattr__(self, "T_base_contact0", T)
+        object.__setattr__(self, "T_base_contact0", read_only(self.T_base_contact0))
 
     @property
     def flat_end(self) -> float:

@@ -86,7 +86,7 @@ class CellFile(Document):
     renamed: ClassVar = {"stands": "mounting_face", "clearances": "pair_clearances"}
 
     robot: str = Field(
-        description="Name of the robot as listed by `opl robots`, or the folder of one of your own."
+        description="Name of the robot as listed by `opl robots`, or the folder of your own one."
     )
     mounting_face: MountingFace | None = Field(
         default=None,

@@ -77,7 +77,8 @@ class ProgramSection(Document):
 
     controller: str = Field(
         default="DX200",
-        description="Name of the controller or language, as `opl templates` lists them.",
+        description="A Yaskawa controller (NX100, DX100, DX200, YRC1000), another language (RAPID, "
+        "KRL, FANUC, URSCRIPT), or a post of your own.",
     )
     tool: Annotated[int, Field(ge=0)] = Field(
         default=0, description="Number of the tool that positions are written for."

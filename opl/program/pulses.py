@@ -90,7 +90,7 @@ class PulseScale:
             UnsafeError: If a joint is beyond its soft limit; the first such posture is named.
         """
         if not self.complete:
-            raise InputError("program.pulse_ratios", "the pulses per degree are not known")
+            raise InputError("", "the pulses per degree are not known")
         postures = np.atleast_2d(q)
         if not np.all(np.isfinite(postures)):
             raise UnsafeError("a joint position is not a number")
@@ -150,6 +150,6 @@ def require_accepted(unverified: Collection[str], accepted: Collection[str], whe
         raise InputError(
             where,
             f"the pulses per degree of {', '.join(missing)} are not verified, so a pulse program "
-            "may lead anywhere; give the controller's own (opl robots import-params, then "
-            f"program.pulse_ratios), or accept them by name: [{', '.join(missing)}]",
+            "may lead anywhere; give the file of the controller's own (opl robots import-params), "
+            f"or accept them by name: [{', '.join(missing)}]",
         )

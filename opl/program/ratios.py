@@ -138,8 +138,8 @@ def ratio_file(robot: Robot, parameters: AxisParameters, source: str) -> str:
     cautions = [f"# caution: {line}" for line in mismatches(robot, parameters)]
     return "\n".join(
         [
-            f"# Pulse ratios and soft limits of one {robot.title}; a job names this file as",
-            "# program.pulse_ratios.",
+            f"# Pulse ratios and soft limits of one {robot.title}; the section program of a",
+            "# job names this file as pulse_ratios.",
             *cautions,
             f"robot: {robot.name}",
             f"source: '{source.replace(chr(39), chr(39) * 2)}, layout of {parameters.layout}'",

@@ -91,8 +91,8 @@ def _draw_axes(axes: Axes, arm: DrawnArm) -> None:
                       markeredgecolor=AXIS["color"], markeredgewidth=1.1, zorder=5)  # fmt: skip
             label = at + 0.022 * size
         else:
-            way = half * direction[[0, 2]] / np.linalg.norm(direction[[0, 2]])
-            ends = np.array([at - way, at + way])
+            reach = half * direction[[0, 2]] / np.linalg.norm(direction[[0, 2]])
+            ends = np.array([at - reach, at + reach])
             axes.plot(*ends.T, zorder=4, **AXIS)
             label = ends[int(np.argmax(ends @ [1.0, 1.0]))] + aside / 4.0
         while any(np.abs(label - other).max() < 0.045 * size for other in seen):

@@ -1,4 +1,4 @@
-"""What the pictures are drawn on: one style, one way to show passes, SVG that repeats to the byte.
+"""What the pictures are drawn on: one style, passes drawn alike, SVG that repeats to the byte.
 
 Whatever the user's matplotlib is set to does not matter. Text stays text, so a picture can be
 searched and read aloud.

@@ -22,7 +22,7 @@ BEHIND: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "alpha": 0.45}
 AIR: dict[str, Any] = {"color": FAINT, "linewidth": 0.9, "linestyle": (0, (3, 3))}
 DOUBT = "#e08214"
 MISSED = "#f4c48a"
-PART = to_rgb("#d9dee2")
+PART_COLOUR = to_rgb("#d9dee2")
 MOST_NORMALS, MOST_TRIADS, MOST_NUMBERS = 160, 12, 24  # drawn; more of them hide the passes
 NORMAL_SIZE, TRIAD_SIZE = 0.05, 0.09  # of the part's size
 LIGHT = np.array([-0.3, 0.6, 0.74])  # from above left, seen from the camera
@@ -84,7 +84,7 @@ def part_view(
 def _legend(doubtful: np.ndarray, uncovered: Array) -> list[Artist]:
     handles: list[Artist] = [
         Line2D([], [], label="pass, begun at its dot", marker="o", markevery=2, **PASS),
-        Line2D([], [], label="way in the air", **AIR),
+        Line2D([], [], label="link between passes", **AIR),
         Line2D([], [], color=AXIS_COLOURS["z"], label="z: outward normal"),
         Line2D([], [], color=AXIS_COLOURS["x"], label="x of the frame: tangent of the path"),
         Line2D([], [], color=AXIS_COLOURS["y"], label="y of the frame: z cross x"),
@@ -135,7 +135,7 @@ def _draw_part(axes: Axes, view: Array, vertices: Array, faces: np.ndarray) -> N
     front = normals @ view[2] > 0.0
     order = np.argsort(triangles[front][:, :, 2].mean(axis=1))
     shade = 0.72 + 0.28 * np.clip(normals[front] @ (LIGHT @ view), -0.4, 1.0)
-    colours = np.clip(shade[:, None] * np.array(PART), 0.0, 1.0)[order]
+    colours = np.clip(shade[:, None] * np.array(PART_COLOUR), 0.0, 1.0)[order]
     axes.add_collection(
         PolyCollection(
             triangles[front][order][:, :, :2],

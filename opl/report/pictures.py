@@ -80,7 +80,7 @@ def contact_chart(
     bottom, top = contact_positions[0] - step / 2.0, contact_positions[-1] + step / 2.0
     palette = np.array([_state_colour(code) for code in range(len(state_names))])
     # one embedded image is ever so much smaller than rectangles; several pixels a node, as many
-    # viewers smooth images whatever the file says
+    # viewers smooth images whatever the file requests
     across, up = (-(-least // n) for least, n in zip(LEAST_PIXELS, states.shape, strict=True))
     pixels = np.kron(states.T, np.ones((up, across), dtype=np.uint8))
     axes.imshow(

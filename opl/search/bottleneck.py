@@ -109,7 +109,7 @@ def bottleneck(  # type: ignore[no-untyped-def]
                 n_reached += 1
         if n_reached == 0:
             return np.inf, -1
-    row = np.argmin(best[n_columns - 1])
+    row = int(np.argmin(best[n_columns - 1]))
     value = best[n_columns - 1, row]
     if value == np.inf:
         return value, -1

@@ -1,8 +1,8 @@
 """Joint boxes: how small a box can be that holds a connected track.
 
 The joint range sum of a track is the size of the box that its nodes span. The functions here look
-at one core, the part of joint space that every box under consideration is known to contain, and say
-what it costs to take in one node more, of some columns, of all, or of a whole track.
+at one core, the part of joint space that every box under consideration is known to contain, and
+compute what it costs to take in one node more, of some columns, of all, or of a whole track.
 """
 
 from __future__ import annotations

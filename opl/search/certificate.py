@@ -38,7 +38,7 @@ class Certificate:
         rows: The best track found, shape (n_columns,), or None.
         box: The box that it spans, or None.
         subproblems: How many were looked at.
-        finished: Whether the proof came to its end, within the gap asked for.
+        finished: Whether the proof came to its end, within the requested gap.
     """
 
     lower_bound: float

@@ -49,7 +49,7 @@ class Ladder:
 
     @property
     def step_rule(self) -> tuple[Array, np.ndarray, float, Array, float]:
-        """What tells small steps from others, in the order in which the inner loops take it."""
+        """What makes a step small enough, in the order in which the inner loops take it."""
         return (
             self.contact_position,
             self.off_wheel,
@@ -60,7 +60,7 @@ class Ladder:
 
     def step_key(self, column: int, row: int, next_row: int) -> int:
         """Return the number under which a step is remembered as blocked."""
-        n_rows = self.q.shape[1]
+        n_rows = int(self.q.shape[1])
         return (column * n_rows + row) * n_rows + next_row
 
 

@@ -1,7 +1,7 @@
 """Boxes with a track of low travel: no more than another path makes, in as small a box as can be.
 
 The least box may force the contact to move further than it would have to in a box that is a little
-larger on some of its faces. Which ones, dynamic programming tells: the least travel of t in a box.
+larger on some of its faces. Dynamic programming finds which ones: the least travel of t in a box.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from opl.search.ladder import Ladder
 from opl.search.smooth import TrackCost, Travel, smoothest, travel_of
 
 CONTACT_WEIGHT = 1.0  # cost of moving t by one belt unit against 1 for each radian of a joint
-HALVINGS = 7  # of the way by which faces are moved out
+HALVINGS = 7  # of the distance by which faces are moved out
 ROUND_OFF = 1e-7  # [rad]
 
 

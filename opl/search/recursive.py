@@ -67,7 +67,7 @@ def add_dead_ends(ladder: Ladder, blocked: np.ndarray, dead: np.ndarray) -> None
     """Mark every node from which the last column cannot be reached.
 
     A search finds dead ends as it meets them; one that is to stop at a bound must know them before,
-    or it stops on a way that it would have come back from.
+    or it stops on a track that it would have come back from.
 
     Args:
         ladder: The nodes.
@@ -126,7 +126,7 @@ def _descend(  # type: ignore[no-untyped-def]
     sums = np.empty(n_rows)
     low = np.empty((n_columns, n_joints))
     high = np.empty((n_columns, n_joints))
-    # candidates of a column are taken by increasing (sum, row); these say where it stands
+    # candidates of a column are taken by increasing (sum, row); these hold where it stands
     tried_sum = np.full(n_columns + 1, -np.inf)
     tried_row = np.full(n_columns + 1, -1)
     rows[0] = start

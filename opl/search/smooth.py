@@ -1,6 +1,6 @@
 """The smoothest track: least joint travel, by exact dynamic programming over the ladder.
 
-Each column is passed once; the cost of the best way to each of its nodes is all that is kept, no
+Each column is passed once; the cost of the best track to each of its nodes is all that is kept, no
 step is ever stored.
 """
 
@@ -210,7 +210,7 @@ def _cheapest(  # type: ignore[no-untyped-def]
                         before[column, row] = here
             following[row] += node_cost[column, row]
         best[:] = following
-    row = np.argmin(best)
+    row = int(np.argmin(best))
     total = best[row]
     if total == np.inf:
         return total

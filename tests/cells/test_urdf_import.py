@@ -332,7 +332,7 @@ def test_a_xacro_is_expanded_and_its_meshes_are_found(tmp_path):
         ('<link name="$(arg n)"/>', r"line 3: Undefined .* n: give it a default, or expand it by"),
         (
             '<xacro:include filename="$(find ur)/ur.xacro"/>',
-            r"line 3: \$\(find \.\.\.\) asks for a ROS package, .*: xacro arm\.xacro ARGUMENT:=",
+            r"line 3: \$\(find \.\.\.\) needs a ROS package, .*: xacro arm\.xacro ARGUMENT:=",
         ),
         ('<xacro:include filename="none.xacro"/>', r"arm\.xacro: xacro refuses it: line 3: .*none"),
         ('<xacro:include filename="bad.xacro"/>', r"bad\.xacro: is not XML: .* line 2"),

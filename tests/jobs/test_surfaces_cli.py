@@ -169,7 +169,7 @@ def test_faces_of_a_mesh_need_its_unit():
     mesh = folder("workpieces") / "v_shape" / "v_shape.stl"
     ended = opl("faces", mesh)
     assert ended.status == 2
-    assert "a mesh does not say its unit" in ended.err
+    assert "a mesh file has no unit" in ended.err
     told = json.loads(opl("faces", mesh, "--unit", "mm", "--json").out)
     assert [one["id"] for one in told] == [1, 2, 3, 4]
     top = told[2]
@@ -255,7 +255,7 @@ def test_a_solid_that_is_open_flat_or_crosses_itself_is_refused(tmp_path, break_
 
 
 def test_who_lacks_the_extra_is_told_how_to_get_it(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "OCP.TopAbs", None)  # as if it were not installed
+    monkeypatch.setitem(sys.modules, "OCP.TopoDS", None)  # as if it were not installed
     (tmp_path / "part.step").write_text("ISO-10303-21;")
     job = write_job(tmp_path, {"workpiece.surface": "part.step"})
     for ended in (opl("faces", tmp_path / "part.step"), opl("check", job)):

@@ -9,7 +9,7 @@ from opl.files.resources import folder
 from opl.geometry.coverage import uncovered
 from opl.geometry.frames import rotation_angle
 from opl.geometry.nurbs import NurbsSurface
-from opl.geometry.order import air_way, shortest_air
+from opl.geometry.order import link_length, shortest_links
 from opl.geometry.passes import Kind, Order, Passes, lay_passes
 from opl.geometry.patchwork import Face, Patchwork
 from opl.geometry.scallop import row_pitch, scallop_pitch
@@ -221,7 +221,7 @@ def test_the_shortest_order_is_shorter_where_a_hole_splits_the_rows():
     ways = {}
     for order in (Order.ONE_WAY, Order.ZIGZAG, Order.SHORTEST):
         points = lay(holed, Y, order=order, **changes).points
-        ways[order] = air_way(points.Ts_workpiece_cutter, points.pass_index)
+        ways[order] = link_length(points.Ts_workpiece_cutter, points.pass_index)
         assert len(np.unique(points.Ts_workpiece_cutter[ORIGINS].round(9), axis=0)) == len(points)
     assert ways[Order.SHORTEST] < 0.7 * ways[Order.ZIGZAG] < ways[Order.ONE_WAY]
 
@@ -244,7 +244,7 @@ def test_the_shortest_order_of_scattered_passes_is_near_the_best_of_all():
         for order in permutations(range(5))
         for signs in product((1, -1), repeat=5)
     )
-    found = shortest_air(Ts)
+    found = shortest_links(Ts)
     assert sorted(index for index, _ in found) == list(range(5))
     assert way(found) <= 1.1 * best
 
