@@ -47,8 +47,8 @@ class NoPathError(OplError):
         self.reasons = tuple(reasons)
 
 
-class NoWayError(NoPathError):
-    """Paths on the wheel there are, but no way through the air leads to one, on or back home."""
+class NoFreeMoveError(NoPathError):
+    """The passes can be ground, but a free move from home, between passes or home was not found."""
 
 
 class UnsafeError(OplError):

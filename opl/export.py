@@ -42,7 +42,7 @@ def draw(outcome: Outcome, problem: GrindingProblem) -> None:
     outcome.files[f"{job.name}_contact.svg"] = contact_chart(
         title=f"{job.name}: where the part touches the wheel",
         contact_positions=problem.field.contact_positions,
-        states=node_states(problem, path.branch),
+        states=node_states(problem, path.ik_branch),
         state_names=[state.value for state in NodeState],
         pass_index=points.pass_index,
         flat_end=job.cell.wheel.flat_end,

@@ -6,22 +6,22 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 
-from opl.cell.collision import CollisionScene, enclosing_bodies
+from opl.cell.collision import enclosing_bodies
 from opl.cell.robot import forward_kinematics
-from opl.cell.wheel_distance import PartTree, part_tree, signed_wheel_distance
+from opl.cell.wheel_distance import PartTree, signed_wheel_distance
 from opl.cell.workcell import PART, SECOND_OPINION_OF_A_LINK, WHEEL
-from opl.errors import InputError, NoPathError, NoWayError
+from opl.errors import InputError, NoFreeMoveError, NoPathError
 from opl.export import draw, job_date, write_program
-from opl.field.layer import wheel_layer
-from opl.field.nodes import build_nodes
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
-from opl.motion.feed import dwell_refusal, slow_stretches
+from opl.job.refusals import dwell_refusal
+from opl.motion.feed import slow_stretches
 from opl.motion.timing import time_motion
 from opl.outcome import Outcome
 from opl.planning.fixed import keep_contact, runs_of
-from opl.planning.problem import GrindingProblem
+from opl.planning.problem import GrindingProblem, build_problem
 from opl.planning.reasons import unreachable_points
+from opl.planning.scene import planning_scene
 from opl.proof.read_back import as_told, read_back
 from opl.remedies import find_remedies
 from opl.searches import compare, from_paper_start, search_path
@@ -58,7 +58,7 @@ def run(job: Job, progress: Progress = lambda stage, fraction: None) -> Outcome:
             outcome.plan = plan = search_path(outcome, problem)
     except NoPathError as error:
         outcome.status, outcome.refusal = "no_path", error
-        if isinstance(error, NoWayError):
+        if isinstance(error, NoFreeMoveError):
             return outcome  # on the wheel nothing has to change
         with clock("remedies"):
             outcome.remedies = find_remedies(job, points)
@@ -118,14 +118,10 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
             home.
     """
     contact_positions = job.cell.wheel.positions(job.search.n_contact_positions)
-    with clock("nodes"):
-        field = build_nodes(job.cell, points, contact_positions)
     with clock("clearance"):
-        part = part_tree(job.cell.part)
-        layer = wheel_layer(job.cell, part, points, contact_positions)
-        scene = CollisionScene(job.cell).for_second_opinion()
-    problem = GrindingProblem(
-        job.cell, scene, part, points, field, layer, job.search.interpolation, job.process
+        scene = planning_scene(job.cell)
+    problem = build_problem(
+        scene, points, contact_positions, job.search.interpolation, job.process, clock
     )
     unreachable = unreachable_points(problem)
     if len(unreachable):
@@ -139,7 +135,7 @@ def pose_problem(job: Job, points: CutterPoints, clock: Clock) -> GrindingProble
     if inside:
         pairs = ", ".join(" inside of ".join(pair) for pair in inside)
         raise InputError(job.around.home_key, f"at home one is in the other: {pairs}")
-    hits = [*scene.colliding_pairs(job.process.home), *_part_near_wheel(job, part)]
+    hits = [*scene.collision.colliding_pairs(job.process.home), *_part_near_wheel(job, scene.part)]
     if hits:
         pairs = ", ".join(" and ".join(pair) for pair in hits)
         needed = f"{1e3 * job.cell.required_clearance:g} mm (clearance_mm)"

@@ -7,18 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from opl.cell.collision import CollisionScene
-from opl.cell.wheel_distance import part_tree
 from opl.cell.workcell import WorkCell
-from opl.field.layer import wheel_layer
-from opl.field.nodes import build_nodes
 from opl.geometry.frames import from_roll_pitch_yaw
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
-from opl.planning.plan import try_recursive
-from opl.planning.problem import GrindingProblem
+from opl.planning.plan import Found
+from opl.planning.problem import GrindingProblem, build_problem
 from opl.planning.reasons import free_at
-from opl.planning.starts import Start
+from opl.planning.scene import PlanningScene, planning_scene
+from opl.planning.starts import Start, try_recursive
 
 MM = 1e3
 # the work is bounded by counts, so that the same job always gets the same answer
@@ -64,20 +61,23 @@ def find_remedies(job: Job, points: CutterPoints) -> list[str]:
     left = MOST_IN_ALL
     for kind in kinds:
         for told, cell in kind(job.cell):
-            if not _open_at(_changed(job, cell, some)):
+            scene = planning_scene(cell)
+            if not _open_at(_changed(job, scene, some)):
                 continue
             if left <= 0:
                 found.append(f"not all changes were tried: {MOST_IN_ALL} motions were checked")
                 return found
-            problem = _changed(job, cell, points)
-            plan = try_recursive(problem, Start.BEST, min(MOST_CHECKS, left))
-            left -= min(MOST_CHECKS, left) if plan is None else plan.checks
-            if plan is not None:
+            most_checks = min(MOST_CHECKS, left)
+            problem = _changed(job, scene, points)
+            outcome = try_recursive(problem, Start.BEST, most_checks)
+            if isinstance(outcome, Found):
+                left -= outcome.plan.checks
                 found.append(
                     f"would be possible with {told} (planned again: joint range sum "
-                    f"{plan.path.joint_range_sum:.3f} rad, not verified)"
+                    f"{outcome.plan.path.joint_range_sum:.3f} rad, not verified)"
                 )
                 break
+            left -= most_checks
     return found
 
 
@@ -138,23 +138,13 @@ def _turned_fixture(cell: WorkCell) -> Iterator[Change]:
         yield told, replace(cell, T_flange_workpiece=T_flange_turned @ cell.T_flange_workpiece)
 
 
-def _changed(job: Job, cell: WorkCell, points: CutterPoints) -> GrindingProblem:
+def _changed(job: Job, scene: PlanningScene, points: CutterPoints) -> GrindingProblem:
     """Return what is to be planned in a changed cell."""
-    positions = cell.wheel.positions(job.search.n_contact_positions)
-    part = part_tree(cell.part)
-    return GrindingProblem(
-        cell,
-        CollisionScene(cell).for_second_opinion(),
-        part,
-        points,
-        build_nodes(cell, points, positions),
-        wheel_layer(cell, part, points, positions),
-        job.search.interpolation,
-        job.process,
-    )
+    positions = scene.cell.wheel.positions(job.search.n_contact_positions)
+    return build_problem(scene, points, positions, job.search.interpolation, job.process)
 
 
 def _open_at(problem: GrindingProblem) -> bool:
     """Return whether each cutter point has a free posture, all of them on one branch at least."""
-    every = (problem.free_nodes(nodes).any(axis=1).all() for nodes in problem.field.branches)
+    every = (problem.free_nodes(nodes).any(axis=1).all() for nodes in problem.field.matrices)
     return any(every) and all(free_at(problem, column) for column in range(len(problem.points)))

@@ -12,8 +12,8 @@ from opl.cell.inverse_kinematics import ik_branch_name
 from opl.motion.feed import SlowStretch
 from opl.motion.figures import Figures
 from opl.outcome import Outcome
-from opl.planning.objective import ObjectiveWeights, WeightedValue
-from opl.planning.plan import Plan, Refinement
+from opl.planning.costs import ObjectiveWeights
+from opl.planning.plan import Plan, Refinement, WeightedValue
 from opl.proof.digest import digest
 from opl.proof.read_back import FileProof
 
@@ -111,7 +111,7 @@ def _path(outcome: Outcome, plan: Plan | None) -> dict[str, Any] | None:
     return {
         "method": outcome.job.search.method.value,
         "objective": outcome.job.search.objective.value,
-        "branch": ik_branch_name(path.branch),
+        "branch": ik_branch_name(path.ik_branch),
         "joint_ranges_rad": _rounded(path.joint_ranges),
         "joint_range_sum_rad": _rounded(path.joint_range_sum),
         "joint_travel_rad": _rounded(path.joint_travel),

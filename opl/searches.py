@@ -8,11 +8,11 @@ from opl.job.search import Method, Objective
 from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.outcome import Outcome
 from opl.planning.cheapest import plan_cheapest
-from opl.planning.objective import ObjectiveWeights
+from opl.planning.costs import ObjectiveWeights
 from opl.planning.optimal import plan_optimal
-from opl.planning.plan import Plan, plan_recursive, try_recursive
+from opl.planning.plan import Found, Plan
 from opl.planning.problem import GrindingProblem
-from opl.planning.starts import Start
+from opl.planning.starts import Start, plan_recursive, try_recursive
 from opl.planning.weighted import plan_weighted
 
 # of motions from the paper's start node, which are sought for comparison only
@@ -67,4 +67,5 @@ def compare(outcome: Outcome) -> dict[str, Figures]:
 
 def from_paper_start(problem: GrindingProblem) -> Plan | None:
     """Return what the paper's search finds from the paper's own start node, None if nothing."""
-    return try_recursive(problem, Start.NEAREST, MOST_CHECKS)
+    outcome = try_recursive(problem, Start.NEAREST, MOST_CHECKS)
+    return outcome.plan if isinstance(outcome, Found) else None

@@ -20,7 +20,6 @@ FLOORS = [
     {"files"},
     {"geometry"},
     {"cell", "search"},
-    {"field"},
     {"motion"},
     {"planning"},
     {"verification", "program", "report"},

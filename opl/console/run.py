@@ -126,7 +126,7 @@ def _facts(outcome: Outcome) -> Iterator[str]:
         yield f"contact fixed at t = 0 is not feasible: {fixed.reason}"
     yield (
         f"path: {len(points)} cutter points in {points.n_passes} passes, "
-        f"{path.n_intermediate} intermediate nodes, branch {ik_branch_name(path.branch)}"
+        f"{path.n_intermediate} intermediate nodes, branch {ik_branch_name(path.ik_branch)}"
     )
     yield from _certified(plan, outcome.job.search.n_contact_positions)
     yield f"search with its collision checks: {search_seconds(outcome):.2f} s"

@@ -9,12 +9,11 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
-from opl.field.path import Interpolation
 from opl.files.documents import Document
 from opl.job.bodies import MM, NotNegative, Positive
 from opl.planning.box_search import OptimalSettings
-from opl.planning.costs import Costs
-from opl.planning.objective import ObjectiveWeights
+from opl.planning.costs import CostWeights, ObjectiveWeights
+from opl.planning.filling import Interpolation
 from opl.planning.starts import Start
 
 # contact positions are in mm on the wheel's flat and in degrees of roll about its edges
@@ -163,7 +162,7 @@ class SearchSection(Document):
     def in_si(self, chord_error_mm: float) -> Search:
         """Return the section's values; the chord error is part of the contact error allowed."""
         weights = self.weights
-        costs = Costs(
+        costs = CostWeights(
             joint_weights=np.array(weights.joints),
             contact_weight=weights.contact,
             time_weight=0.0,

@@ -12,12 +12,12 @@ import numpy as np
 from opl.cell.full_turns import principal
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.workcell import WorkCell
-from opl.field.path import GrindingPath
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.leads import lead_offsets
 from opl.motion.links import Links, NoLinkError
 from opl.motion.motion import Motion, MoveKind
+from opl.motion.path import GrindingPath
 from opl.motion.process import ProcessSettings
 
 
@@ -73,7 +73,7 @@ def whole_motion(
                 points,
                 process,
                 kind,
-                path.branch,
+                path.ik_branch,
                 int(path.cutter_point[k]),
                 path.contact_position[k],
                 path.q[k],
@@ -125,7 +125,7 @@ def lead(
     points: CutterPoints,
     process: ProcessSettings,
     kind: MoveKind,
-    branch: int,
+    ik_branch: int,
     column: int,
     contact_position: float,
     q_contact: Array,
@@ -137,7 +137,7 @@ def lead(
         points: The cutter points.
         process: How long it is, and how far it turns.
         kind: Whether it is the approach or the retract.
-        branch: Slot of the inverse kinematics.
+        ik_branch: Slot of the inverse kinematics.
         column: The cutter point that is ground.
         contact_position: Where on the wheel.
         q_contact: The posture that grinds it in [rad], shape (6,).
@@ -152,7 +152,7 @@ def lead(
     T_base_flange = cell.Ts_base_flange(contact_position, points.Ts_workpiece_cutter[column])
     T_contact_flange = np.linalg.solve(T_base_contact, T_base_flange)
     Ts_base_flange = T_base_contact @ T_contact_away @ T_contact_flange
-    solutions = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_contact)[:, branch]
+    solutions = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_contact)[:, ik_branch]
     if np.isnan(solutions).any():
         raise UnreachableApproachError(column, "reach")
     steps = principal(np.diff(solutions, axis=0, prepend=q_contact[None]))

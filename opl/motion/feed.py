@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.errors import NoPathError
 from opl.motion.process import ProcessSettings
 from opl.motion.timing import Cause, Timing
 
@@ -73,24 +72,6 @@ def slow_stretches(timing: Timing, process: ProcessSettings) -> tuple[SlowStretc
     slow = np.array([cause is not Cause.NONE for cause in timing.cause])
     index = timing.timed.motion.pass_index
     return tuple(_stretch(timing, process, moves) for moves in _runs(slow, index))
-
-
-def dwell_refusal(
-    stretches: tuple[SlowStretch, ...], process: ProcessSettings
-) -> NoPathError | None:
-    """Return why a path is refused on which the belt would dwell too long, None if it is not."""
-    too_long = [one for one in stretches if one.dwell > process.max_dwell]
-    if not too_long:
-        return None
-    return NoPathError(
-        f"the belt would dwell on one spot for more than {process.max_dwell:g} s beyond the time "
-        "at the feed (process.max_dwell_s); raise process.max_contact_speed or lower "
-        "process.feed_mm_s, or let the contact move less (search.weights.contact)",
-        [
-            f"pass {one.pass_index + 1}, cutter point {one.dwell_at:.2f}: {one.dwell:.2f} s"
-            for one in too_long
-        ],
-    )
 
 
 def _runs(wanted: np.ndarray, index: np.ndarray) -> Iterator[np.ndarray]:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.cell.robot import Robot
-from opl.field.path import GrindingPath
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion
+from opl.motion.path import GrindingPath
 from opl.motion.process import ProcessSettings
 from opl.motion.timing import followed, time_motion
 

@@ -13,11 +13,11 @@ import time
 
 import numpy as np
 
-from opl.field.path import BrokenStepError, fill_in
 from opl.geometry.frames import Array
-from opl.planning.branch import Branch
+from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.open_matrix import OpenMatrix
 from opl.planning.problem import GrindingProblem
-from opl.planning.refine import postures_between
+from opl.planning.refine import configurations_between
 from opl.search.bottleneck import tighten_strips
 from opl.search.box import JointBox, size_of
 from opl.search.certificate import BoxProof, least_box
@@ -33,23 +33,23 @@ MOST_SUBPROBLEMS = 1000  # of one round: what has not closed by then would take 
 
 def raise_bound(
     problem: GrindingProblem,
-    branch: Branch,
+    matrix: OpenMatrix,
     bound: float,
     wanted: float,
     deadline: float,
 ) -> float:
-    """Return a lower bound on the joint range sum of one branch, in [rad].
+    """Return a lower bound on the joint range sum of one matrix, in [rad].
 
     Args:
         problem: What is to be planned.
-        branch: The branch; its free nodes and blocked steps are taken for all there are.
+        matrix: The matrix; its free nodes and blocked edges are taken for all there are.
         bound: What is already proven, in [rad].
         wanted: How large a bound is wanted, in [rad]; there the proof ends.
         deadline: When to stop with what is proven, by `time.monotonic`.
     """
     nodes = least_box(
-        branch.ladder,
-        branch.blocked_steps,
+        matrix.ladder,
+        matrix.blocked_edges,
         bound=wanted,
         gap=NODES_GAP,
         seconds=deadline - time.monotonic(),
@@ -58,14 +58,14 @@ def raise_bound(
     rows, box = nodes.rows, nodes.box
     cells: dict[int, int] = {}
     while bound < wanted and rows is not None and box is not None:
-        outside = _steps_outside(problem, branch, rows, box)
+        outside = _steps_outside(problem, matrix, rows, box)
         finer = [step for step in outside if cells.get(step, 0) < MOST_CELLS]
         if not finer:
             break
         for step in finer:
             cells[step] = 2 * cells[step] if step in cells else FIRST_CELLS
         proof = StripProof(
-            branch.ladder, branch.blocked_steps, wanted, _cut(problem, branch, cells)
+            matrix.ladder, matrix.blocked_edges, wanted, _cut(problem, matrix, cells)
         )
         while proof.open_bound() < min(wanted, proof.held):
             if proof.subproblems >= MOST_SUBPROBLEMS or time.monotonic() >= deadline:
@@ -140,25 +140,26 @@ class StripProof(BoxProof):
             self.held, self.rows, self.box = bound, rows, JointBox(low, high)
 
 
-def _cut(problem: GrindingProblem, branch: Branch, cells: dict[int, int]) -> Strips:
+def _cut(problem: GrindingProblem, matrix: OpenMatrix, cells: dict[int, int]) -> Strips:
     """Return strips with that many cells for each of some steps."""
     steps = np.array(sorted(cells), dtype=int)
     lines = [step + np.arange(1, cells[step]) / cells[step] for step in steps]
     places = np.concatenate([*lines, np.arange(len(problem.points))])
     order = np.argsort(places)
     between = np.concatenate([*lines, np.empty(0)])
-    q = np.concatenate([postures_between(problem, branch.nodes, between), branch.nodes.q])[order]
-    in_order = bool((np.diff(branch.nodes.position_index) == 1).all())
+    q_between = configurations_between(problem, matrix.nodes, between)
+    q = np.concatenate([q_between, matrix.nodes.q])[order]
+    in_order = bool((np.diff(matrix.nodes.position_index) == 1).all())
     return strips_of(q, places[order] % 1.0 == 0.0, in_order)
 
 
 def _steps_outside(
-    problem: GrindingProblem, branch: Branch, rows: np.ndarray, box: JointBox
+    problem: GrindingProblem, matrix: OpenMatrix, rows: np.ndarray, box: JointBox
 ) -> list[int]:
     """Return the steps of a track that pass outside of a box if t changes evenly."""
     try:
-        path = fill_in(problem.cell, problem.points, branch.nodes, rows, problem.interpolation)
-    except BrokenStepError as error:
+        path = fill_in(problem.cell, problem.points, matrix.nodes, rows, problem.interpolation)
+    except BrokenEdgeError as error:
         return [error.column]
     outside = path.cutter_point[~box.holds(path.q)]
     return sorted({int(place) for place in outside if place % 1.0})

@@ -14,16 +14,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opl.field.path import BrokenStepError, fill_in
 from opl.planning.bound import raise_bound
-from opl.planning.branch import Branch, Track, branches_of
-from opl.planning.costs import Costs, roughness
-from opl.planning.plan import Plan, check_track
+from opl.planning.costs import CostWeights, track_cost
+from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
+from opl.planning.plan import Exhausted, Found, OutOfBudget, SearchOutcome, propose_and_check
 from opl.planning.refine import RefinedProblem, carried, refine
 from opl.planning.symmetry import twins, undominated
 from opl.search.box import JointBox
-from opl.search.calm import ROUND_OFF, calm_box
 from opl.search.certificate import least_box
+from opl.search.low_travel import ROUND_OFF, low_travel_box
 from opl.search.smooth import Travel, smoothest_within
 
 SUBDIVIDE = np.array([0.25, 0.5, 0.75])  # where a step that bulges is given columns
@@ -53,7 +53,7 @@ class OptimalSettings:
 
     widen: float
     max_contact_change: float
-    costs: Costs
+    costs: CostWeights
     seconds: float
     tolerance: float
 
@@ -86,16 +86,16 @@ class BoxSearch:
         self._deadline = deadline
         self._room = room
         self._whole = self.refined = whole
-        self._original = branches_of(whole.problem)
-        self._branches = branches_of(whole.problem)
+        self._original = open_matrices(whole.problem)
+        self._matrices = open_matrices(whole.problem)
         self._refinements = 0
         self._checks = 0
         self._blocked_something = False
         self._bound = 0.0
         self._searched = undominated(self._original)
 
-    def run(self, gap: float) -> Plan | None:
-        """Return the best plan, or None if there is none within time and widenings.
+    def run(self, gap: float) -> SearchOutcome:
+        """Return the best plan, if there is one within time and widenings.
 
         Args:
             gap: The fraction to which the least box of the columns given is proven.
@@ -104,15 +104,15 @@ class BoxSearch:
         while best is not None and not self._late():
             refinements = self._refinements
             self._blocked_something = False
-            plan = self._smooth_plan(*best)
-            if plan is not None:
-                return plan
+            found = self._smooth_plan(*best)
+            if found is not None:
+                return found
             if self._blocked_something:
-                self._searched = undominated(self._branches)
+                self._searched = undominated(self._matrices)
             elif refinements == self._refinements:
-                return None
-            _, best = self._certify(self._branches, REFINED_GAP)
-        return None
+                break
+            _, best = self._certify(self._matrices, REFINED_GAP)
+        return OutOfBudget() if self._late() else Exhausted()
 
     def prove(self, found: float) -> float:
         """Return the lower bound without a search, as `lower_bound` does after one."""
@@ -130,9 +130,9 @@ class BoxSearch:
         """
         columns = np.searchsorted(self.refined.places, self._whole.places)
         lost = False
-        for original, branch in zip(self._original, self._branches, strict=True):
-            lost |= bool((original.free & ~branch.free[columns]).any())
-            original.free &= branch.free[columns]
+        for original, matrix in zip(self._original, self._matrices, strict=True):
+            lost |= bool((original.free & ~matrix.free[columns]).any())
+            original.free &= matrix.free[columns]
         if lost:
             self._searched = undominated(self._original)
             self._bound = max(self._bound, self._certify(self._original, PROOF_GAP)[0])
@@ -149,19 +149,19 @@ class BoxSearch:
         return time.monotonic() > self._deadline
 
     def _certify(
-        self, branches: list[Branch], gap: float
+        self, matrices: list[OpenMatrix], gap: float
     ) -> tuple[float, tuple[int, JointBox] | None]:
-        """Return the least lower bound of all branches, and the branch with the smallest box.
+        """Return the least lower bound of all matrices, and the matrix with the smallest box.
 
         Boxes as large as what the fallback spans are of no use; None if there is no smaller one.
         """
         lower_bound, size = np.inf, self._ceiling
         best = None
         for index in self._searched:
-            branch = branches[index]
+            matrix = matrices[index]
             certificate = least_box(
-                branch.ladder,
-                branch.blocked_steps,
+                matrix.ladder,
+                matrix.blocked_edges,
                 bound=size,
                 gap=gap,
                 seconds=self._deadline - time.monotonic(),
@@ -171,53 +171,53 @@ class BoxSearch:
                 size, best = certificate.box.size, (index, certificate.box)
         return min(lower_bound, size), best
 
-    def _smooth_plan(self, index: int, box: JointBox) -> Plan | None:
+    def _smooth_plan(self, index: int, box: JointBox) -> Found | None:
         """Return the plan of the smoothest free track in the box, widened as little as possible.
 
         None if more was learnt of the problem first: bulges became columns, or nothing in the box
         is free.
         """
-        branch, problem = self._branches[index], self.refined.problem
+        matrix, problem = self._matrices[index], self.refined.problem
         settings = self._settings
-        changes = np.where(problem.off_wheel, np.inf, settings.max_contact_change)
-        ladder = replace(branch.ladder, max_contact_change=changes)
+        ladder = matrix.ladder_within(settings.max_contact_change)
         allowance = max(self._bound * (1.0 + settings.widen) - box.size, LEAST_WIDENING * box.size)
         if self._room is not None:
-            costs = roughness(problem, branch.nodes, settings.costs, np.zeros_like(branch.free))
-            steps = branch.blocked_steps
-            calm = calm_box(ladder, steps, costs, box, self._room, self._most)
-            if calm is None:
+            nowhere = np.zeros_like(matrix.free)
+            cost = track_cost(problem, matrix.nodes, settings.costs, nowhere)
+            edges = matrix.blocked_edges
+            wider = low_travel_box(ladder, edges, cost, box, self._room, self._most)
+            if wider is None:
                 return None
-            box, allowance = calm, ROUND_OFF
+            box, allowance = wider, ROUND_OFF
         for widening in WIDENINGS:
             wide = box.widened(float(widening) * allowance)
-            inside = branch.free & wide.holds(np.nan_to_num(branch.nodes.q, nan=np.inf))
-            costs = roughness(problem, branch.nodes, settings.costs, inside)
+            inside = matrix.free_inside(wide)
+            cost = track_cost(problem, matrix.nodes, settings.costs, inside)
             while not self._late():
-                smooth = smoothest_within(ladder, branch.blocked_steps, inside, costs, self._most)
+                smooth = smoothest_within(ladder, matrix.blocked_edges, inside, cost, self._most)
                 if smooth is None:
                     break
-                bulges = self._bulges(branch, smooth.rows, wide)
+                bulges = self._bulges(matrix, smooth.rows, wide)
                 if len(bulges) and self._refinements < MOST_REFINEMENTS:
                     self._refine(bulges)
                     return None
-                plan = self._check(Track(index, smooth.rows))
-                if plan is not None:
-                    return plan
+                found = self._check(Track(index, smooth.rows))
+                if found is not None:
+                    return found
                 self._blocked_something = True
-                inside &= branch.free
+                inside &= matrix.free
         return None
 
-    def _bulges(self, branch: Branch, rows: np.ndarray, box: JointBox) -> np.ndarray:
+    def _bulges(self, matrix: OpenMatrix, rows: np.ndarray, box: JointBox) -> np.ndarray:
         """Return the columns from which a track steps through postures outside of a box."""
         problem = self.refined.problem
         try:
-            path = fill_in(problem.cell, problem.points, branch.nodes, rows, problem.interpolation)
-        except BrokenStepError:
+            path = fill_in(problem.cell, problem.points, matrix.nodes, rows, problem.interpolation)
+        except BrokenEdgeError:
             return np.empty(0, dtype=int)  # the check will find and block it
         bulging = np.unique(path.cutter_point[~box.holds(path.q)].astype(int))
         # where t jumps within a smaller step the robot pivots in place: columns do not change that
-        return bulging[np.diff(self.refined.places)[bulging] > SMALLEST_STEP]
+        return np.asarray(bulging[np.diff(self.refined.places)[bulging] > SMALLEST_STEP])
 
     def _refine(self, columns: np.ndarray) -> None:
         """Take in places on the steps that start at these columns."""
@@ -225,20 +225,17 @@ class BoxSearch:
         ends = before[columns], before[columns + 1]
         places = ends[0][:, None] + (ends[1] - ends[0])[:, None] * SUBDIVIDE
         self.refined = refine(self.refined, places.ravel())
-        self._branches = carried(self._branches, before, self.refined)
+        self._matrices = carried(self._matrices, before, self.refined)
         self._refinements += 1
 
-    def _check(self, track: Track) -> Plan | None:
+    def _check(self, track: Track) -> Found | None:
         """Return the plan of a track or of a twin of it, if one of them is free."""
-        problem = self.refined.problem
-        robot = problem.cell.robot
-        for twin in twins(self._branches, track, robot.lower, robot.upper):
-            self._checks += 1
-            plan = check_track(problem, self._branches[twin.branch], twin.rows, self._checks)
-            if plan is not None:
-                return replace(
-                    plan,
-                    path=self.refined.original_path(plan.path),
-                    motion=self.refined.original_motion(plan.motion),
-                )
+        problem, refined = self.refined.problem, self.refined
+        proposals = twins(self._matrices, track, problem.cell.robot)
+        outcome = propose_and_check(problem, self._matrices, proposals, self._checks)
+        if isinstance(outcome, Found):
+            plan = outcome.plan
+            path, motion = refined.original_path(plan.path), refined.original_motion(plan.motion)
+            return Found(replace(plan, path=path, motion=motion))
+        self._checks += len(proposals)
         return None

@@ -1,4 +1,4 @@
-"""What a track is charged for where the joint range sum does not care."""
+"""What tracks are charged for where the joint range sum does not care, and whole paths."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ import numpy as np
 
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import singularity_margins
-from opl.field.nodes import NodeMatrix
 from opl.geometry.frames import Array
+from opl.motion.figures import Figures
+from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
-from opl.search.smooth import Roughness
+from opl.search.smooth import TrackCost
 
 NEAR_LIMIT = np.deg2rad(10.0)  # from where on nearness to a joint limit is charged
 NEAR_SINGULARITY = 0.2  # as in `singularity_margins`; for the wrist 11.5 degrees
 
 
 @dataclass(frozen=True)
-class Costs:
+class CostWeights:
     """Prices, all in the same unit as joint travel with weight 1, [rad].
 
     Attributes:
@@ -41,33 +42,56 @@ class Costs:
     push_weight: float
 
 
-def roughness(
-    problem: GrindingProblem, nodes: NodeMatrix, costs: Costs, inside: np.ndarray
-) -> Roughness:
-    """Return the costs of every step and node of a branch.
+@dataclass(frozen=True)
+class ObjectiveWeights:
+    """What a path is charged for as a whole.
+
+    Attributes:
+        joint_range: For each radian of the joint range sum.
+        travel: For each radian that a joint turns on the wheel.
+        time: For each second on the wheel.
+    """
+
+    joint_range: float
+    travel: float
+    time: float
+
+    def value(self, figures: Figures) -> float:
+        """Return the weighted sum of a path's figures."""
+        return (
+            self.joint_range * figures.joint_range_sum
+            + self.travel * figures.joint_travel
+            + self.time * figures.seconds
+        )
+
+
+def track_cost(
+    problem: GrindingProblem, nodes: NodeMatrix, weights: CostWeights, inside: np.ndarray
+) -> TrackCost:
+    """Return the cost of every edge and node of a matrix.
 
     Args:
         problem: For limits, speeds and the scene.
-        nodes: The branch.
-        costs: The prices.
+        nodes: The matrix.
+        weights: The prices.
         inside: The nodes that matter, shape (n_columns, n_rows); the others cost nothing.
     """
     robot = problem.cell.robot
     node_cost = np.zeros(inside.shape)
     q = nodes.q[inside]
     margin = np.minimum(q - robot.lower, robot.upper - q) / NEAR_LIMIT
-    charge = costs.limit_weight * np.square(np.maximum(1.0 - margin, 0.0)).sum(axis=-1)
+    charge = weights.limit_weight * np.square(np.maximum(1.0 - margin, 0.0)).sum(axis=-1)
     near = singularity_margins(robot.arm, q) / NEAR_SINGULARITY
-    charge += costs.singularity_weight * np.square(np.maximum(1.0 - near, 0.0)).sum(axis=-1)
-    if costs.push_away > 0.0 and costs.push_weight > 0.0:
-        wider = problem.cell.widened(costs.push_away)
-        charge += costs.push_weight * CollisionScene(wider).collides(q)
+    charge += weights.singularity_weight * np.square(np.maximum(1.0 - near, 0.0)).sum(axis=-1)
+    if weights.push_away > 0.0 and weights.push_weight > 0.0:
+        wider = problem.cell.widened(weights.push_away)
+        charge += weights.push_weight * CollisionScene(wider).collides(q)
     node_cost[inside] = charge
     arc_step = np.abs(np.diff(problem.points.arc_length))
-    return Roughness(
-        joint_weights=costs.joint_weights,
-        contact_weight=costs.contact_weight,
-        time_weight=costs.time_weight,
+    return TrackCost(
+        joint_weights=weights.joint_weights,
+        contact_weight=weights.contact_weight,
+        time_weight=weights.time_weight,
         step_seconds=np.where(problem.off_wheel, 0.0, arc_step / problem.process.feed),
         max_speed=robot.max_speed,
         contact_speed=problem.process.contact_speed,

@@ -11,11 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from opl.field.layer import layer_at
-from opl.field.nodes import NodeMatrix, build_nodes
 from opl.geometry.frames import Array
 from opl.planning.box_search import BoxSearch, OptimalSettings
-from opl.planning.problem import GrindingProblem
+from opl.planning.nodes import NodeMatrix, build_nodes
+from opl.planning.problem import GrindingProblem, wheel_distances
 from opl.planning.refine import RefinedProblem
 from opl.search.box import tighten
 from opl.search.smooth import Travel
@@ -37,20 +36,20 @@ def finer_bound(
         found: The joint range sum of a path at these positions in [rad].
         deadline: When to stop with what is proven, by `time.monotonic`.
     """
-    cell, points = problem.cell, problem.points
-    field = build_nodes(cell, points, contact_positions)
+    points = problem.points
+    field = build_nodes(problem.cell, points, contact_positions)
     near = np.zeros((len(points), len(contact_positions)), dtype=bool)
-    branches = []
-    for nodes in field.branches:
+    matrices = []
+    for nodes in field.matrices:
         counts = _small_enough(nodes, found)
         if counts.any(axis=1).all():
-            branches.append(replace(nodes, q=np.where(counts[..., None], nodes.q, np.nan)))
+            matrices.append(replace(nodes, q=np.where(counts[..., None], nodes.q, np.nan)))
             for row, position in enumerate(nodes.position_index):
                 near[:, position] |= counts[:, row]
     finer = replace(
         problem,
-        field=replace(field, branches=tuple(branches)),
-        wheel_clearance=layer_at(cell, problem.part, points, contact_positions, near),
+        field=replace(field, matrices=tuple(matrices)),
+        wheel_distance=wheel_distances(problem.scene, points, contact_positions, near),
     )
     whole = RefinedProblem(finer, np.arange(len(points), dtype=float))
     nowhere = Travel(0.0, 0.0)  # no track is sought

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
-from opl.field.layer import wheel_layer
-from opl.field.nodes import build_nodes
 from opl.geometry.frames import Array
-from opl.planning.plan import try_recursive
-from opl.planning.problem import GrindingProblem
-from opl.planning.starts import Start
-from opl.search.recursive import add_dead_ends, descend
+from opl.planning.open_matrix import OpenMatrix
+from opl.planning.plan import Found
+from opl.planning.problem import GrindingProblem, build_problem
+from opl.planning.starts import Start, tracks_from_best_start, try_recursive
 
 MOST_CHECKS = 50  # of contact-fixed motions, which differ in the counts of turns only
 
@@ -23,8 +21,8 @@ class FixedContact:
     """The contact-fixed path, for comparison.
 
     Attributes:
-        q: The posture at each cutter point in [rad], shape (N, 6); None if some point is out of
-            reach or limits at t = 0.
+        q: The configuration at each cutter point in [rad], shape (N, 6); None if some point is out
+            of reach or limits at t = 0.
         feasible: Whether the motion is free of collision.
         reason: Why it is not, empty if it is.
     """
@@ -42,38 +40,30 @@ class FixedContact:
 def keep_contact(problem: GrindingProblem) -> FixedContact:
     """Return the path with the contact in the middle of the wheel, collisions or not.
 
-    Of all branches and turns the one with the least joint range sum is taken; whether it is free of
-    collision is told, but does not matter for its ranges.
+    Of all matrices the track with the least joint range sum is taken; whether it is free of
+    collision is reported, but does not matter for its ranges.
     """
-    middle = np.zeros(1)
-    fixed = replace(
-        problem,
-        field=build_nodes(problem.cell, problem.points, middle),
-        wheel_clearance=wheel_layer(problem.cell, problem.part, problem.points, middle),
+    fixed = build_problem(
+        problem.scene, problem.points, np.zeros(1), problem.interpolation, problem.process
     )
-    best = np.inf
-    q = None
-    for nodes in fixed.field.branches:
-        ladder = fixed.ladder(nodes, nodes.exists)
-        dead, blocked = np.zeros_like(nodes.exists), np.empty(0, dtype=np.int64)
-        add_dead_ends(ladder, blocked, dead)
-        for start in np.flatnonzero(nodes.exists[0]):
-            descent = descend(ladder, int(start), blocked, dead, best)
-            if descent.rows is not None:
-                best = descent.joint_range_sum
-                q = nodes.q[np.arange(len(descent.rows)), descent.rows]
-    if q is None:
+    everywhere = [
+        OpenMatrix(nodes, fixed.ladder(nodes, nodes.exists), nodes.exists)
+        for nodes in fixed.field.matrices
+    ]
+    track = next(tracks_from_best_start(everywhere), None)
+    if track is None:
         return FixedContact(None, False, "no continuous path within reach and limits at t = 0")
-    cut = np.flatnonzero(fixed.wheel_clearance[:, 0] < -problem.cell.planned_penetration)
+    q = everywhere[track.matrix].nodes.along(track.rows)
+    cut = np.flatnonzero(fixed.cuts)
     if len(cut):
-        deepest = -1e3 * float(fixed.wheel_clearance.min())
+        deepest = -1e3 * float(fixed.wheel_distance.min())
         return FixedContact(
             q,
             False,
             f"{PART} cuts into {WHEEL} at {len(cut)} of {len(q)} cutter points "
             f"({runs_of(cut)}), {deepest:.2f} mm deep at most",
         )
-    if try_recursive(fixed, Start.BEST, MOST_CHECKS) is None:
+    if not isinstance(try_recursive(fixed, Start.BEST, MOST_CHECKS), Found):
         return FixedContact(q, False, "every motion that was checked collides")
     return FixedContact(q, True, "")
 

@@ -15,7 +15,7 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.planning.box_search import PROOF_GAP, REFINED_GAP, BoxSearch, OptimalSettings
 from opl.planning.finer_bound import finer_bound
-from opl.planning.plan import Plan, Refinement
+from opl.planning.plan import Found, Plan, Refinement
 from opl.planning.problem import GrindingProblem
 from opl.planning.refine import RefinedProblem
 from opl.planning.tube import halved, tube
@@ -40,13 +40,14 @@ def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: 
     deadline = time.monotonic() + settings.seconds
     most = _travel(fallback)
     whole = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
-    search = BoxSearch(whole, settings, most, fallback.path.joint_range_sum, deadline)
-    plan, refined = search.run(PROOF_GAP), search.refined
-    if plan is None or plan.path.joint_range_sum > fallback.path.joint_range_sum:
-        plan, refined = fallback, whole
-    plan = replace(plan, lower_bound=search.lower_bound(plan.path.joint_range_sum))
+    search = BoxSearch(whole, settings, most, _range(fallback), deadline)
+    plan, refined = fallback, whole
+    outcome = search.run(PROOF_GAP)
+    if isinstance(outcome, Found) and _range(outcome.plan) <= _range(fallback):
+        plan, refined = outcome.plan, search.refined
+    plan = replace(plan, lower_bound=search.lower_bound(_range(plan)))
     plan, positions = _between_positions(refined, plan, settings, most, deadline)
-    found, bound = plan.path.joint_range_sum, plan.lower_bound
+    found, bound = _range(plan), plan.lower_bound
     if bound is not None and plan.refinement is not None and found < bound:
         # less than is possible without the finer positions: with them, a lower bound holds
         until = min(deadline, time.monotonic() + FINER_PROOF)
@@ -72,28 +73,35 @@ def _between_positions(
         if gain < settings.tolerance and _travel(plan).within(most):
             break
         finer = halved(finer)
-        search = BoxSearch(
-            tube(refined, plan.path, finer), settings, most, plan.path.joint_range_sum, deadline
-        )
-        found = search.run(REFINED_GAP)
-        if found is None or found.path.joint_range_sum >= plan.path.joint_range_sum:
+        search = BoxSearch(tube(refined, plan.path, finer), settings, most, _range(plan), deadline)
+        outcome = search.run(REFINED_GAP)
+        if not isinstance(outcome, Found) or _range(outcome.plan) >= _range(plan):
             break
-        gain = 1.0 - found.path.joint_range_sum / plan.path.joint_range_sum
-        plan, refined = replace(found, checks=plan.checks + found.checks), search.refined
+        gain = 1.0 - _range(outcome.plan) / _range(plan)
+        plan, refined = _added(plan, outcome.plan), search.refined
         positions = finer
         rounds += 1
     if rounds and not _travel(plan).within(most):
-        room = start.path.joint_range_sum
-        ceiling = plan.path.joint_range_sum
+        room = _range(start)
         around = tube(refined, plan.path, finer)
-        search = BoxSearch(around, settings, most, ceiling, deadline, room)
-        calm = search.run(REFINED_GAP)
-        if calm is not None and calm.path.joint_range_sum <= room and _travel(calm).within(most):
-            plan, positions = replace(calm, checks=plan.checks + calm.checks), finer
-    value, bound = start.path.joint_range_sum, start.lower_bound
-    gain = value - plan.path.joint_range_sum
-    refinement = Refinement(value, bound, gain, rounds, n_positions)
+        outcome = BoxSearch(around, settings, most, _range(plan), deadline, room).run(REFINED_GAP)
+        if isinstance(outcome, Found):
+            wider = outcome.plan
+            if _range(wider) <= room and _travel(wider).within(most):
+                plan, positions = _added(plan, wider), finer
+    gain = _range(start) - _range(plan)
+    bound = start.lower_bound
+    refinement = Refinement(_range(start), bound, gain, rounds, n_positions)
     return replace(plan, lower_bound=bound, refinement=refinement), positions
+
+
+def _added(before: Plan, found: Plan) -> Plan:
+    """Return a plan that counts the motions checked for the one before as well."""
+    return replace(found, checks=before.checks + found.checks)
+
+
+def _range(plan: Plan) -> float:
+    return plan.path.joint_range_sum
 
 
 def _travel(plan: Plan) -> Travel:

@@ -1,20 +1,21 @@
-"""What is to be planned: the cell, the points and the free nodes, as one value."""
+"""What is to be planned: the scene, the points and the free nodes, as one value."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.collision import CollisionScene
-from opl.cell.wheel_distance import PartTree
+from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import WorkCell
-from opl.field.nodes import NodeField, NodeMatrix
-from opl.field.path import Interpolation
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.links import Links
 from opl.motion.process import ProcessSettings
+from opl.planning.filling import Interpolation
+from opl.planning.nodes import NodeField, NodeMatrix, build_nodes
+from opl.planning.scene import PlanningScene
 from opl.search.ladder import Ladder
 
 
@@ -23,50 +24,43 @@ class GrindingProblem:
     """Everything a search needs.
 
     Attributes:
-        cell: The cell.
-        scene: Its collision geometry.
-        part: The triangles of the part.
+        scene: The cell and its geometry.
         points: N cutter points.
-        field: The nodes of every branch.
-        wheel_clearance: Signed distance of the part to the wheel in [m], exact where it is less
+        field: The nodes of every matrix.
+        wheel_distance: Signed distance of the part to the wheel in [m], exact where it is less
             than the largest belt penetration allows, shape (N, M).
         interpolation: How the path between nodes is filled in.
         process: Speeds, approach and home.
-        links: Ways through the air, found so far; not to be given, and kept as long as the cell is
-            the same.
     """
 
-    cell: WorkCell
-    scene: CollisionScene
-    part: PartTree
+    scene: PlanningScene
     points: CutterPoints
     field: NodeField
-    wheel_clearance: Array
+    wheel_distance: Array
     interpolation: Interpolation
     process: ProcessSettings
-    links: Links = None  # type: ignore[assignment]
 
-    def __post_init__(self) -> None:
-        known = self.links
-        if (
-            not isinstance(known, Links)
-            or known.scene is not self.scene
-            or known.cell is not self.cell
-        ):
-            object.__setattr__(self, "links", Links(self.cell, self.scene, self.part))
+    @property
+    def cell(self) -> WorkCell:
+        """The cell."""
+        return self.scene.cell
 
     @property
     def off_wheel(self) -> np.ndarray:
-        """Which steps from a cutter point to the next leave the wheel, shape (N - 1,)."""
-        return np.diff(self.points.pass_index) != 0
+        """Which edges from a cutter point to the next leave the wheel, shape (N - 1,)."""
+        return np.asarray(np.diff(self.points.pass_index) != 0)
+
+    @property
+    def cuts(self) -> np.ndarray:
+        """Where the part would sink too deep into the wheel, shape (N, M)."""
+        return np.asarray(self.wheel_distance < -self.cell.planned_penetration)
 
     def free_nodes(self, nodes: NodeMatrix) -> np.ndarray:
         """Return which nodes exist and do not cut into the wheel, shape (N, n_rows)."""
-        free = self.wheel_clearance >= -self.cell.planned_penetration
-        return np.ascontiguousarray(nodes.exists & free[:, nodes.position_index])
+        return np.ascontiguousarray(nodes.exists & ~self.cuts[:, nodes.position_index])
 
     def ladder(self, nodes: NodeMatrix, free: np.ndarray) -> Ladder:
-        """Return a branch as the search sees it."""
+        """Return a node matrix as the search sees it."""
         return Ladder(
             nodes.q,
             free,
@@ -75,3 +69,57 @@ class GrindingProblem:
             self.interpolation.max_contact_step,
             self.interpolation.max_joint_step,
         )
+
+
+def build_problem(
+    scene: PlanningScene,
+    points: CutterPoints,
+    contact_positions: Array,
+    interpolation: Interpolation,
+    process: ProcessSettings,
+    clock: Callable[[str], AbstractContextManager[object]] = nullcontext,
+) -> GrindingProblem:
+    """Build the node matrices, and the distances of part and wheel at every node.
+
+    Args:
+        scene: The cell and its geometry.
+        points: N cutter points.
+        contact_positions: M values of t.
+        interpolation: How the path between nodes is filled in.
+        process: Speeds, approach and home.
+        clock: Measures the stages ``nodes`` and ``clearance``.
+    """
+    with clock("nodes"):
+        field = build_nodes(scene.cell, points, contact_positions)
+    with clock("clearance"):
+        layer = wheel_distances(scene, points, contact_positions)
+    return GrindingProblem(scene, points, field, layer, interpolation, process)
+
+
+def wheel_distances(
+    scene: PlanningScene,
+    points: CutterPoints,
+    contact_positions: Array,
+    at: np.ndarray | None = None,
+) -> Array:
+    """Return the signed distance of the part to the wheel at nodes in [m], shape (N, M).
+
+    As in `signed_wheel_distance`: exact where it is less than the belt penetration permits.
+
+    Args:
+        scene: The cell and its geometry.
+        points: N cutter points.
+        contact_positions: M values of t.
+        at: Which nodes, shape (N, M), all if not given; the others are minus infinity, not free.
+    """
+    cell = scene.cell
+    if at is None:
+        at = np.ones((len(points), len(contact_positions)), dtype=bool)
+    columns, rows = np.nonzero(at)
+    Ts_contact0_contact = cell.wheel.T_contact0_contact(contact_positions)[rows]
+    # cutter and contact coincide, whatever robot brings the part there
+    Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[columns]
+    layer = np.full(at.shape, -np.inf)
+    allowed = -cell.planned_penetration
+    layer[at] = signed_wheel_distance(scene.part, cell.wheel, Ts_contact0_workpiece, allowed)
+    return layer

@@ -11,16 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opl.cell.full_turns import nearest_turn
-from opl.cell.inverse_kinematics import inverse_kinematics
-from opl.cell.workcell import WorkCell
-from opl.field.layer import layer_at
-from opl.field.nodes import NodeField, NodeMatrix
-from opl.field.path import GrindingPath, cutter_frames
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion
-from opl.planning.branch import Branch, branches_of
-from opl.planning.problem import GrindingProblem
+from opl.motion.path import GrindingPath
+from opl.planning.filling import cutter_frames
+from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
+from opl.planning.open_matrix import OpenMatrix, open_matrices
+from opl.planning.problem import GrindingProblem, wheel_distances
 
 
 @dataclass(frozen=True)
@@ -65,16 +63,20 @@ def refine(refined: RefinedProblem, places: Array) -> RefinedProblem:
         np.interp(columns, np.arange(len(points)), points.arc_length),
     )
     t = problem.field.contact_positions
-    asked = problem.wheel_clearance > -np.inf
-    asked = _between(asked[before] | asked[before + 1])
-    layer = layer_at(problem.cell, problem.part, added, t, asked)
-    q = np.full((*asked.shape, *problem.field.q.shape[2:]), np.nan)
-    q[asked] = solve_at(problem.cell, added, t, asked)
+    known = problem.wheel_distance > -np.inf
+    wanted = _between(known[before] | known[before + 1])
+    layer = wheel_distances(problem.scene, added, t, wanted)
+    q = np.full((*wanted.shape, *problem.field.q.shape[2:]), np.nan)
+    column, row = np.nonzero(wanted)
+    q[wanted] = inverse_solutions(problem.cell, added.Ts_workpiece_cutter[column], t[row])
     at = before + 1
     field = NodeField(
         t,
-        problem.field.q[:0],  # nobody asks what lies beyond the limits between cutter points
-        tuple(_insert(problem, nodes, q, before) for nodes in problem.field.branches),
+        problem.field.q[:0],  # what lies beyond the limits between cutter points is of no use
+        tuple(
+            replace(nodes, q=np.insert(nodes.q, at, _taken(problem, nodes, q, before), axis=0))
+            for nodes in problem.field.matrices
+        ),
     )
     return RefinedProblem(
         replace(
@@ -85,53 +87,26 @@ def refine(refined: RefinedProblem, places: Array) -> RefinedProblem:
                 np.insert(points.arc_length, at, added.arc_length),
             ),
             field=field,
-            wheel_clearance=np.insert(problem.wheel_clearance, at, layer, axis=0),
+            wheel_distance=np.insert(problem.wheel_distance, at, layer, axis=0),
         ),
         np.insert(refined.places, at, new),
     )
 
 
-def postures_between(problem: GrindingProblem, nodes: NodeMatrix, places: Array) -> Array:
-    """Return the postures of a branch between cutter points, NaN where there is none.
+def configurations_between(problem: GrindingProblem, nodes: NodeMatrix, places: Array) -> Array:
+    """Return the configurations of a matrix between cutter points, NaN where there is none.
 
     Args:
         problem: What is to be planned.
-        nodes: The branch.
+        nodes: The matrix.
         places: Fractional cutter points, shape (k,).
 
     Returns:
         Joint positions in [rad], shape (k, n_rows, 6).
     """
-    q = _solutions(problem, cutter_frames(problem.points, places))
-    return _on_branch(problem, nodes, q, places.astype(int))
-
-
-def _solutions(problem: GrindingProblem, Ts_workpiece_cutter: Array) -> Array:
-    """Return all inverse solutions of some cutter frames in [rad], shape (k, M, 8, 6)."""
-    t = problem.field.contact_positions
-    Ts_base_flange = problem.cell.Ts_base_flange(t[None, :], Ts_workpiece_cutter[:, None])
-    return inverse_kinematics(problem.cell.robot.arm, Ts_base_flange)
-
-
-def solve_at(
-    cell: WorkCell, points: CutterPoints, contact_positions: Array, at: np.ndarray
-) -> Array:
-    """Return the inverse solutions of some nodes in [rad], NaN where there are none.
-
-    Args:
-        cell: The cell.
-        points: N cutter points.
-        contact_positions: M values of t.
-        at: Which k nodes, shape (N, M).
-
-    Returns:
-        Shape (k, 8, 6), column by column.
-    """
-    columns, rows = np.nonzero(at)
-    Ts_base_flange = cell.Ts_base_flange(
-        contact_positions[rows], points.Ts_workpiece_cutter[columns]
-    )
-    return inverse_kinematics(cell.robot.arm, Ts_base_flange)
+    frames = cutter_frames(problem.points, places)[:, None]
+    q = inverse_solutions(problem.cell, frames, problem.field.contact_positions)
+    return _taken(problem, nodes, q, places.astype(int))
 
 
 def _between(rows: np.ndarray) -> np.ndarray:
@@ -142,27 +117,19 @@ def _between(rows: np.ndarray) -> np.ndarray:
     )
 
 
-def _insert(
-    problem: GrindingProblem, nodes: NodeMatrix, q: Array, before: np.ndarray
-) -> NodeMatrix:
-    """Return a matrix with new columns, all their inverse solutions given."""
-    added = _on_branch(problem, nodes, q, before)
-    return replace(nodes, q=np.insert(nodes.q, before + 1, added, axis=0))
-
-
-def _on_branch(problem: GrindingProblem, nodes: NodeMatrix, q: Array, before: np.ndarray) -> Array:
-    """Return what a branch makes of inverse solutions, on the count of turns of its neighbours.
+def _taken(problem: GrindingProblem, nodes: NodeMatrix, q: Array, before: np.ndarray) -> Array:
+    """Return what a matrix takes of inverse solutions, on the count of turns of its neighbours.
 
     Args:
         problem: For the limits.
-        nodes: The branch.
+        nodes: The matrix.
         q: All inverse solutions in [rad], shape (k, M, 8, 6).
         before: Column of ``nodes`` that each follows, shape (k,).
 
     Returns:
         Joint positions in [rad], NaN beyond the limits, shape (k, n_rows, 6).
     """
-    added = q[:, nodes.position_index, nodes.branch]
+    added = q[:, nodes.position_index, nodes.ik_branch]
     near = nodes.q[before]
     near = np.where(np.isnan(near), nodes.q[before + 1], near)
     added = nearest_turn(added, near)
@@ -170,18 +137,18 @@ def _on_branch(problem: GrindingProblem, nodes: NodeMatrix, q: Array, before: np
     return np.where(within[..., None], added, np.nan)
 
 
-def carried(branches: list[Branch], places: Array, refined: RefinedProblem) -> list[Branch]:
-    """Return the branches of a refined problem, with what is known to be blocked.
+def carried(matrices: list[OpenMatrix], places: Array, refined: RefinedProblem) -> list[OpenMatrix]:
+    """Return the matrices of a refined problem, with what is known to be blocked.
 
     Args:
-        branches: The branches before.
+        matrices: The matrices before.
         places: Their columns in the original numbering, shape (n,).
         refined: The problem with more columns.
     """
     columns = np.searchsorted(refined.places, places)
     together = np.diff(columns) == 1
-    result = branches_of(refined.problem)
-    for before, after in zip(branches, result, strict=True):
+    result = open_matrices(refined.problem)
+    for before, after in zip(matrices, result, strict=True):
         after.free[columns] &= before.free
         n_rows = before.free.shape[1]
         for key in before.blocked:

@@ -1,4 +1,4 @@
-"""The recursive search from many start nodes: tracks in the order in which to check them."""
+"""The recursive search of the paper from many start nodes, its tracks checked best first."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from enum import Enum
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.branch import Branch, Track
+from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
+from opl.planning.plan import Plan, SearchOutcome, first_free, propose_and_check
+from opl.planning.problem import GrindingProblem
+from opl.planning.symmetry import twins
 from opl.search.recursive import Descent, add_dead_ends, descend
 
 
@@ -17,21 +20,58 @@ class Start(str, Enum):
     """Where the search starts in the first column."""
 
     BEST = "best"  # every start node is tried, the one with the least joint range sum is kept
-    NEAREST = "nearest"  # Node_1 of the paper: nearest to the home posture
+    NEAREST = "nearest"  # Node_1 of the paper: nearest to home
 
 
-def tracks_from_best_start(branches: list[Branch]) -> Iterator[Track]:
-    """Yield tracks by increasing joint range sum over all start nodes of all branches.
+def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
+    """Find a collision-free motion by the recursive search of the paper.
 
-    A start node is given up as soon as its sum reaches the best known. The caller may block what
-    it finds on a track before it asks for the next: only then a start node can yield again.
+    Args:
+        problem: What is to be planned.
+        start: Which start nodes to try.
+
+    Raises:
+        NoPathError: If there is none, as in `first_free`.
     """
-    searches = [_Search(branch) for branch in branches]
-    # (joint range sum, branch, start row, rows); where a start was given up, its sum then and None
+    matrices = open_matrices(problem)
+    return first_free(problem, matrices, _tracks(problem, matrices, start))
+
+
+def try_recursive(problem: GrindingProblem, start: Start, most_checks: int) -> SearchOutcome:
+    """Return what the recursive search finds within a number of checked motions.
+
+    Args:
+        problem: What is to be planned.
+        start: Which start nodes to try.
+        most_checks: How many motions to check at the most.
+    """
+    matrices = open_matrices(problem)
+    tracks = _tracks(problem, matrices, start)
+    return propose_and_check(problem, matrices, tracks, most_checks=most_checks)
+
+
+def _tracks(problem: GrindingProblem, matrices: list[OpenMatrix], start: Start) -> Iterator[Track]:
+    """Yield tracks in the order in which the search wants them checked."""
+    if start is Start.NEAREST:
+        yield from tracks_from_nearest_start(matrices, problem.process.home)
+        return
+    for track in tracks_from_best_start(matrices):
+        yield from twins(matrices, track, problem.cell.robot)
+
+
+def tracks_from_best_start(matrices: list[OpenMatrix]) -> Iterator[Track]:
+    """Yield tracks by increasing joint range sum over all start nodes of all matrices.
+
+    A start node is given up as soon as its sum reaches the best known. What is found to be blocked
+    on a track is noted in its matrix before the next is wanted: only then a start node can yield
+    again.
+    """
+    searches = [_Search(matrix) for matrix in matrices]
+    # (joint range sum, matrix, start row, rows); where a start was given up, its sum then and None
     queue: list[tuple[float, int, int, np.ndarray | None]] = []
     bound = np.inf
     for index, search in enumerate(searches):
-        for row in np.flatnonzero(search.branch.free[0]).tolist():
+        for row in np.flatnonzero(search.matrix.free[0]).tolist():
             descent = search.descend(row, bound)
             queue.append((descent.joint_range_sum, index, row, descent.rows))
             if descent.rows is not None:
@@ -40,57 +80,46 @@ def tracks_from_best_start(branches: list[Branch]) -> Iterator[Track]:
     heapq.heapify(queue)
     while queue:
         _, index, row, rows = heapq.heappop(queue)
-        if rows is not None and branches[index].allows(rows):
+        if rows is not None and matrices[index].allows(rows):
             yield Track(index, rows)
-            if branches[index].allows(rows):
+            if matrices[index].allows(rows):
                 continue  # nothing was blocked: the same search would find the same track
         descent = searches[index].descend(row, np.inf)
         if descent.rows is not None:
             heapq.heappush(queue, (descent.joint_range_sum, index, row, descent.rows))
 
 
-def tracks_from_nearest_start(branches: list[Branch], home: Array) -> Iterator[Track]:
-    """Yield tracks from the start node nearest to the home posture, then the next nearest.
-
-    Args:
-        branches: All branches.
-        home: The initial posture of the robot in [rad], shape (6,).
-    """
+def tracks_from_nearest_start(matrices: list[OpenMatrix], home: Array) -> Iterator[Track]:
+    """Yield tracks from the start node nearest to home in [rad], then from the next nearest."""
     starts = [
-        (float(np.linalg.norm(branch.nodes.q[0, row] - home)), index, row)
-        for index, branch in enumerate(branches)
-        for row in np.flatnonzero(branch.free[0]).tolist()
+        (float(np.linalg.norm(matrix.nodes.q[0, row] - home)), index, row)
+        for index, matrix in enumerate(matrices)
+        for row in np.flatnonzero(matrix.free[0]).tolist()
     ]
-    searches = [_Search(branch) for branch in branches]
+    searches = [_Search(matrix) for matrix in matrices]
     for _, index, row in sorted(starts):
-        while True:
-            descent = searches[index].descend(row, np.inf)
-            if descent.rows is None:
-                break
-            yield Track(index, descent.rows)
-            if branches[index].allows(descent.rows):
+        while (rows := searches[index].descend(row, np.inf).rows) is not None:
+            yield Track(index, rows)
+            if matrices[index].allows(rows):
                 break
 
 
 class _Search:
-    """The recursive search on one branch; remembers its dead ends."""
+    """The recursive search in one matrix; remembers its dead ends."""
 
-    def __init__(self, branch: Branch) -> None:
-        self.branch = branch
-        self._dead = np.zeros_like(branch.free)
-        self._blocked = np.empty(0, dtype=np.int64)
+    def __init__(self, matrix: OpenMatrix) -> None:
+        self.matrix = matrix
+        self._dead = np.zeros_like(matrix.free)
         # of the ladder as it was; a search that finds them itself also finds how far it can come
-        self._dead_ends = np.zeros_like(branch.free)
-        add_dead_ends(branch.ladder, self._blocked, self._dead_ends)
+        self._dead_ends = np.zeros_like(matrix.free)
+        add_dead_ends(matrix.ladder, matrix.blocked_edges, self._dead_ends)
 
     def descend(self, start: int, bound: float) -> Descent:
-        branch = self.branch
-        if not branch.free[0, start]:
+        matrix = self.matrix
+        if not matrix.free[0, start]:
             return Descent(None, np.inf, 0)
-        if len(self._blocked) != len(branch.blocked):
-            self._blocked = np.array(sorted(branch.blocked), dtype=np.int64)
         # to stop at a bound is right only where the search would not have turned back
         dead = self._dead_ends if np.isfinite(bound) else self._dead
-        descent = descend(branch.ladder, start, self._blocked, dead, bound)
-        branch.reached = max(branch.reached, descent.reached)
+        descent = descend(matrix.ladder, start, matrix.blocked_edges, dead, bound)
+        matrix.reached = max(matrix.reached, descent.reached)
         return descent

@@ -1,4 +1,4 @@
-"""What each node of a branch is: free, or what rules it out."""
+"""What each node of a branch of the inverse kinematics is: free, or what rules it out."""
 
 from __future__ import annotations
 
@@ -20,34 +20,27 @@ class NodeState(str, Enum):
     COLLISION = "robot or fixture collides"
 
 
-def node_states(problem: GrindingProblem, branch: int) -> np.ndarray:
+def node_states(problem: GrindingProblem, ik_branch: int) -> np.ndarray:
     """Return the code of every cutter point and contact position, shape (N, M) of uint8.
 
     Args:
         problem: The nodes and what they are checked against.
-        branch: Slot of the inverse kinematics.
+        ik_branch: Slot of the inverse kinematics.
     """
-    codes = list(NodeState)
-    shape = problem.wheel_clearance.shape
-    states = np.full(shape, codes.index(NodeState.LIMITS), dtype=np.uint8)
-    for nodes in problem.field.branches:
-        if nodes.branch != branch:
+    code = {state: number for number, state in enumerate(NodeState)}
+    states = np.full(problem.cuts.shape, code[NodeState.LIMITS], dtype=np.uint8)
+    for nodes in problem.field.matrices:
+        if nodes.ik_branch != ik_branch:
             continue
         free = problem.free_nodes(nodes)
-        # the turn of the wrist axes does not matter for collisions: one row for each t is asked
-        for position in range(shape[1]):
+        # full turns of the wrist do not matter for collisions: one row for each t is checked
+        for position in np.unique(nodes.position_index):
             rows = np.flatnonzero(nodes.position_index == position)
-            for row in rows:
-                column = nodes.exists[:, row]
-                states[column, position] = codes.index(NodeState.FREE)
-            asked = np.full(len(states), -1)
-            for row in rows:
-                asked[free[:, row]] = row
-            columns = np.flatnonzero(asked >= 0)
-            hit = problem.scene.collides(nodes.q[columns, asked[columns]])
-            states[columns[hit], position] = codes.index(NodeState.COLLISION)
-    states[problem.wheel_clearance < -problem.cell.planned_penetration] = codes.index(
-        NodeState.WHEEL
-    )
-    states[np.isnan(problem.field.q[:, :, branch, 0])] = codes.index(NodeState.REACH)
+            states[nodes.exists[:, rows].any(axis=1), position] = code[NodeState.FREE]
+            columns = np.flatnonzero(free[:, rows].any(axis=1))
+            last = rows[-1 - free[columns][:, rows[::-1]].argmax(axis=1)]
+            hit = problem.scene.collision.collides(nodes.q[columns, last])
+            states[columns[hit], position] = code[NodeState.COLLISION]
+    states[problem.cuts] = code[NodeState.WHEEL]
+    states[np.isnan(problem.field.q[:, :, ik_branch, 0])] = code[NodeState.REACH]
     return states

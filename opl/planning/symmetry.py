@@ -1,4 +1,4 @@
-"""Branches that make the same motion at another place of joint space.
+"""Matrices that make the same motion at another place of joint space.
 
 The other flip of the wrist mirrors one joint and shifts two; a full turn of a wrist axis shifts
 one. The joint ranges stay the same, the distances from the limits and the collisions may not.
@@ -10,40 +10,40 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from opl.field.nodes import NodeMatrix
-from opl.geometry.frames import Array
-from opl.planning.branch import Branch, Track
+from opl.cell.robot import Robot
+from opl.planning.nodes import NodeMatrix
+from opl.planning.open_matrix import OpenMatrix, Track
 
 SAME_SUM = 1e-6  # [rad] two tracks whose joint range sums differ by less are equally good
 
 
-def undominated(branches: list[Branch]) -> list[int]:
-    """Return the branches of which no other one makes at least the same motions.
+def undominated(matrices: list[OpenMatrix]) -> list[int]:
+    """Return the matrices of which no other one makes at least the same motions.
 
     What is proven of the least joint range sum of these holds for the others too.
     """
     return [
         k
-        for k, branch in enumerate(branches)
+        for k, matrix in enumerate(matrices)
         if not any(
-            _dominates(other, branch) and (m < k or not _dominates(branch, other))
-            for m, other in enumerate(branches)
+            _dominates(other, matrix) and (m < k or not _dominates(matrix, other))
+            for m, other in enumerate(matrices)
             if m != k
         )
     ]
 
 
-def _dominates(branch: Branch, other: Branch) -> bool:
-    """Return whether every track of ``other`` is one of ``branch``, shifted or mirrored."""
-    positions = branch.nodes.position_index
+def _dominates(matrix: OpenMatrix, other: OpenMatrix) -> bool:
+    """Return whether every track of ``other`` is one of ``matrix``, shifted or mirrored."""
+    positions = matrix.nodes.position_index
     rows = np.minimum(np.searchsorted(positions, other.nodes.position_index), len(positions) - 1)
-    if branch.blocked or len(np.unique(positions)) < len(positions):
+    if matrix.blocked or len(np.unique(positions)) < len(positions):
         return False
     if not np.array_equal(positions[rows], other.nodes.position_index):
         return False
-    if (other.free & ~branch.free[:, rows]).any():
+    if (other.free & ~matrix.free[:, rows]).any():
         return False
-    q, q_other = branch.nodes.q[:, rows][other.free], other.nodes.q[other.free]
+    q, q_other = matrix.nodes.q[:, rows][other.free], other.nodes.q[other.free]
     if not len(q):
         return True
     shifted = np.ptp(q - q_other, axis=0) < SAME_SUM
@@ -51,40 +51,34 @@ def _dominates(branch: Branch, other: Branch) -> bool:
     return bool((shifted | mirrored).all())
 
 
-def twins(branches: list[Branch], track: Track, lower: Array, upper: Array) -> list[Track]:
+def twins(matrices: list[OpenMatrix], track: Track, robot: Robot) -> list[Track]:
     """Return the tracks with the same contact positions and joint range sum, best margin first.
 
     The other flip of the wrist, or a full turn of a wrist axis, makes the same motion at another
     distance from the joint limits. ``track`` itself is among them.
 
     Args:
-        branches: All branches.
+        matrices: All matrices.
         track: The track.
-        lower: Lower joint limits in [rad], shape (6,).
-        upper: Upper joint limits in [rad], shape (6,).
+        robot: For its joint limits.
     """
-    nodes = branches[track.branch].nodes
+    nodes = matrices[track.matrix].nodes
     positions = nodes.position_index[track.rows]
-    total = _range_sum(nodes, track.rows)
+    total = nodes.range_sum(track.rows)
     found = []
-    for index, branch in enumerate(branches):
-        for rows in _followers(branch, positions):
-            if abs(_range_sum(branch.nodes, rows) - total) < SAME_SUM and branch.allows(rows):
-                q = branch.nodes.q[np.arange(len(rows)), rows]
-                margins = np.minimum(q - lower, upper - q).min(axis=0)
+    for index, matrix in enumerate(matrices):
+        for rows in _followers(matrix.nodes, positions):
+            if abs(matrix.nodes.range_sum(rows) - total) < SAME_SUM and matrix.allows(rows):
+                q = matrix.nodes.along(rows)
+                margins = np.minimum(q - robot.lower, robot.upper - q).min(axis=0)
                 nearness = float((1.0 / np.maximum(margins, 1e-3)).sum())
                 found.append((nearness, Track(index, rows)))
     found.sort(key=lambda item: item[0])
     return [twin for _, twin in found] or [track]
 
 
-def _range_sum(nodes: NodeMatrix, rows: np.ndarray) -> float:
-    return float(np.ptp(nodes.q[np.arange(len(rows)), rows], axis=0).sum())
-
-
-def _followers(branch: Branch, positions: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the tracks of a branch with given contact positions, one for each turn of the wrist."""
-    nodes = branch.nodes
+def _followers(nodes: NodeMatrix, positions: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the tracks of a matrix with given contact positions, one for each turn of the wrist."""
     for start in np.flatnonzero(nodes.position_index == positions[0]):
         rows = np.full(len(positions), start)
         for column in range(1, len(positions)):

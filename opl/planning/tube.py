@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from opl.cell.full_turns import nearest_turn
-from opl.field.layer import layer_at
-from opl.field.nodes import NodeField, NodeMatrix
-from opl.field.path import GrindingPath
 from opl.geometry.frames import Array
-from opl.planning.refine import RefinedProblem, solve_at
+from opl.motion.path import GrindingPath
+from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
+from opl.planning.problem import wheel_distances
+from opl.planning.refine import RefinedProblem
 
 REACH = 8  # finer contact positions on either side of the path's own
 
@@ -29,7 +29,7 @@ def tube(refined: RefinedProblem, path: GrindingPath, finer: Array) -> RefinedPr
         path: A path through these columns, its cutter points in the original numbering.
         finer: The contact positions, those of the path among them, increasing, shape (M,).
     """
-    problem = refined.problem
+    problem, points = refined.problem, refined.problem.points
     at_column = np.searchsorted(path.cutter_point, refined.places)
     q_path, t_path = path.q[at_column], path.contact_position[at_column]
     own = np.abs(finer - t_path[:, None]).argmin(axis=1)
@@ -37,17 +37,20 @@ def tube(refined: RefinedProblem, path: GrindingPath, finer: Array) -> RefinedPr
     near = np.abs(rows - own[:, None]) <= REACH
     used = near.any(axis=0)
     near, t = np.ascontiguousarray(near[:, used]), finer[used]
-    layer = layer_at(problem.cell, problem.part, problem.points, t, near)
+    layer = wheel_distances(problem.scene, points, t, near)
+    columns, at = np.nonzero(near)
     q = np.full((*near.shape, 6), np.nan)
-    q[near] = solve_at(problem.cell, problem.points, t, near)[:, path.branch]
+    q[near] = inverse_solutions(problem.cell, points.Ts_workpiece_cutter[columns], t[at])[
+        :, path.ik_branch
+    ]
     # on the same count of turns as the path
     q = nearest_turn(q, q_path[:, None])
     q = np.where(problem.cell.within_limits(q)[..., None], q, np.nan)
     # to the bit what is known to be free
     q[np.arange(len(q)), np.searchsorted(np.flatnonzero(used), own)] = q_path
-    nodes = NodeMatrix(path.branch, np.ascontiguousarray(q), t, np.arange(len(t)))
+    nodes = NodeMatrix(path.ik_branch, np.ascontiguousarray(q), t, np.arange(len(t)))
     field = NodeField(t, problem.field.q[:0], (nodes,))
-    return RefinedProblem(replace(problem, field=field, wheel_clearance=layer), refined.places)
+    return RefinedProblem(replace(problem, field=field, wheel_distance=layer), refined.places)
 
 
 def halved(contact_positions: Array) -> Array:

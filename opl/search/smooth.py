@@ -19,7 +19,7 @@ LEAST_CONTACT_WEIGHT = 0.01  # where t may move for nothing
 
 
 @dataclass(frozen=True)
-class Roughness:
+class TrackCost:
     """What a track is charged for.
 
     Attributes:
@@ -74,7 +74,7 @@ class SmoothTrack:
 
 
 def smoothest(
-    ladder: Ladder, blocked: np.ndarray, inside: np.ndarray, roughness: Roughness
+    ladder: Ladder, blocked: np.ndarray, inside: np.ndarray, cost: TrackCost
 ) -> SmoothTrack | None:
     """Return the connected track with the least cost, or None if there is no connected track.
 
@@ -84,24 +84,24 @@ def smoothest(
         ladder: The nodes and what steps are small enough.
         blocked: Sorted keys of steps that are not free, int64.
         inside: Which of the free nodes may be used, shape (n_columns, n_rows).
-        roughness: The costs.
+        cost: The costs.
     """
     rows = np.empty(len(ladder.q), dtype=np.int64)
-    cost = _cheapest(
+    total = _cheapest(
         ladder.q_by_joint,
         ladder.free & inside,
         *ladder.step_rule,
         np.asarray(blocked, dtype=np.int64),
-        np.array(roughness.joint_weights),
-        roughness.contact_weight,
-        roughness.time_weight,
-        np.array(roughness.step_seconds),
-        np.array(roughness.max_speed),
-        roughness.contact_speed,
-        np.ascontiguousarray(roughness.node_cost),
+        np.array(cost.joint_weights),
+        cost.contact_weight,
+        cost.time_weight,
+        np.array(cost.step_seconds),
+        np.array(cost.max_speed),
+        cost.contact_speed,
+        np.ascontiguousarray(cost.node_cost),
         rows,
     )
-    return SmoothTrack(rows, cost) if np.isfinite(cost) else None
+    return SmoothTrack(rows, total) if np.isfinite(total) else None
 
 
 def travel_of(ladder: Ladder, rows: np.ndarray) -> Travel:
@@ -113,7 +113,7 @@ def travel_of(ladder: Ladder, rows: np.ndarray) -> Travel:
 
 
 def smoothest_within(
-    ladder: Ladder, blocked: np.ndarray, inside: np.ndarray, roughness: Roughness, most: Travel
+    ladder: Ladder, blocked: np.ndarray, inside: np.ndarray, cost: TrackCost, most: Travel
 ) -> SmoothTrack | None:
     """Return the cheapest track that moves no further than another did, or just the cheapest.
 
@@ -124,14 +124,14 @@ def smoothest_within(
         ladder: As in `smoothest`.
         blocked: As in `smoothest`.
         inside: As in `smoothest`.
-        roughness: The costs.
+        cost: The costs.
         most: How far joints and contact should move at the most.
     """
-    cheapest = smoothest(ladder, blocked, inside, roughness)
+    cheapest = smoothest(ladder, blocked, inside, cost)
     if cheapest is None or travel_of(ladder, cheapest.rows).within(most):
         return cheapest
-    for price in DEARER * max(roughness.contact_weight, LEAST_CONTACT_WEIGHT):
-        dearer = replace(roughness, contact_weight=float(price))
+    for price in DEARER * max(cost.contact_weight, LEAST_CONTACT_WEIGHT):
+        dearer = replace(cost, contact_weight=float(price))
         track = smoothest(ladder, blocked, inside, dearer)
         if track is not None and travel_of(ladder, track.rows).within(most):
             return track

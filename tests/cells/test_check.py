@@ -49,8 +49,8 @@ def faults_of(cell, timed):
 
 
 def test_a_planned_motion_has_no_faults():
-    problem = small_problem()
-    assert find_faults(problem.cell, problem.scene, problem.part, small_motion()) == []
+    scene = small_problem().scene
+    assert find_faults(scene.cell, scene.collision, scene.part, small_motion()) == []
 
 
 def test_an_obstacle_between_two_free_postures_is_found():
@@ -118,7 +118,7 @@ def test_the_part_may_sink_into_the_belt_by_the_allowance(depth, found):
     index = int(np.argmin(np.where(grind, np.abs(motion.contact_position), np.inf)))
     assert abs(motion.contact_position[index]) < 20.0
     moved = shifted_along_normal(motion, index, depth)
-    faults = find_faults(problem.cell, problem.scene, problem.part, moved)
+    faults = find_faults(problem.cell, problem.scene.collision, problem.scene.part, moved)
     assert bool(faults) == found
     if found:
         assert faults[0].pair == ("part", "wheel")
@@ -128,8 +128,8 @@ def test_the_part_may_sink_into_the_belt_by_the_allowance(depth, found):
 def test_a_free_move_keeps_the_clearance_from_the_wheel():
     problem, motion = small_problem(), small_motion()
     on_wheel = next(k for k, s in enumerate(motion.kind) if s is MoveKind.GRIND)
-    hold = free_move(motion.q[[on_wheel, on_wheel]]).motion
-    faults = find_faults(problem.cell, problem.scene, problem.part, hold)
+    hold = free_move(motion.q[[on_wheel, on_wheel]])
+    faults = find_faults(problem.cell, problem.scene.collision, problem.scene.part, hold)
     assert [fault.pair for fault in faults] == [("part", "wheel")] * 2
 
 

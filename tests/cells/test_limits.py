@@ -1,6 +1,5 @@
 """Limits that a cell adds to those of its robot: kept by the planner, proven by the replay."""
 
-from collections import Counter
 from dataclasses import replace
 from itertools import product
 
@@ -10,14 +9,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opl.cell.joint_limits import JointLimit
-from opl.field.nodes import build_nodes
-from opl.field.path import BrokenStepError, fill_in
 from opl.motion.air import UnreachableApproachError, whole_motion
 from opl.motion.motion import MoveKind
-from opl.planning.plan import plan_recursive
+from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.nodes import build_nodes
 from opl.planning.reasons import explain
+from opl.planning.starts import plan_recursive
 from opl.planning.states import NodeState, node_states
-from tests.support.planned import replay_tiny, small_problem, tiny_motion, tiny_problem
+from tests.support.planned import (
+    replay_tiny,
+    small_problem,
+    tiny_motion,
+    tiny_problem,
+    with_scene,
+)
 
 R, T = np.eye(6)[3], np.eye(6)[5]
 EVERYWHERE = np.deg2rad(10000.0)
@@ -31,12 +36,12 @@ def with_limits(problem, *limits):
     """Return a problem whose cell has limits, its nodes made anew."""
     cell = replace(problem.cell, limits=limits)
     field = build_nodes(cell, problem.points, problem.field.contact_positions)
-    return replace(problem, cell=cell, field=field)
+    return replace(with_scene(problem, cell=cell), field=field)
 
 
 def postures_of(field):
     """Return every posture of every matrix, shape (n, 6)."""
-    return np.concatenate([nodes.q[nodes.exists] for nodes in field.branches])
+    return np.concatenate([nodes.q[nodes.exists] for nodes in field.matrices])
 
 
 @settings(max_examples=15, deadline=None)
@@ -49,7 +54,7 @@ def test_the_nodes_are_all_postures_within_the_limits_and_no_others(weights, low
     problem, coefficients = tiny_problem(), np.array(weights)
     limit = limit_of("sum", coefficients, lowest, lowest + width)
     limited = with_limits(problem, limit).field
-    kept = postures_of(limited) if limited.branches else np.empty((0, 6))
+    kept = postures_of(limited) if limited.matrices else np.empty((0, 6))
     sums = np.rad2deg(kept @ coefficients)
     assert (sums >= lowest).all() and (sums <= lowest + width).all()
     # brute force over turns: nothing else was lost
@@ -116,12 +121,12 @@ def test_a_step_and_an_approach_beyond_a_limit_are_refused_by_name():
         whole_motion(cell, problem.points, path, problem.process)
     assert refused.value.cause == "limits of U only"
 
-    nodes = next(n for n in problem.field.branches if n.branch == path.branch)
+    nodes = next(n for n in problem.field.matrices if n.ik_branch == path.ik_branch)
     at_points = np.flatnonzero(path.cutter_point % 1.0 == 0.0)
     wanted = np.interp(path.contact_position[at_points], nodes.contact_position, np.arange(30))
     rows = np.round(wanted).astype(int)
     shut = replace(problem.cell, limits=(JointLimit("T", T, EVERYWHERE, EVERYWHERE + 1.0),))
-    with pytest.raises(BrokenStepError) as broken:
+    with pytest.raises(BrokenEdgeError) as broken:
         fill_in(shut, problem.points, nodes, rows, problem.interpolation)
     assert broken.value.cause == "limits of T"
 
@@ -129,10 +134,10 @@ def test_a_step_and_an_approach_beyond_a_limit_are_refused_by_name():
 def test_reasons_and_states_tell_the_limit():
     problem = small_problem()
     shut = with_limits(problem, limit_of("R+T", R + T, 5000, 5001))
-    assert shut.field.branches == ()
-    (line,) = explain(shut, 0, Counter())
+    assert shut.field.matrices == ()
+    (line,) = explain(shut, [])
     assert "beyond the limits of R+T" in line
     states = node_states(shut, 0)
     reached = ~np.isnan(problem.field.q[:, :, 0, 0])
-    cuts = problem.wheel_clearance < -problem.cell.planned_penetration
+    cuts = problem.wheel_distance < -problem.cell.planned_penetration
     assert (states[reached & ~cuts] == list(NodeState).index(NodeState.LIMITS)).all()

@@ -7,10 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from opl.cell.inverse_kinematics import inverse_kinematics
-from opl.field.nodes import NodeMatrix
-from opl.field.path import BrokenStepError, GrindingPath, fill_in
 from opl.geometry.frames import pose
 from opl.geometry.toolpath import CutterPoints
+from opl.motion.path import GrindingPath
+from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.nodes import NodeMatrix
 from tests.support.fcl_scene import FclScene
 from tests.support.planned import small_plan, small_problem, v_plan, v_problem
 
@@ -44,8 +45,8 @@ def rows_of(problem, plan):
     """Return the matrix and the rows that a plan's path went through."""
     path = plan.path
     at_node = path.cutter_point % 1.0 == 0.0
-    for nodes in problem.field.branches:
-        if nodes.branch != path.branch:
+    for nodes in problem.field.matrices:
+        if nodes.ik_branch != path.ik_branch:
             continue
         rows = []
         for column, q in enumerate(path.q[at_node]):
@@ -163,13 +164,13 @@ def two_points(p_first=None, p_second=None, t=(0.0, 3.0)):
     problem = small_problem()
     frames = problem.points.Ts_workpiece_cutter[30:32].copy()
     q = problem.cell.Ts_base_flange(np.array(t), frames)
-    q = inverse_kinematics(problem.cell.robot.arm, q)[:, small_plan().path.branch]
+    q = inverse_kinematics(problem.cell.robot.arm, q)[:, small_plan().path.ik_branch]
     for k, p in enumerate((p_first, p_second)):
         if p is not None:
             frames[k, :3, 3] = p
     points = CutterPoints(frames, np.zeros(2, dtype=int), np.array([0.0, 0.004]))
     nodes = NodeMatrix(
-        small_plan().path.branch,
+        small_plan().path.ik_branch,
         np.repeat(q[:, None], 2, axis=1),
         np.array(t),
         np.arange(2),
@@ -208,7 +209,7 @@ def test_a_joint_turned_by_more_than_half_a_turn_is_followed():
 
 
 def broken(cell, points, nodes, rows, rule=None):
-    with pytest.raises(BrokenStepError) as caught:
+    with pytest.raises(BrokenEdgeError) as caught:
         fill_in(cell, points, nodes, rows, rule or small_problem().interpolation)
     return caught.value
 
@@ -217,7 +218,7 @@ def test_a_step_out_of_reach_is_refused():
     # both ends are said to be fine; between them the part would have to be metres away
     error = broken(*two_points(p_first=np.array([0, 0, 4.0]), p_second=np.array([0, 0, 4.0])))
     assert (error.column, error.cause) == (0, "reach")
-    assert "step from cutter point 0: reach" in str(error)
+    assert "edge from cutter point 0: reach" in str(error)
 
 
 def test_a_step_beyond_the_limits_is_refused():

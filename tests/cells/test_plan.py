@@ -1,6 +1,5 @@
 """Search and check together: what is in the way, the motion around a path, refusals."""
 
-from collections import Counter
 from dataclasses import replace
 from functools import cache
 
@@ -9,15 +8,15 @@ import pytest
 
 from opl.cell.robot import forward_kinematics
 from opl.errors import NoPathError
-from opl.field.path import BrokenStepError, fill_in
 from opl.motion.air import UnreachableApproachError, whole_motion
 from opl.motion.check import RESOLUTION, densify, find_faults
 from opl.motion.motion import MoveKind
 from opl.motion.timing import time_motion
+from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.fixed import keep_contact, runs_of
-from opl.planning.plan import plan_recursive
+from opl.planning.plan import Exhausted, Found, OutOfBudget
 from opl.planning.reasons import explain, unreachable_points
-from opl.planning.starts import Start
+from opl.planning.starts import Start, plan_recursive, try_recursive
 from opl.planning.states import NodeState, node_states
 from tests.support.bare_cells import Ghosts, with_obstacle
 from tests.support.brute_force import printed_recursion
@@ -35,6 +34,7 @@ from tests.support.planned import (
     v_timed,
     with_positions,
     with_problem_cell,
+    with_scene,
 )
 
 PAPER_FIXED = [0.4711, 0.3512, 0.2951, 2.8134, 0.8810, 1.5024]  # [rad], table 2, S L U R B T
@@ -92,7 +92,7 @@ def test_the_nearest_start_is_the_node_nearest_to_home():
     path = plan_recursive(problem, Start.NEAREST).path
     home = problem.process.home
     nearest = np.inf
-    for nodes in problem.field.branches:
+    for nodes in problem.field.matrices:
         q = nodes.q[0][problem.free_nodes(nodes)[0]]
         if len(q):
             nearest = min(nearest, np.linalg.norm(q - home, axis=1).min())
@@ -120,7 +120,7 @@ def by_printed_recursion(problem):
     Every step is filled in and asked about on its own, when the recursion comes to it.
     """
     home = problem.process.home
-    fields = [(nodes, problem.free_nodes(nodes)) for nodes in problem.field.branches]
+    fields = [(nodes, problem.free_nodes(nodes)) for nodes in problem.field.matrices]
     starts = sorted(
         (np.linalg.norm(nodes.q[0, row] - home), index, row)
         for index, (nodes, free) in enumerate(fields)
@@ -136,7 +136,7 @@ def by_printed_recursion(problem):
                 known[key] = step_is_free(problem, nodes, *key)
             return known[key]
 
-        if problem.scene.collides(nodes.q[0, row][None])[0]:
+        if problem.scene.collision.collides(nodes.q[0, row][None])[0]:
             continue
         rows = printed_recursion(nodes.q, free, leads_on, row)
         if rows is not None:
@@ -154,9 +154,9 @@ def step_is_free(problem, nodes, column, here, there):
     rows = np.array([here, there])
     try:
         path = fill_in(problem.cell, points, cut, rows, problem.interpolation)
-    except BrokenStepError:
+    except BrokenEdgeError:
         return False
-    return not problem.scene.collides(densify(path.q, RESOLUTION)[0]).any()
+    return not problem.scene.collision.collides(densify(path.q, RESOLUTION)[0]).any()
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -167,7 +167,7 @@ def test_collisions_found_late_lead_to_the_track_of_the_printed_recursion(seed):
     random = np.random.default_rng(seed)
     inner = np.flatnonzero((free.cutter_point > 3) & (free.cutter_point < 16))
     ghosts = Ghosts(free.q[random.choice(inner, 5, replace=False)], radius=0.02)
-    haunted = replace(problem, scene=ghosts)
+    haunted = with_scene(problem, collision=ghosts)
     wanted = by_printed_recursion(haunted)
     plan = plan_recursive(haunted, Start.NEAREST)
     assert plan.checks > 1
@@ -183,6 +183,23 @@ def test_a_path_goes_round_an_obstacle():
     plan = plan_recursive(with_problem_cell(problem, cell))
     assert plan.checks > 1
     assert not hits_anything(cell, plan.motion, every=3)
+
+
+def test_a_search_ends_with_a_plan_or_without_proposals_or_with_its_budget_spent():
+    problem = one_row_problem()
+    found = try_recursive(problem, Start.NEAREST, most_checks=1)
+    assert isinstance(found, Found) and found.plan.checks == 1
+    shut = with_scene(problem, collision=Ghosts(np.zeros(6), radius=100.0))
+    assert isinstance(try_recursive(shut, Start.NEAREST, most_checks=1), OutOfBudget)
+    assert isinstance(try_recursive(shut, Start.NEAREST, most_checks=1000), Exhausted)
+
+
+def test_another_scene_finds_free_moves_of_its_own():
+    scene = small_problem().scene
+    other = replace(scene, collision=Ghosts(np.zeros(6), radius=0.1))
+    assert scene.links is scene.links
+    assert other.links is not scene.links
+    assert other.links.scene is other.collision
 
 
 def test_a_wall_at_the_wheel_is_named_with_the_points_it_shuts():
@@ -206,7 +223,7 @@ def test_a_way_that_only_ends_in_a_collision_is_named():
     ghosts = Ghosts(home + np.array([0.0, 0.01, 0.0, 0.0, 0.0, 0.0]), radius=0.02)
     # home itself is in it, so is every way from and to home
     with pytest.raises(NoPathError, match=r"R_link and ghost"):
-        plan_recursive(replace(problem, scene=ghosts))
+        plan_recursive(with_scene(problem, collision=ghosts))
 
 
 def test_what_is_in_the_way_of_a_free_move_is_led_around():
@@ -217,9 +234,9 @@ def test_what_is_in_the_way_of_a_free_move_is_led_around():
     moves = [1, *links, n - 1]
     middles = np.array([(plan.motion.q[k - 1] + plan.motion.q[k]) / 2.0 for k in moves])
     ghosts = Ghosts(middles, radius=0.015)
-    faults = find_faults(problem.cell, ghosts, problem.part, plan.motion)
+    faults = find_faults(problem.cell, ghosts, problem.scene.part, plan.motion)
     assert [fault.move for fault in faults] == moves
-    other = plan_recursive(replace(problem, scene=ghosts))
+    other = plan_recursive(with_scene(problem, collision=ghosts))
     assert other.checks == 1
     np.testing.assert_array_equal(other.path.q, plan.path.q)
     assert not ghosts.collides(densify(other.motion.q, RESOLUTION)[0]).any()
@@ -232,11 +249,11 @@ def test_what_is_in_the_way_of_a_free_move_is_led_around():
 
 def test_a_part_that_cannot_touch_without_being_cut_is_told_how_deep():
     problem = small_problem()
-    layer = problem.wheel_clearance.copy()
+    layer = problem.wheel_distance.copy()
     layer[30:40] = -0.003
     layer[35, 4] = -0.0012
     with pytest.raises(NoPathError) as caught:
-        plan_recursive(replace(problem, wheel_clearance=layer))
+        plan_recursive(replace(problem, wheel_distance=layer))
     error = caught.value
     assert error.message == "no path beyond cutter point 29 (30 of 120 reached)"
     assert len(error.reasons) == 1
@@ -251,20 +268,21 @@ def test_points_beyond_the_limits_are_told_with_the_joint():
     upper = robot.upper.copy()
     upper[1] = np.radians(-30.0)  # L bends forward at the wheel
     narrow = replace(problem.cell, robot=replace(robot, upper=upper))
-    branches = tuple(
+    matrices = tuple(
         replace(nodes, q=np.where((nodes.q <= upper).all(axis=-1)[..., None], nodes.q, np.nan))
-        for nodes in problem.field.branches
+        for nodes in problem.field.matrices
     )
-    changed = replace(problem, cell=narrow, field=replace(problem.field, branches=branches))
+    field = replace(problem.field, matrices=matrices)
+    changed = replace(with_scene(problem, cell=narrow), field=field)
     with pytest.raises(NoPathError, match="beyond the limits of L"):
         plan_recursive(changed)
 
 
 def test_many_shut_runs_are_not_all_listed():
     problem = one_row_problem()
-    layer = problem.wheel_clearance.copy()
+    layer = problem.wheel_distance.copy()
     layer[::2] = -1.0
-    reasons = explain(replace(problem, wheel_clearance=layer), 0, Counter())
+    reasons = explain(replace(problem, wheel_distance=layer), [])
     assert len(reasons) == 9
     assert reasons[-1] == "and 2 more runs of cutter points"
 
@@ -281,9 +299,9 @@ def test_points_out_of_reach_are_found():
 def test_a_fixed_contact_that_cuts_is_told():
     # the part is larger than its surface by 1 mm
     problem = small_problem()
-    larger = replace(problem.part, triangles=problem.part.triangles * 1.01)
-    larger = replace(larger, spheres=problem.part.spheres * 1.01)
-    fixed = keep_contact(replace(problem, part=larger))
+    part = problem.scene.part
+    larger = replace(part, triangles=part.triangles * 1.01, spheres=part.spheres * 1.01)
+    fixed = keep_contact(with_scene(problem, part=larger))
     assert not fixed.feasible
     assert fixed.reason.startswith("part cuts into wheel at 120 of 120 cutter points (0-119), ")
     assert fixed.reason.endswith(" mm deep at most")
@@ -304,19 +322,15 @@ def test_runs_are_written_short(numbers, told):
 def test_states_say_what_rules_a_node_out():
     problem = one_row_problem()
     codes = {state: code for code, state in enumerate(NodeState)}
-    branch = small_plan().path.branch
-    layer = problem.wheel_clearance.copy()
+    branch = small_plan().path.ik_branch
+    layer = problem.wheel_distance.copy()
     layer[5, 3] = -0.1
     q = problem.field.q.copy()
     q[6, 4, branch] = np.nan
-    nodes = next(n for n in problem.field.branches if n.branch == branch and n.exists.any())
+    nodes = next(n for n in problem.field.matrices if n.ik_branch == branch and n.exists.any())
     column, row = np.argwhere(nodes.exists)[len(np.argwhere(nodes.exists)) // 2]
-    changed = replace(
-        problem,
-        wheel_clearance=layer,
-        field=replace(problem.field, q=q),
-        scene=Ghosts(nodes.q[column, row], radius=1e-3),
-    )
+    haunted = with_scene(problem, collision=Ghosts(nodes.q[column, row], radius=1e-3))
+    changed = replace(haunted, wheel_distance=layer, field=replace(problem.field, q=q))
     states = node_states(changed, branch)
     assert states.shape == layer.shape
     assert states[5, 3] == codes[NodeState.WHEEL]

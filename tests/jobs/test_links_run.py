@@ -16,7 +16,7 @@ from opl.cell.robot import forward_kinematics, load_robot
 from opl.deliver import deliver
 from opl.job.load import load
 from opl.pipeline import cutter_points, pose_problem, run
-from opl.planning.plan import plan_recursive
+from opl.planning.starts import plan_recursive
 from tests.support.fcl_scene import margin_along
 from tests.support.jobs import document, opl, write_job
 

@@ -5,11 +5,11 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from opl.field.path import BrokenStepError, fill_in
 from opl.files.resources import folder
 from opl.job.load import load
 from opl.planning.bound import StripProof, raise_bound
-from opl.planning.branch import branches_of
+from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.open_matrix import open_matrices
 from opl.planning.refine import RefinedProblem, refine
 from opl.search.certificate import least_box
 from opl.search.ladder import Ladder
@@ -142,10 +142,10 @@ def test_no_motion_of_the_s_part_is_below_the_raised_bound():
         RefinedProblem(problem, np.arange(14.0)),
         (np.arange(13)[:, None] + np.array([0.25, 0.5, 0.75])).ravel(),
     )
-    all_between = branches_of(finer.problem)
+    all_between = open_matrices(finer.problem)
     random = np.random.default_rng(0)
     raised = 0
-    for branch, between in zip(branches_of(problem), all_between, strict=True):
+    for branch, between in zip(open_matrices(problem), all_between, strict=True):
         certificate = least_box(branch.ladder, NOTHING, gap=1e-6)
         if certificate.box is None:
             continue
@@ -174,5 +174,5 @@ def test_no_motion_of_the_s_part_is_below_the_raised_bound():
 def _filled(problem, branch, rows):
     try:
         return fill_in(problem.cell, problem.points, branch.nodes, rows, problem.interpolation)
-    except BrokenStepError:
+    except BrokenEdgeError:
         return None

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 from opl.search.box import JointBox
 from opl.search.certificate import least_box
 from opl.search.ladder import Ladder
-from opl.search.smooth import Roughness, Travel, smoothest, smoothest_within
+from opl.search.smooth import TrackCost, Travel, smoothest, smoothest_within
 from tests.support.brute_force import all_tracks, keys_of, may_step, random_field
 
 
@@ -18,25 +18,25 @@ def range_sum(ladder, rows):
     return float(np.ptp(ladder.q[np.arange(len(rows)), list(rows)], axis=0).sum())
 
 
-def cost_of(ladder, rows, roughness):
+def cost_of(ladder, rows, cost):
     q = ladder.q[np.arange(len(rows)), list(rows)]
     t = ladder.contact_position[list(rows)]
     turned = np.abs(np.diff(q, axis=0))
     on_wheel = ~ladder.off_wheel
-    sliding = np.abs(np.diff(t)) / roughness.contact_speed
-    turning = (turned / roughness.max_speed).max(axis=1)
-    seconds = np.maximum(np.maximum(roughness.step_seconds, turning), sliding)
+    sliding = np.abs(np.diff(t)) / cost.contact_speed
+    turning = (turned / cost.max_speed).max(axis=1)
+    seconds = np.maximum(np.maximum(cost.step_seconds, turning), sliding)
     return float(
-        (turned @ roughness.joint_weights).sum()
-        + roughness.contact_weight * np.abs(np.diff(t))[on_wheel].sum()
-        + roughness.time_weight * seconds[on_wheel].sum()
-        + roughness.node_cost[np.arange(len(rows)), list(rows)].sum()
+        (turned @ cost.joint_weights).sum()
+        + cost.contact_weight * np.abs(np.diff(t))[on_wheel].sum()
+        + cost.time_weight * seconds[on_wheel].sum()
+        + cost.node_cost[np.arange(len(rows)), list(rows)].sum()
     )
 
 
-def random_roughness(ladder, seed):
+def random_cost(ladder, seed):
     random = np.random.default_rng(seed)
-    return Roughness(
+    return TrackCost(
         joint_weights=random.uniform(0.0, 2.0, 6),
         contact_weight=float(random.uniform(0.0, 0.3)),
         time_weight=float(random.uniform(0.0, 0.5)),
@@ -100,20 +100,20 @@ def test_nothing_is_found_below_the_least_box(seed):
 def test_the_smoothest_track_is_the_one_that_enumeration_finds(block):
     for seed in range(20 * block, 20 * block + 20):
         ladder, blocked = random_field(seed)
-        roughness = random_roughness(ladder, seed)
+        cost = random_cost(ladder, seed)
         inside = np.random.default_rng(seed).random(ladder.free.shape) > 0.1
         tracks = [
             rows
             for rows in all_tracks(ladder, blocked)
             if all(inside[c, r] for c, r in enumerate(rows))
         ]
-        found = smoothest(ladder, keys_of(ladder, blocked), inside, roughness)
+        found = smoothest(ladder, keys_of(ladder, blocked), inside, cost)
         if not tracks:
             assert found is None
             continue
-        least = min(cost_of(ladder, rows, roughness) for rows in tracks)
+        least = min(cost_of(ladder, rows, cost) for rows in tracks)
         assert found.cost == pytest.approx(least, abs=1e-9)
-        assert cost_of(ladder, found.rows, roughness) == pytest.approx(least, abs=1e-9)
+        assert cost_of(ladder, found.rows, cost) == pytest.approx(least, abs=1e-9)
         assert tuple(found.rows) in set(tracks)
 
 
@@ -131,16 +131,16 @@ def test_a_track_that_moves_no_further_than_another_is_found_where_a_dearer_t_le
     kept = 0
     for seed in range(300):
         ladder, blocked = random_field(seed)
-        roughness = random_roughness(ladder, seed)
+        cost = random_cost(ladder, seed)
         keys, inside = keys_of(ladder, blocked), np.ones_like(ladder.free)
-        cheapest = smoothest(ladder, keys, inside, roughness)
-        calm = smoothest(ladder, keys, inside, replace(roughness, contact_weight=10.0))
+        cheapest = smoothest(ladder, keys, inside, cost)
+        calm = smoothest(ladder, keys, inside, replace(cost, contact_weight=10.0))
         if cheapest is None:
-            assert smoothest_within(ladder, keys, inside, roughness, Travel(9.0, 9.0)) is None
+            assert smoothest_within(ladder, keys, inside, cost, Travel(9.0, 9.0)) is None
             continue
         # all the room in the joints, none in t but what the calmest track needs
         most = Travel(np.inf, travel_of(ladder, calm.rows)[1])
-        found = smoothest_within(ladder, keys, inside, roughness, most)
+        found = smoothest_within(ladder, keys, inside, cost, most)
         if travel_of(ladder, cheapest.rows)[1] <= most.contact:
             np.testing.assert_array_equal(found.rows, cheapest.rows)
         elif (found.rows != cheapest.rows).any():
@@ -153,9 +153,9 @@ def test_a_track_that_cannot_move_less_stays_the_cheapest():
     ladder, _ = random_field(8)
     ladder = replace(ladder, max_joint_step=4.0)  # every step may be made
     keys, inside = np.empty(0, dtype=np.int64), np.ones_like(ladder.free)
-    roughness = random_roughness(ladder, 8)
-    cheapest = smoothest(ladder, keys, inside, roughness)
-    found = smoothest_within(ladder, keys, inside, roughness, Travel(-1.0, -1.0))
+    cost = random_cost(ladder, 8)
+    cheapest = smoothest(ladder, keys, inside, cost)
+    found = smoothest_within(ladder, keys, inside, cost, Travel(-1.0, -1.0))
     np.testing.assert_array_equal(found.rows, cheapest.rows)
 
 
@@ -171,14 +171,14 @@ def test_the_smoothest_track_of_a_large_field_is_a_shortest_path_of_scipy():
         max_joint_step=0.4,
         max_contact_change=8.0,
     )
-    roughness = random_roughness(ladder, 7)
+    cost = random_cost(ladder, 7)
     everywhere = np.ones_like(ladder.free)
-    found = smoothest(ladder, np.empty(0, dtype=np.int64), everywhere, roughness)
+    found = smoothest(ladder, np.empty(0, dtype=np.int64), everywhere, cost)
 
     start, end = n_columns * n_rows, n_columns * n_rows + 1
     edges = {}
     for row in np.flatnonzero(ladder.free[0]):
-        edges[start, row] = 1.0 + roughness.node_cost[0, row]
+        edges[start, row] = 1.0 + cost.node_cost[0, row]
     for row in np.flatnonzero(ladder.free[-1]):
         edges[(n_columns - 1) * n_rows + row, end] = 1.0
     for column in range(n_columns - 1):
@@ -193,14 +193,14 @@ def test_the_smoothest_track_of_a_large_field_is_a_shortest_path_of_scipy():
                         1.0,
                         0.4,
                     )
-                    price = Roughness(
-                        roughness.joint_weights,
-                        roughness.contact_weight,
-                        roughness.time_weight,
-                        roughness.step_seconds[column : column + 1],
-                        roughness.max_speed,
-                        roughness.contact_speed,
-                        np.stack([np.zeros(n_rows), roughness.node_cost[column + 1]]),
+                    price = TrackCost(
+                        cost.joint_weights,
+                        cost.contact_weight,
+                        cost.time_weight,
+                        cost.step_seconds[column : column + 1],
+                        cost.max_speed,
+                        cost.contact_speed,
+                        np.stack([np.zeros(n_rows), cost.node_cost[column + 1]]),
                     )
                     key = (column * n_rows + row, (column + 1) * n_rows + following)
                     edges[key] = cost_of(pair, (row, following), price)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from opl.planning.impasse import Impasse, impasses
+from opl.search.impasse import impasses
 from opl.search.ladder import Ladder
 from tests.support.brute_force import all_tracks, keys_of, random_field
 
@@ -31,14 +31,14 @@ def test_impasses_are_the_smallest_runs_that_no_track_passes():
         ladder, blocked = random_field(seed)
         n = len(ladder.q)
         expected = [
-            Impasse(first, last)
+            (first, last)
             for first in range(n)
             for last in range(first, n)
             if not passable(ladder, blocked, first, last)
             and (first == last or passable(ladder, blocked, first + 1, last))
             and (first == last or passable(ladder, blocked, first, last - 1))
         ]
-        found = impasses(ladder, set(keys_of(ladder, blocked).tolist()))
+        found = impasses(ladder, keys_of(ladder, blocked))
         assert found == expected
         told += len(found)
     assert told > 20
@@ -50,4 +50,4 @@ def test_a_jump_of_all_postures_is_the_impasse():
     ladder = Ladder(
         q, np.ones((6, 3), dtype=bool), np.arange(3.0), np.zeros(5, dtype=bool), 1.0, 0.3
     )
-    assert impasses(ladder, set()) == [Impasse(3, 4)]
+    assert impasses(ladder, np.empty(0, dtype=np.int64)) == [(3, 4)]

@@ -13,22 +13,21 @@ from opl.cell.robot import forward_kinematics
 from opl.motion.check import RESOLUTION, densify
 from opl.motion.figures import figures_of_path
 from opl.planning.cheapest import plan_cheapest
-from opl.planning.costs import roughness
+from opl.planning.costs import ObjectiveWeights, track_cost
 from opl.planning.finer_bound import finer_bound
-from opl.planning.objective import ObjectiveWeights
 from opl.planning.optimal import plan_optimal
-from opl.planning.plan import plan_recursive
 from opl.planning.refine import RefinedProblem
+from opl.planning.starts import plan_recursive
 from opl.planning.tube import REACH, halved, tube
 from opl.planning.weighted import plan_weighted
-from opl.search.calm import calm_box
 from opl.search.certificate import least_box
+from opl.search.low_travel import low_travel_box
 from opl.search.smooth import Travel, smoothest, travel_of
 from opl.verification.replay import replay
 from tests.support.bare_cells import Ghosts
 from tests.support.fcl_scene import FclScene
 from tests.support.jobs import opl, write_job
-from tests.support.planned import problem_of, small_job, timed, v_job, with_positions
+from tests.support.planned import problem_of, small_job, timed, v_job, with_positions, with_scene
 
 SETTINGS = v_job().search.optimal
 ONLY_TRAVEL = replace(
@@ -76,7 +75,7 @@ def on_wheel(motion):
 def free_tracks(problem):
     """Yield (posture at each cutter point, t at each) of every continuous track of a tiny field."""
     rule = problem.interpolation
-    for nodes in problem.field.branches:
+    for nodes in problem.field.matrices:
         free = problem.free_nodes(nodes)
         for rows in product(*(np.flatnonzero(column) for column in free)):
             q = nodes.q[np.arange(len(rows)), list(rows)]
@@ -189,7 +188,7 @@ def test_what_collides_is_avoided_and_the_bound_still_holds():
     problem, free = one_row(), optimal(one_row)
     inner = free.path.q[(free.path.cutter_point > 5) & (free.path.cutter_point < 15)]
     ghosts = Ghosts(inner[:: len(inner) // 4], radius=0.02)
-    haunted = replace(problem, scene=ghosts)
+    haunted = with_scene(problem, collision=ghosts)
     plan = plan_optimal(haunted, SETTINGS, plan_recursive(haunted))
     assert not ghosts.collides(densify(plan.motion.q, RESOLUTION)[0]).any()
     bound = plan.refinement.lower_bound
@@ -225,7 +224,7 @@ def shortest(problem, price):
     """
     rule = problem.interpolation
     best = np.inf
-    for nodes in problem.field.branches:
+    for nodes in problem.field.matrices:
         free, (n, m) = problem.free_nodes(nodes), nodes.q.shape[:2]
         tails, heads, prices = [], [], []
         for column in range(n - 1):
@@ -266,7 +265,7 @@ def test_the_least_travel_is_a_shortest_path_of_scipy():
 def test_the_least_time_is_a_shortest_path_of_scipy():
     problem = one_row()
     slow = replace(problem.cell.robot, max_speed=problem.cell.robot.max_speed / 40.0)
-    problem = replace(problem, cell=replace(problem.cell, robot=slow))
+    problem = with_scene(problem, cell=replace(problem.cell, robot=slow))
     arc = np.abs(np.diff(problem.points.arc_length)) / problem.process.feed
 
     def seconds(q_a, q_b, t_a, t_b, column):
@@ -335,7 +334,7 @@ def test_no_track_of_a_tiny_field_has_less_than_the_bound_of_the_weighted_sum(fi
 def test_one_part_alone_has_the_bound_of_that_part():
     problem = one_row()
     only_range = weighted(problem, ObjectiveWeights(1.0, 0.0, 0.0), recursive(one_row))
-    ladders = [problem.ladder(nodes, problem.free_nodes(nodes)) for nodes in problem.field.branches]
+    ladders = [problem.ladder(nodes, problem.free_nodes(nodes)) for nodes in problem.field.matrices]
     nothing = np.empty(0, dtype=np.int64)
     least = min(least_box(ladder, nothing).lower_bound for ladder in ladders)
     assert only_range.weighted.lower_bound == pytest.approx(least, rel=2e-4)
@@ -344,7 +343,7 @@ def test_one_part_alone_has_the_bound_of_that_part():
     assert only_travel.weighted.lower_bound == pytest.approx(bound, abs=1e-9)
 
 
-# the tube around a path, and the calm box in it
+# the tube around a path, and the box of low travel in it
 
 
 def test_a_tube_holds_the_path_and_only_postures_that_grind_near_it():
@@ -352,7 +351,7 @@ def test_a_tube_holds_the_path_and_only_postures_that_grind_near_it():
     whole = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
     finer = halved(problem.field.contact_positions)
     around = tube(whole, path, finer).problem
-    (nodes,) = around.field.branches
+    (nodes,) = around.field.matrices
     free = around.free_nodes(nodes)
     q_path, t_path = at_cutter_points(path)
     for column, (q, t) in enumerate(zip(q_path, t_path, strict=True)):
@@ -376,13 +375,13 @@ def test_halved_contact_positions_keep_the_old_ones_to_the_bit():
     np.testing.assert_allclose(np.diff(finer), 140.0 / 139.0 / 4.0)
 
 
-def test_a_calm_box_holds_a_calm_track_and_is_widened_no_more_than_allowed():
+def test_a_low_travel_box_holds_a_track_of_low_travel_and_is_widened_no_more_than_allowed():
     problem = one_row()
     found = 0
-    for nodes in problem.field.branches:
+    for nodes in problem.field.matrices:
         free = problem.free_nodes(nodes)
         ladder, nothing = problem.ladder(nodes, free), np.empty(0, dtype=np.int64)
-        costs = roughness(problem, nodes, ONLY_TRAVEL, np.zeros_like(free))
+        costs = track_cost(problem, nodes, ONLY_TRAVEL, np.zeros_like(free))
         box = least_box(ladder, nothing).box
         if box is None:
             continue
@@ -390,12 +389,12 @@ def test_a_calm_box_holds_a_calm_track_and_is_widened_no_more_than_allowed():
         dear = replace(costs, contact_weight=1.0)
         before = travel_of(ladder, smoothest(ladder, nothing, box.holds(q), dear).rows)
         most = Travel(np.inf, before.contact - 4.0)  # one step of t less than the box permits
-        calm = calm_box(ladder, nothing, costs, box, 2.0 * box.size, most)
-        assert calm_box(ladder, nothing, costs, box, box.size, most) is None
-        if calm is not None:
+        wider = low_travel_box(ladder, nothing, costs, box, 2.0 * box.size, most)
+        assert low_travel_box(ladder, nothing, costs, box, box.size, most) is None
+        if wider is not None:
             found += 1
-            assert box.size < calm.size <= 2.0 * box.size
-            assert (calm.lower <= box.lower).all() and (calm.upper >= box.upper).all()
-            track = smoothest(ladder, nothing, calm.holds(q), dear)
+            assert box.size < wider.size <= 2.0 * box.size
+            assert (wider.lower <= box.lower).all() and (wider.upper >= box.upper).all()
+            track = smoothest(ladder, nothing, wider.holds(q), dear)
             assert travel_of(ladder, track.rows).within(most)
     assert found

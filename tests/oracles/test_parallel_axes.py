@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from opl.cell.inverse_kinematics import inverse_kinematics, singularity_margins
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot import controller_poses, forward_kinematics, known_robots, load_robot
-from opl.field.nodes import _lift
+from opl.planning.nodes import _lift
 from tests.support.closed_forms import difference
 
 UR10E = load_robot("ur10e")

@@ -6,16 +6,14 @@ from functools import cache
 import numpy as np
 
 from opl.cell.collision import CollisionScene
-from opl.cell.wheel_distance import part_tree
-from opl.field.layer import wheel_layer
-from opl.field.nodes import build_nodes
 from opl.files.resources import folder
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import load
 from opl.motion.timing import time_motion
 from opl.pipeline import cutter_points
-from opl.planning.plan import plan_recursive
-from opl.planning.problem import GrindingProblem
+from opl.planning.problem import build_problem
+from opl.planning.scene import planning_scene
+from opl.planning.starts import plan_recursive
 from opl.verification.replay import replay
 
 V_JOB = folder("workpieces") / "v_shape" / "job.yaml"
@@ -48,17 +46,8 @@ def problem_of(job, points_of=None):
             points.arc_length[points_of],
         )
     positions = job.cell.wheel.positions(job.search.n_contact_positions)
-    part = part_tree(job.cell.part)
-    return GrindingProblem(
-        job.cell,
-        CollisionScene(job.cell).for_second_opinion(),
-        part,
-        points,
-        build_nodes(job.cell, points, positions),
-        wheel_layer(job.cell, part, points, positions),
-        job.search.interpolation,
-        job.process,
-    )
+    scene = planning_scene(job.cell)
+    return build_problem(scene, points, positions, job.search.interpolation, job.process)
 
 
 @cache
@@ -126,5 +115,10 @@ def replay_tiny(timed=None, cell=None):
 
 
 def with_problem_cell(problem, cell):
-    """Return a problem in another cell; nodes and wheel layer stay."""
-    return replace(problem, cell=cell, scene=CollisionScene(cell).for_second_opinion())
+    """Return a problem in another cell; nodes, part and wheel layer stay."""
+    return with_scene(problem, cell=cell, collision=CollisionScene(cell).for_second_opinion())
+
+
+def with_scene(problem, **changes):
+    """Return a problem whose scene has another cell, collision geometry or part."""
+    return replace(problem, scene=replace(problem.scene, **changes))

@@ -1,4 +1,4 @@
-"""Calm tracks: no more travel than another path makes, for as little more of joint range as needed.
+"""Boxes with a track of low travel: no more than another path makes, in as small a box as can be.
 
 The least box may force the contact to move further than it would have to in a box that is a little
 larger on some of its faces. Dynamic programming finds which ones: the least travel of t in a box.
@@ -14,17 +14,17 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
 from opl.search.ladder import Ladder
-from opl.search.smooth import Roughness, Travel, smoothest, travel_of
+from opl.search.smooth import TrackCost, Travel, smoothest, travel_of
 
-CALM = 1.0  # cost of moving t by one belt unit against 1 for each radian of a joint
+CONTACT_WEIGHT = 1.0  # cost of moving t by one belt unit against 1 for each radian of a joint
 HALVINGS = 7  # of the distance by which faces are moved out
 ROUND_OFF = 1e-7  # [rad]
 
 
-def calm_box(
+def low_travel_box(
     ladder: Ladder,
     blocked: np.ndarray,
-    roughness: Roughness,
+    cost: TrackCost,
     box: JointBox,
     size: float,
     most: Travel,
@@ -37,7 +37,7 @@ def calm_box(
     Args:
         ladder: The nodes and what steps are small enough.
         blocked: Sorted keys of steps that are not free, int64.
-        roughness: What joints cost.
+        cost: What joints cost.
         box: The box.
         size: The result must not be larger, in [rad].
         most: How far joints and contact may move.
@@ -45,12 +45,12 @@ def calm_box(
     Returns:
         The box, or None if there is no track in one that small.
     """
-    calm = replace(roughness, contact_weight=CALM, node_cost=np.zeros(ladder.free.shape))
+    dear = replace(cost, contact_weight=CONTACT_WEIGHT, node_cost=np.zeros(ladder.free.shape))
     q = np.nan_to_num(ladder.q, nan=np.inf)
 
     def spanned(outer: JointBox) -> JointBox | None:
-        """Return the box with the calmest track in an outer one, if that track is calm enough."""
-        track = smoothest(ladder, blocked, outer.holds(q), calm)
+        """Return the box of the track that travels least in an outer one, if that is low enough."""
+        track = smoothest(ladder, blocked, outer.holds(q), dear)
         if track is None or not travel_of(ladder, track.rows).within(most):
             return None
         on_track = ladder.q[np.arange(len(track.rows)), track.rows]

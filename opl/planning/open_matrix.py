@@ -1,17 +1,27 @@
-"""A branch while it is searched: which of its nodes and steps were found not to be free."""
+"""A node matrix while it is searched: which of its nodes and edges are still open to a track."""
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from enum import Enum
 
 import numpy as np
 
 from opl.cell.collision import CollisionScene
-from opl.field.nodes import NodeMatrix
 from opl.motion.links import Blocker
+from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
+from opl.search.box import JointBox
 from opl.search.ladder import Ladder
+
+
+class FreeMove(str, Enum):
+    """Where a free move leads, in words."""
+
+    FROM_HOME = "way from home"
+    BETWEEN_PASSES = "way between passes"
+    TO_HOME = "way home"
 
 
 @dataclass(frozen=True)
@@ -19,26 +29,26 @@ class Track:
     """One node per column.
 
     Attributes:
-        branch: Index of the branch in the list that is searched.
+        matrix: Index of the matrix in the list that is searched.
         rows: The row in each column, shape (n_columns,).
     """
 
-    branch: int
+    matrix: int
     rows: np.ndarray
 
 
 @dataclass
-class Branch:
-    """The nodes of one branch with what is known to be blocked.
+class OpenMatrix:
+    """A node matrix with what is known to be blocked in it.
 
     Attributes:
         nodes: The nodes.
         ladder: What a search sees; shares ``free``.
         free: Which nodes may be used; shrinks, shape (n_columns, n_rows).
-        blocked: Keys of the steps that may not be used; grows.
+        blocked: Keys of the edges that may not be used; grows.
         causes: How often each cause blocked something, by cutter point.
-        cut_off: How many tracks, otherwise free, were refused for a way through the air: by which
-            way, and the pair that is in it.
+        cut_off: How many tracks, otherwise free, were refused for a free move: by which one, and
+            the pair of bodies that blocks it.
         reached: Largest number of columns that a search passed.
     """
 
@@ -47,25 +57,31 @@ class Branch:
     free: np.ndarray
     blocked: set[int] = field(default_factory=set)
     causes: Counter[tuple[int, str]] = field(default_factory=Counter)
-    cut_off: Counter[tuple[str, Blocker]] = field(default_factory=Counter)
+    cut_off: Counter[tuple[FreeMove, Blocker]] = field(default_factory=Counter)
     reached: int = 0
     _swept: set[int] = field(default_factory=set)
+    _sorted: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @property
-    def blocked_steps(self) -> np.ndarray:
+    def blocked_edges(self) -> np.ndarray:
         """The blocked keys, sorted, as the searches take them."""
-        return np.array(sorted(self.blocked), dtype=np.int64)
+        if len(self._sorted) != len(self.blocked):
+            self._sorted = np.array(sorted(self.blocked), dtype=np.int64)
+        return self._sorted
 
-    def block_step(self, column: int, rows: np.ndarray, cause: str) -> None:
-        """Block the step that a track makes from a column to the next."""
-        key = self.ladder.step_key(column, int(rows[column]), int(rows[column + 1]))
-        self.blocked.add(key)
-        self.causes[column, cause] += 1
+    def ladder_within(self, max_contact_change: float) -> Ladder:
+        """Return the ladder with a largest change of t over each edge on the wheel."""
+        changes = np.where(self.ladder.off_wheel, np.inf, max_contact_change)
+        return replace(self.ladder, max_contact_change=changes)
 
-    def block_steps(
+    def free_inside(self, box: JointBox) -> np.ndarray:
+        """Return which nodes are free and lie in a box, shape (n_columns, n_rows)."""
+        return np.asarray(self.free & box.holds(np.nan_to_num(self.nodes.q, nan=np.inf)))
+
+    def block_edges(
         self, column: int, from_rows: list[int], to_rows: list[int], cause: str
     ) -> None:
-        """Block every step from some rows of a column to some of the next."""
+        """Block every edge from some rows of a column to some of the next."""
         self.blocked.update(
             self.ladder.step_key(column, row, after) for row in from_rows for after in to_rows
         )
@@ -98,10 +114,10 @@ class Branch:
         return bool(self.free[columns, rows].all()) and self.blocked.isdisjoint(keys.tolist())
 
 
-def branches_of(problem: GrindingProblem) -> list[Branch]:
-    """Return every branch of a problem, nothing blocked but what its nodes tell."""
-    branches = []
-    for nodes in problem.field.branches:
+def open_matrices(problem: GrindingProblem) -> list[OpenMatrix]:
+    """Return every matrix of a problem, nothing blocked yet but nodes that cut into the wheel."""
+    matrices = []
+    for nodes in problem.field.matrices:
         free = problem.free_nodes(nodes)
-        branches.append(Branch(nodes, problem.ladder(nodes, free), free))
-    return branches
+        matrices.append(OpenMatrix(nodes, problem.ladder(nodes, free), free))
+    return matrices

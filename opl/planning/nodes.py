@@ -1,12 +1,12 @@
-"""The node matrix: every posture that can grind each cutter point.
+"""The node matrix: every configuration that can grind each cutter point.
 
 A column is a cutter point, a row a contact position: a ladder graph whose rungs are the columns.
-Each branch of the inverse kinematics has its own matrices, because a track never changes branch (a
-change passes a singularity). Joints that turn more than once have several counts of turns for a
-posture; where the angles of a branch leave a gap that no step could cross, each count is a matrix
-of its own, elsewhere the counts are more rows of one matrix. Where nearly every joint turns twice,
-that would be hundreds of matrices that make the same motions: then the one in the middle of the
-limits stands for all.
+Each branch of the inverse kinematics has its own matrices, because a track never changes it (a
+change passes a singularity). Joints that turn more than once give a configuration several counts of
+full turns; where the angles of a branch leave a gap that no edge could cross, each count is a
+matrix of its own, elsewhere the counts are more rows of one matrix. Where nearly every joint turns
+twice, that would be hundreds of matrices that make the same motions: then the one in the middle of
+the limits stands for all.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from opl.geometry.toolpath import CutterPoints
 
 @dataclass(frozen=True)
 class NodeMatrix:
-    """The nodes of one branch, or of one count of full turns in it.
+    """The nodes of one branch of the inverse kinematics, or of one count of full turns in it.
 
     Attributes:
-        branch: Slot of the inverse kinematics, 0 to 7.
-        q: Joint positions in [rad], NaN where there is no posture within the limits, shape
+        ik_branch: Slot of the inverse kinematics, 0 to 7.
+        q: Joint positions in [rad], NaN where there is no configuration within the limits, shape
             (n_columns, n_rows, 6).
         contact_position: t of each row, shape (n_rows,).
         position_index: Which of the contact positions each row stands for, shape (n_rows,).
     """
 
-    branch: int
+    ik_branch: int
     q: Array
     contact_position: Array
     position_index: np.ndarray
@@ -45,25 +45,33 @@ class NodeMatrix:
         """Which nodes there are, shape (n_columns, n_rows)."""
         return np.ascontiguousarray(~np.isnan(self.q[..., 0]))
 
+    def along(self, rows: np.ndarray) -> Array:
+        """Return the configurations of a track in [rad], its row in each column given."""
+        return np.asarray(self.q[np.arange(len(rows)), rows])
+
+    def range_sum(self, rows: np.ndarray) -> float:
+        """Return the joint range sum of a track at its nodes in [rad]."""
+        return float(np.ptp(self.along(rows), axis=0).sum())
+
 
 @dataclass(frozen=True)
 class NodeField:
-    """What every branch shares, and the branches.
+    """All nodes: the contact positions, the inverse solutions and the matrices made of them.
 
     Attributes:
         contact_positions: The values of t, shape (M,).
         q: All inverse solutions as principal angles in [rad], NaN out of reach, shape
             (n_columns, M, 8, 6). Kept to tell reach from limits when nothing is left; without
-            columns where that is not asked.
-        branches: The matrices that have a node within the limits, in slot order.
+            columns where nobody needs to know.
+        matrices: The matrices that have a node within the limits, in slot order.
     """
 
     contact_positions: Array
     q: Array
-    branches: tuple[NodeMatrix, ...]
+    matrices: tuple[NodeMatrix, ...]
 
 
-# [rad] a gap in the angles of a joint that is wider than this is crossed by no step of a track
+# [rad] a gap in the angles of a joint that is wider than this is crossed by no edge of a track
 SEAM_GAP = np.deg2rad(45.0)
 # three turns each of two wrist axes
 MOST_SHEETS = 9
@@ -78,15 +86,13 @@ def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) 
         contact_positions: M values of t.
     """
     robot = cell.robot
-    Ts_base_flange = cell.Ts_base_flange(
-        contact_positions[None, :], points.Ts_workpiece_cutter[:, None]
-    )
-    q = inverse_kinematics(robot.arm, Ts_base_flange)  # (N, M, 8, 6)
-    branches = []
-    for branch in range(q.shape[2]):
-        if np.isnan(q[:, :, branch, 0]).all():
+    frames = points.Ts_workpiece_cutter[:, None]
+    q = inverse_solutions(cell, frames, contact_positions)  # (N, M, 8, 6)
+    matrices = []
+    for ik_branch in range(q.shape[2]):
+        if np.isnan(q[:, :, ik_branch, 0]).all():
             continue
-        lifted, sheets, copies = _lift(q[:, :, branch], robot.lower, robot.upper)
+        lifted, sheets, copies = _lift(q[:, :, ik_branch], robot.lower, robot.upper)
         for sheet in sheets:
             # (N, copies, M, 6)
             turned = lifted[:, None] + sheet + copies[:, None]
@@ -97,12 +103,27 @@ def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) 
                     np.where(within[..., None], turned, np.nan)[:, copy, position_index]
                 )
                 t = contact_positions[position_index]
-                branches.append(NodeMatrix(branch, q_sheet, t, position_index))
-    return NodeField(contact_positions, q, tuple(branches))
+                matrices.append(NodeMatrix(ik_branch, q_sheet, t, position_index))
+    return NodeField(contact_positions, q, tuple(matrices))
+
+
+def inverse_solutions(
+    cell: WorkCell, Ts_workpiece_cutter: Array, contact_positions: Array
+) -> Array:
+    """Return every inverse solution in [rad], NaN where there is none, shape (..., 8, 6).
+
+    Args:
+        cell: The cell.
+        Ts_workpiece_cutter: The cutter frames, shape (..., 4, 4).
+        contact_positions: Where on the wheel each is ground, shape (...).
+    """
+    return inverse_kinematics(
+        cell.robot.arm, cell.Ts_base_flange(contact_positions, Ts_workpiece_cutter)
+    )
 
 
 def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
-    """Unroll the angles of one branch where they leave a gap.
+    """Unroll the angles of one branch of the inverse kinematics where they leave a gap.
 
     Args:
         q: Principal angles in [rad], NaN where there are none, shape (N, M, 6).

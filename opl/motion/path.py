@@ -1,0 +1,58 @@
+"""A path on the wheel: a track with its intermediate nodes, and the figures it is judged by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.geometry.frames import Array
+
+
+@dataclass(frozen=True)
+class GrindingPath:
+    """Configurations on the wheel, joined by linear joint interpolation within a pass.
+
+    Attributes:
+        ik_branch: Slot of the inverse kinematics that all configurations share.
+        q: Joint positions in [rad], shape (n, 6).
+        contact_position: t of each configuration, shape (n,).
+        cutter_point: Index of the cutter point, fractional at intermediate nodes, shape (n,).
+        pass_index: The pass of each configuration, shape (n,).
+    """
+
+    ik_branch: int
+    q: Array
+    contact_position: Array
+    cutter_point: Array
+    pass_index: np.ndarray
+
+    @property
+    def n_intermediate(self) -> int:
+        """Number of configurations between cutter points."""
+        return int(np.count_nonzero(self.cutter_point % 1.0))
+
+    @property
+    def joint_ranges(self) -> Array:
+        """Largest minus smallest value of each joint in [rad], shape (6,)."""
+        return np.ptp(self.q, axis=0)
+
+    @property
+    def joint_range_sum(self) -> float:
+        """Sum of the joint ranges in [rad]: what the search keeps small (equation 14)."""
+        return float(self.joint_ranges.sum())
+
+    @property
+    def joint_travel(self) -> float:
+        """Sum over all moves and joints of the absolute change in [rad], on the wheel only."""
+        return float(np.abs(np.diff(self.q, axis=0)[self._on_wheel]).sum())
+
+    @property
+    def contact_travel(self) -> float:
+        """Sum over all moves of the absolute change of t in belt units, on the wheel only."""
+        return float(np.abs(np.diff(self.contact_position)[self._on_wheel]).sum())
+
+    @property
+    def _on_wheel(self) -> np.ndarray:
+        """Which moves stay on the wheel, shape (n - 1,)."""
+        return np.diff(self.pass_index) == 0

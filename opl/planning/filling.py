@@ -1,0 +1,151 @@
+"""Filling in a track: intermediate nodes between its nodes, until the contact error is small."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.cell.full_turns import nearest_turn
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import forward_kinematics
+from opl.cell.workcell import WorkCell
+from opl.geometry.frames import Array, interpolate, transform
+from opl.geometry.toolpath import CutterPoints
+from opl.motion.path import GrindingPath
+from opl.planning.nodes import NodeMatrix
+from opl.search.ladder import middle_count
+
+
+class BrokenEdgeError(Exception):
+    """An edge between two nodes cannot be made on the wheel.
+
+    Args:
+        column: The cutter point the edge starts from.
+        cause: ``reach``, ``limits of`` those by name, or ``continuity``.
+    """
+
+    def __init__(self, column: int, cause: str) -> None:
+        super().__init__(f"edge from cutter point {column}: {cause}")
+        self.column = column
+        self.cause = cause
+
+
+@dataclass(frozen=True)
+class Interpolation:
+    """How the path between nodes is filled in.
+
+    Attributes:
+        max_contact_step: Largest difference of t between adjacent configurations, delta T.
+        max_contact_error: Largest distance of the ground point from where it should touch the
+            wheel, half-way between two configurations, in [m]. More are put in to keep it.
+        max_joint_step: Largest change of a joint between adjacent configurations in [rad].
+    """
+
+    max_contact_step: float
+    max_contact_error: float
+    max_joint_step: float
+
+
+MOST_HALVINGS = 6  # of a move between intermediate nodes; 64 times denser always was enough
+
+
+def fill_in(
+    cell: WorkCell, points: CutterPoints, nodes: NodeMatrix, rows: np.ndarray, rule: Interpolation
+) -> GrindingPath:
+    """Put intermediate nodes between the nodes of a track.
+
+    Contact position, origin, axis z and axis x of the cutter frame are interpolated linearly, and
+    the inverse kinematics is solved on the same branch, nearest to the joint interpolation.
+
+    Args:
+        cell: The cell.
+        points: N cutter points, the columns.
+        nodes: The node matrix.
+        rows: The row chosen in each column, shape (N,).
+        rule: How dense.
+
+    Raises:
+        BrokenEdgeError: If an edge leaves reach, limits or branch between its ends.
+    """
+    columns = np.arange(len(rows))
+    q_node, t_node = nodes.along(rows), nodes.contact_position[rows]
+    counts = [
+        middle_count(change, rule.max_contact_step) if same_pass else 0
+        for change, same_pass in zip(np.diff(t_node), np.diff(points.pass_index) == 0, strict=True)
+    ]
+    places = [k + np.arange(n + 1) / (n + 1) for k, n in enumerate(counts)]
+    place = np.concatenate([*places, columns[-1:].astype(float)])
+    for _ in range(MOST_HALVINGS):
+        q = _solve(cell, points, nodes.ik_branch, q_node, t_node, place)
+        pass_index = points.pass_index[place.astype(int)]
+        on_wheel = np.diff(pass_index) == 0
+        jumps = on_wheel & (np.abs(np.diff(q, axis=0)).max(axis=1) > rule.max_joint_step)
+        if jumps.any():
+            raise BrokenEdgeError(int(place[:-1][jumps][0]), "continuity")
+        error = _contact_error_between(cell, points, t_node, place, q)
+        coarse = np.flatnonzero(on_wheel & (error > rule.max_contact_error))
+        if not len(coarse):
+            t = np.interp(place, columns, t_node)
+            return GrindingPath(nodes.ik_branch, q, t, place, pass_index)
+        halves = (place[coarse] + place[coarse + 1]) / 2.0
+        place = np.insert(place, coarse + 1, halves)
+    raise BrokenEdgeError(int(place[coarse[0]]), "continuity")
+
+
+def cutter_frames(points: CutterPoints, place: Array) -> Array:
+    """Return cutter frames at fractional cutter points, shape (n, 4, 4)."""
+    before = np.minimum(place.astype(int), len(points) - 1)
+    after = np.minimum(before + 1, len(points) - 1)
+    Ts = points.Ts_workpiece_cutter
+    return interpolate(Ts[before], Ts[after], place - before)
+
+
+def _solve(
+    cell: WorkCell,
+    points: CutterPoints,
+    ik_branch: int,
+    q_node: Array,
+    t_node: Array,
+    place: Array,
+) -> Array:
+    """Return the configuration at each place, (n, 6); those of the nodes are kept to the bit."""
+    columns = np.arange(len(q_node))
+    t = np.interp(place, columns, t_node)
+    q_guess = np.stack([np.interp(place, columns, joint) for joint in q_node.T], axis=-1)
+    Ts_base_flange = cell.Ts_base_flange(t, cutter_frames(points, place))
+    q = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_guess)[:, ik_branch]
+    q = nearest_turn(q, q_guess)
+    at_node = place == np.floor(place)
+    q[at_node] = q_node[place[at_node].astype(int)]
+    lost = np.isnan(q).any(axis=1)
+    if lost.any():
+        raise BrokenEdgeError(int(place[lost][0]), "reach")
+    beyond = ~cell.within_limits(q)
+    if beyond.any():
+        names = " ".join(cell.broken_limits(q))
+        raise BrokenEdgeError(int(place[beyond][0]), f"limits of {names}")
+    return q
+
+
+def _contact_error_between(
+    cell: WorkCell, points: CutterPoints, t_node: Array, place: Array, q: Array
+) -> Array:
+    """Return how far the ground point is from its place on the wheel half-way to the next node.
+
+    Args:
+        cell: The cell.
+        points: The cutter points.
+        t_node: Contact position at each cutter point, shape (N,).
+        place: Fractional cutter point of each configuration, shape (n,).
+        q: The configurations in [rad], shape (n, 6).
+
+    Returns:
+        Distances in [m], shape (n - 1,); without meaning where the move leaves the wheel.
+    """
+    middle = (place[:-1] + place[1:]) / 2.0
+    T_base_flange = forward_kinematics(cell.robot, (q[:-1] + q[1:]) / 2.0)
+    p_workpiece = cutter_frames(points, middle)[:, :3, 3]
+    p_base = transform(T_base_flange @ cell.T_flange_workpiece, p_workpiece)
+    t = np.interp(middle, np.arange(len(t_node)), t_node)
+    return np.asarray(np.linalg.norm(p_base - cell.wheel.T_base_contact(t)[:, :3, 3], axis=1))

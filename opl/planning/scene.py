@@ -1,0 +1,36 @@
+"""The cell as a planner uses it: bodies that collide, part against wheel, free moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from opl.cell.collision import CollisionScene
+from opl.cell.wheel_distance import PartTree, part_tree
+from opl.cell.workcell import WorkCell
+from opl.motion.links import Links
+
+
+@dataclass(frozen=True)
+class PlanningScene:
+    """A cell with its geometry, owned by whoever plans in it.
+
+    Attributes:
+        cell: The cell.
+        collision: Its collision geometry, with the reserve that the second opinion needs.
+        part: The triangles of the part.
+    """
+
+    cell: WorkCell
+    collision: CollisionScene
+    part: PartTree
+
+    @cached_property
+    def links(self) -> Links:
+        """Free moves of this scene, and what has been learnt of them."""
+        return Links(self.cell, self.collision, self.part)
+
+
+def planning_scene(cell: WorkCell) -> PlanningScene:
+    """Return the scene of a cell."""
+    return PlanningScene(cell, CollisionScene(cell).for_second_opinion(), part_tree(cell.part))

@@ -1,0 +1,79 @@
+"""Is the whole motion of a track free of collision, and if not, what is in the way?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.motion.air import BlockedLinkError, UnreachableApproachError, linked, whole_motion
+from opl.motion.check import Fault, find_faults
+from opl.motion.motion import Motion
+from opl.motion.path import GrindingPath
+from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.nodes import NodeMatrix
+from opl.planning.problem import GrindingProblem
+
+
+@dataclass(frozen=True)
+class Free:
+    """The whole motion of a track is free."""
+
+    path: GrindingPath
+    motion: Motion
+
+
+@dataclass(frozen=True)
+class NoMotion:
+    """An edge of the track cannot be filled in, or an approach or retract does not exist."""
+
+    error: BrokenEdgeError | UnreachableApproachError
+
+
+@dataclass(frozen=True)
+class Collides:
+    """Moves of the motion collide; its free moves are straight."""
+
+    motion: Motion
+    faults: tuple[Fault, ...]
+
+
+@dataclass(frozen=True)
+class NoLink:
+    """Nothing but a free move that was not found stops the motion; its free moves are straight."""
+
+    motion: Motion
+    error: BlockedLinkError
+
+
+Blocked = NoMotion | Collides | NoLink
+
+
+def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -> Free | Blocked:
+    """Return the motion of a track if it is free, else what blocks it.
+
+    Args:
+        problem: What is to be planned.
+        nodes: The matrix of the track.
+        rows: The row in each column, shape (N,).
+    """
+    scene, points = problem.scene, problem.points
+    try:
+        path = fill_in(scene.cell, points, nodes, rows, problem.interpolation)
+        motion = whole_motion(scene.cell, points, path, problem.process)
+    except (BrokenEdgeError, UnreachableApproachError) as error:
+        return NoMotion(error)
+    faults = find_faults(scene.cell, scene.collision, scene.part, motion)
+    # what is in the way of a free move is led around, unless it is where an approach begins
+    faults = [
+        fault
+        for fault in faults
+        if not motion.kind[fault.move].is_free
+        or (fault.at_end and motion.pass_index[fault.move] >= 0)
+    ]
+    if faults:
+        return Collides(motion, tuple(faults))
+    try:
+        return Free(path, linked(motion, scene.links))
+    except BlockedLinkError as error:
+        return NoLink(motion, error)

@@ -1,0 +1,61 @@
+"""Where no track leads through a ladder: the shortest runs of columns that cannot be passed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from opl.search.ladder import Ladder, allowed
+
+
+def impasses(ladder: Ladder, blocked: np.ndarray) -> list[tuple[int, int]]:
+    """Return the runs of columns through which no track leads, in order, first and last of each.
+
+    Through every part of such a run a track leads; first and last are the same where a column has
+    no free node at all.
+
+    Args:
+        ladder: The nodes.
+        blocked: Sorted keys of the edges that are not free, int64.
+    """
+    free = ladder.free
+
+    def edges(column: int) -> np.ndarray:
+        rule = _edges(ladder.q_by_joint, *ladder.step_rule, blocked, column)
+        return np.asarray(rule & free[column][:, None] & free[column + 1])
+
+    found = []
+    start = 0
+    while start < len(free):
+        reach, last = free[start], start
+        while reach.any() and last < len(free) - 1:
+            reach = edges(last)[reach].any(axis=0)
+            last += 1
+        if reach.any():
+            break  # it leads to the end
+        reach, first = free[last], last
+        while reach.any():
+            first -= 1
+            reach = edges(first)[:, reach].any(axis=1)
+        found.append((first, last))
+        start = first + 1
+    return found
+
+
+@njit(
+    "boolean[:,::1](float64[:,:,::1],float64[::1],boolean[::1],float64,float64[::1],float64,"
+    "int64[::1],int64)",
+    cache=True,
+)
+def _edges(  # type: ignore[no-untyped-def]
+    q, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, column
+):
+    """Return which rows of a column lead to which of the next, were they all free."""
+    n_rows = q.shape[2]
+    edges = np.empty((n_rows, n_rows), dtype=np.bool_)
+    for here in range(n_rows):
+        for row in range(n_rows):
+            edges[here, row] = allowed(
+                q, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, column, here, row
+            )
+    return edges
