@@ -6,16 +6,13 @@ from functools import cache
 import numpy as np
 
 from opl.cell.collision import CollisionScene
-from opl.cell.wheel_distance import part_tree
-from opl.field.layer import wheel_layer
-from opl.field.nodes import build_nodes
 from opl.files.resources import folder
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import load
 from opl.motion.timing import time_motion
-from opl.pipeline import cutter_points
 from opl.planning.plan import plan_recursive
-from opl.planning.problem import GrindingProblem
+from opl.run.preparing import build_problem
+from opl.run.surfacing import cut_surface
 from opl.verification.replay import replay
 
 V_JOB = folder("workpieces") / "v_shape" / "job.yaml"
@@ -40,25 +37,14 @@ def small_job():
 
 def problem_of(job, points_of=None):
     """Return the problem of a job, or of a slice of its cutter points."""
-    points = cutter_points(job)
+    points = cut_surface(job).points
     if points_of is not None:
         points = CutterPoints(
             points.Ts_workpiece_cutter[points_of],
             points.pass_index[points_of],
             points.arc_length[points_of],
         )
-    positions = job.cell.wheel.positions(job.search.n_contact_positions)
-    part = part_tree(job.cell.part)
-    return GrindingProblem(
-        job.cell,
-        CollisionScene(job.cell).for_second_opinion(),
-        part,
-        points,
-        build_nodes(job.cell, points, positions),
-        wheel_layer(job.cell, part, points, positions),
-        job.search.interpolation,
-        job.process,
-    )
+    return build_problem(job, job.cell, points)
 
 
 @cache

@@ -1,0 +1,99 @@
+"""From cutter points to what a search needs, refused where no search could help."""
+
+from __future__ import annotations
+
+from opl.cell.collision import CollisionScene, enclosing_bodies
+from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import part_tree, signed_wheel_distance
+from opl.cell.workcell import PART, SECOND_OPINION_OF_A_LINK, WHEEL, WorkCell
+from opl.errors import InputError
+from opl.field.layer import wheel_layer
+from opl.field.nodes import build_nodes
+from opl.geometry.toolpath import CutterPoints
+from opl.job import keys
+from opl.job.load import Job
+from opl.planning.fixed import keep_contact, runs_of
+from opl.planning.problem import GrindingProblem
+from opl.planning.reasons import unreachable_points
+from opl.run.values import Prepared, Surfaced
+from opl.run.watch import Stage, Watch
+
+
+def prepare(surfaced: Surfaced, watch: Watch | None = None) -> Prepared:
+    """Build the node matrix and the clearance layer, and keep the contact at t = 0 for comparison.
+
+    Args:
+        surfaced: The cutter points.
+        watch: Follows the run.
+
+    Raises:
+        InputError: If the arm reaches some cutter point at no contact position, or collides at
+            home.
+        Cancelled: If the run was cancelled.
+    """
+    watch = watch or Watch()
+    job = surfaced.job
+    problem = build_problem(job, job.cell, surfaced.points, watch)
+    unreachable = unreachable_points(problem)
+    if len(unreachable):
+        raise InputError(
+            job.source.at(keys.SURFACE),
+            f"out of reach of {job.cell.robot.title} at every contact position: cutter points "
+            f"{runs_of(unreachable)} of {len(surfaced.points)}; check {job.around.wheel_key} and "
+            f"{keys.FIXTURE_POSE}",
+        )
+    _check_home(problem, job)
+    with watch.stage(Stage.COMPARISON):
+        return Prepared(surfaced, problem, keep_contact(problem))
+
+
+def build_problem(
+    job: Job, cell: WorkCell, points: CutterPoints, watch: Watch | None = None
+) -> GrindingProblem:
+    """Return what is to be planned.
+
+    Args:
+        job: How the path is searched, and how fast it is run.
+        cell: The cell of the job, or one that differs from it.
+        points: The cutter points.
+        watch: Follows the run.
+    """
+    watch = watch or Watch()
+    positions = cell.wheel.positions(job.search.n_contact_positions)
+    with watch.stage(Stage.NODES):
+        field = build_nodes(cell, points, positions)
+    with watch.stage(Stage.CLEARANCE):
+        part = part_tree(cell.part)
+        layer = wheel_layer(cell, part, points, positions)
+        scene = CollisionScene(cell).for_second_opinion()
+    return GrindingProblem(
+        cell, scene, part, points, field, layer, job.search.interpolation, job.process
+    )
+
+
+def _check_home(problem: GrindingProblem, job: Job) -> None:
+    """Refuse a home where something collides or is too near.
+
+    Raises:
+        InputError: If it is; names the pairs.
+    """
+    cell, home = job.cell, job.process.home
+    inside = enclosing_bodies(cell, home)
+    if inside:
+        pairs = ", ".join(" inside of ".join(pair) for pair in inside)
+        raise InputError(job.around.home_key, f"at home one is in the other: {pairs}")
+    hits = list(problem.scene.colliding_pairs(home))
+    # at home part and wheel must not touch
+    Ts_contact0_workpiece = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, home[None]))
+    needed = cell.part_from_wheel
+    if signed_wheel_distance(problem.part, cell.wheel, Ts_contact0_workpiece, needed)[0] < needed:
+        hits.append((PART, WHEEL))
+    if hits:
+        pairs = ", ".join(" and ".join(pair) for pair in hits)
+        kept = f"{1e3 * cell.required_clearance:g} mm ({keys.CLEARANCE})"
+        kept += " or their own clearance" if cell.pairs.required else ""
+        raise InputError(
+            job.around.home_key,
+            f"at home these are nearer to each other than {kept} or collide: {pairs}; links are "
+            f"planned {1e3 * SECOND_OPINION_OF_A_LINK:g} mm farther away",
+        )
