@@ -14,7 +14,7 @@ from opl.geometry.surface_file import load_faces
 from opl.job import keys
 from opl.job.file import JobFile
 from opl.job.load import load_job
-from opl.surfacing import cut_surface
+from opl.run.surfacing import cut_surface
 from tests.support.jobs import V_JOB, V_SHAPE, document, write_job
 
 SURFACE = load_faces(V_SHAPE / "surface.json")[0].surface
