@@ -22,7 +22,7 @@ MM = 1e3
 # the work is bounded by counts, so that the same job always gets the same answer
 MOST_CHECKS = 10  # of motions for each change: more would be no easy remedy
 MOST_IN_ALL = 60  # of motions for all changes together
-PROBED_COLUMNS = 8  # cutter points that must have a free configuration before a change is planned again
+PROBED_COLUMNS = 8  # cutter points that must have a free node before a change is planned again
 
 # smallest first: of each kind the first that opens the job is reported
 MORE_ROLL_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)
