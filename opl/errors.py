@@ -55,3 +55,7 @@ class UnsafeError(OplError):
     """A motion was planned but could not be proven safe, so no program was written."""
 
     exit_status = 4
+
+
+class Cancelled(OplError):
+    """A run was cancelled by the program that started it; nothing was written."""

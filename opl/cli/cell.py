@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 
-from opl.console.cell import cell_figures, cell_lines
-from opl.job.cell import load_cell
-
-FILE = click.Path(path_type=Path, readable=False)
+import opl
+from opl.cli.options import FILE
 
 
 @click.command()
@@ -24,10 +21,10 @@ def cell(file: Path, as_json: bool) -> None:
 
     Example: opl cell workpieces/cells/belt_cell.yaml
     """
-    loaded = load_cell(file)
+    loaded = opl.load_cell(file)
     if as_json:
-        click.echo(json.dumps(cell_figures(loaded), indent=2))
+        click.echo(opl.to_json(opl.cell_figures(loaded)))
         return
     click.echo(f"{file} is a valid cell")
-    for line in cell_lines(loaded):
+    for line in opl.describe_cell(loaded):
         click.echo(line)

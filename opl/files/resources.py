@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
+
+from opl.errors import InputError
+from opl.files.writing import check_folder
 
 
 def folder(name: str) -> Path:
@@ -13,3 +17,23 @@ def folder(name: str) -> Path:
     package = Path(__file__).resolve().parents[1]
     installed = package / name
     return installed if installed.is_dir() else package.parent / name
+
+
+def start_job(directory: Path) -> Path:
+    """Start a job: copy the V-shaped example to a new folder, to be changed.
+
+    Args:
+        directory: The folder, which is made.
+
+    Returns:
+        The job file.
+
+    Raises:
+        InputError: If the folder exists, or cannot be made.
+    """
+    if directory.exists():
+        raise InputError(str(directory), "exists already; name a new folder")
+    check_folder(directory)
+    example = folder("workpieces") / "v_shape"
+    shutil.copytree(example, directory, ignore=shutil.ignore_patterns("__pycache__"))
+    return directory / "job.yaml"

@@ -108,7 +108,7 @@ def _summary(number: int, name: str, face: MachinedSurface, holes: int | None) -
     )
 
 
-def preview(faces: list[FaceSummary], face: FaceSummary) -> tuple[str, list[str]]:
+def preview_face(faces: list[FaceSummary], face: FaceSummary) -> tuple[str, list[str]]:
     """Return where to look from to see a face best, and a picture of it among the others in text.
 
     Args:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+NAME = "name"
 CLEARANCE = "clearance_mm"
+
+# a YAML file that has one of these keys is a job
+OF_A_JOB = frozenset({"workpiece", "wheel", "passes"})
 
 WHEEL_POSE = "wheel.T_base_contact0_mm"
 WHEEL_WIDTH = "wheel.width_mm"
@@ -13,6 +17,7 @@ FIXTURE_POSE = "fixture.T_flange_workpiece_mm"
 
 SURFACE = "workpiece.surface"
 PART = "workpiece.mesh"
+FACES = "workpiece.faces"
 
 PASSES = "passes"
 # by the attribute of `opl.geometry.passes.Passes` that an error names

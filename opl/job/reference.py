@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal
 
 from opl.files.documents import Document
 from opl.job.cell_file import CellFile
@@ -49,7 +49,16 @@ def schema(model: type[Document]) -> Schema:
     return made
 
 
-def page() -> str:
+def json_schema(kind: Literal["job", "cell"] = "job") -> Schema:
+    """Return the JSON schema of job files or of cell files, for editors.
+
+    Args:
+        kind: Which of them.
+    """
+    return schema(CellFile if kind == "cell" else JobFile)
+
+
+def keys_page() -> str:
     """Return the page of all keys, in Markdown."""
     lines = [
         "# Keys of job and cell files",

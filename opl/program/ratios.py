@@ -6,8 +6,8 @@ same axis in two positions, each in pulses and in degrees.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -18,7 +18,8 @@ from opl.cell.robot import Robot
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.errors import InputError
 from opl.files.documents import Document, read
-from opl.program.parameters import AxisParameters
+from opl.files.writing import write_file
+from opl.program.parameters import AxisParameters, read_parameters
 
 # Readings nearer than this in [deg] give a ratio of too few digits: the pendant shows hundredths.
 LEAST_SPAN = 20.0
@@ -114,6 +115,42 @@ def with_ratios(robot: Robot, path: Path) -> Robot:
     return replace(
         robot, pulses_per_radian=ratios, lower=lower, upper=upper, unverified_pulses=unverified
     )
+
+
+@dataclass(frozen=True)
+class ImportedRatios:
+    """What came of an import.
+
+    Attributes:
+        file: What was written; a job names it as ``program.pulse_ratios``.
+        pulses_per_degree: By joint name.
+        cautions: What speaks against the parameters being those of the robot, one line each.
+    """
+
+    file: Path
+    pulses_per_degree: Mapping[str, float]
+    cautions: tuple[str, ...]
+
+
+def import_pulse_ratios(parameter_file: Path, robot: Robot, file: Path) -> ImportedRatios:
+    """Make a file of pulse ratios and soft limits from a controller's RC.PRM or ALL.PRM.
+
+    Args:
+        parameter_file: The controller's file.
+        robot: Whose controller it is from.
+        file: The file to write.
+
+    Raises:
+        InputError: If the one cannot be read or is no such file, or the other cannot be written.
+    """
+    try:
+        text = parameter_file.read_text(encoding="latin-1")
+    except OSError as error:
+        raise InputError(str(parameter_file), f"cannot be read: {error.strerror}") from error
+    parameters = read_parameters(text, str(parameter_file))
+    write_file(file, ratio_file(robot, parameters, parameter_file.name))
+    ratios = dict(zip(robot.joint_names, parameters.pulses_per_degree, strict=True))
+    return ImportedRatios(file, ratios, tuple(mismatches(robot, parameters)))
 
 
 def ratio_file(robot: Robot, parameters: AxisParameters, source: str) -> str:

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opl import pipeline
 from opl.geometry.frames import transform
 from opl.job.load import load
 from opl.motion.leads import LEAD_SPACING, LEAD_TURN, lead_count, lead_offsets
@@ -102,7 +101,7 @@ def planned(tmp_path_factory):
     home = tmp_path_factory.mktemp("arc")
     job = write_job(home, JOB)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "draw", lambda outcome, problem: None)
+        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
         ended = opl("run", job, "--out", home / "out")
     assert ended.status == 0, ended.err
     return home

@@ -12,7 +12,7 @@ from opl.files.resources import folder
 from opl.geometry.frames import inverse
 from opl.job.load import load
 from opl.motion.motion import MoveKind
-from opl.pipeline import cutter_points
+from opl.run.surfacing import cut_surface
 from opl.verification.align import align
 from opl.verification.between import frames_at, place_between
 from opl.verification.contact import Touches, contact_positions, find_touches, misfit
@@ -117,7 +117,7 @@ def test_contact_positions_are_those_of_the_contact_model(t):
 def hollow():
     """Return wheel and cutter points of the S part; its hollow half is ground at an edge."""
     job = load(folder("workpieces") / "s_shape" / "job.yaml")
-    return job.cell.wheel, cutter_points(job)
+    return job.cell.wheel, cut_surface(job).points
 
 
 def parts_at(wheel, points, place, t):

@@ -15,7 +15,6 @@ import trimesh
 import yaml
 from scipy.spatial import KDTree
 
-from opl import pipeline
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
@@ -24,11 +23,11 @@ from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job, load
-from opl.pipeline import cutter_points
 from opl.program.inform.files import program_jobs
 from opl.program.inform.playback import play
 from opl.program.pulses import PulseScale
 from opl.proof.prove import profile_of, prove
+from opl.run.surfacing import cut_surface
 from tests.support.bare_cells import with_obstacle
 from tests.support.jobs import opl
 
@@ -77,11 +76,11 @@ def written(request, tmp_path_factory):
     content["process"].update(approach_mm=20, home_deg=own["home_deg"])
     (home / "job.yaml").write_text(yaml.safe_dump(content))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "draw", lambda outcome, problem: None)
+        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
         ended = opl("run", home / "job.yaml", "--out", home / "out")
     assert ended.status == 0, ended.err
     job = load(home / "job.yaml")
-    points = cutter_points(job)
+    points = cut_surface(job).points
     lines = (home / "out" / f"{job.name}.csv").read_text().splitlines()
     labels = [line.split(",")[1] for line in lines[1:]]
     moves = [labels.index(f"{point:.4f}") for point in range(len(points))]

@@ -17,7 +17,7 @@ from opl.job.bodies import BodySection
 from opl.job.cell_file import CellFile
 from opl.job.file import JobFile
 from opl.job.process import ProcessSection
-from opl.job.reference import page, schema, unit_of
+from opl.job.reference import keys_page, schema, unit_of
 from opl.job.search import ObjectiveWeightsSection, SearchSection, WeightsSection
 from tests.support.jobs import document, opl
 
@@ -111,13 +111,13 @@ def test_old_names_of_a_cell_are_told_their_new_ones():
 
 
 def test_the_page_is_that_of_the_models():
-    assert PAGE.read_text(encoding="utf-8") == page(), "opl schema --markdown > docs/keys.md"
-    assert opl("schema", "--markdown").out == page()
+    assert PAGE.read_text(encoding="utf-8") == keys_page(), "opl schema --markdown > docs/keys.md"
+    assert opl("schema", "--markdown").out == keys_page()
 
 
 @pytest.mark.parametrize(("path", "model"), MODELS)
 def test_every_key_has_a_row_on_the_page(path, model):
-    rows = [line.split(" | ") for line in page().splitlines() if line.startswith("| `")]
+    rows = [line.split(" | ") for line in keys_page().splitlines() if line.startswith("| `")]
     for key, field in model.model_fields.items():
         found = [row for row in rows if row[0] == f"| `{key}`"]
         assert any(row[-1] == f"{field.description} |" for row in found), f"{path}{key}"

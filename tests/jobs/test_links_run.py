@@ -4,7 +4,6 @@ import csv
 import json
 import subprocess
 import sys
-from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
@@ -13,10 +12,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import forward_kinematics, load_robot
-from opl.deliver import deliver
 from opl.job.load import load
-from opl.pipeline import cutter_points, pose_problem, run
 from opl.planning.starts import plan_recursive
+from opl.run.delivery import deliver
+from opl.run.preparing import prepare
+from opl.run.stages import run_job
+from opl.run.surfacing import cut_surface
 from tests.support.fcl_scene import margin_along
 from tests.support.jobs import document, opl, write_job
 
@@ -48,9 +49,9 @@ def under_the_hood():
     """Run the job under the hood; return what became of it, the job file and the folder."""
     home = Path(mkdtemp())
     job = write_job(home / "j", {**with_bodies(HOOD), **BACK_UNDER_IT})
-    outcome = run(load(job))
-    deliver(outcome, home / "out")
-    return outcome, job, home / "out"
+    run = run_job(load(job))
+    deliver(run, home / "out")
+    return run, job, home / "out"
 
 
 def table(folder):
@@ -73,11 +74,11 @@ def test_a_frame_across_the_straight_way_is_led_around_and_proven():
 
 
 def test_a_plate_between_two_passes_is_led_around():
-    outcome, _, out = under_the_hood()
+    run, _, out = under_the_hood()
     kinds, q = table(out)
     first, last = kinds.index("link") - 1, len(kinds) - 1 - kinds[::-1].index("link")
     assert kinds[first] == "retract" and set(kinds[first + 1 : last + 1]) == {"link"}
-    way, cell = q[first : last + 1], outcome.job.cell
+    way, cell = q[first : last + 1], run.surfaced.job.cell
     assert len(way) > 2
     assert margin_along(cell, way[[0, -1]], 2.0) < 0.0
     assert margin_along(cell, way, 2.0) > 0.0
@@ -92,12 +93,12 @@ def test_a_program_with_postures_on_the_way_is_read_back_and_proven():
 def planned(job):
     """Return the postures of the motion of a job, as bytes; for another process."""
     loaded = load(Path(job))
-    problem = pose_problem(loaded, cutter_points(loaded), lambda stage: nullcontext())
+    problem = prepare(cut_surface(loaded)).problem
     return plan_recursive(problem, loaded.search.start).motion.q.tobytes()
 
 
 def test_another_process_finds_the_same_ways():
-    outcome, job, _ = under_the_hood()
+    run, job, _ = under_the_hood()
     script = f"from tests.jobs import test_links_run as t;print(t.planned({str(job)!r}).hex())"
     told = subprocess.run(
         [sys.executable, "-c", script],
@@ -106,7 +107,7 @@ def test_another_process_finds_the_same_ways():
         check=True,
         cwd=Path(__file__).parents[2],
     ).stdout
-    assert bytes.fromhex(told) == outcome.plan.motion.q.tobytes()
+    assert bytes.fromhex(told) == run.proven.planned.plan.motion.q.tobytes()
 
 
 def cage():

@@ -14,7 +14,7 @@ from opl.geometry.surface_file import load_faces
 from opl.job import keys
 from opl.job.file import JobFile
 from opl.job.load import load_job
-from opl.surfacing import cut_surface
+from opl.run.surfacing import cut_surface
 from tests.support.jobs import V_JOB, V_SHAPE, document, write_job
 
 SURFACE = load_faces(V_SHAPE / "surface.json")[0].surface
@@ -131,10 +131,11 @@ def exists(schema, definitions, parts):
     return False
 
 
-NAMED = [value for name, value in vars(keys).items() if name.isupper() and name != "OF_PASSES"]
+CONSTANTS = {name: value for name, value in vars(keys).items() if name.isupper()}
+NAMED = [value for value in CONSTANTS.values() if isinstance(value, str)]
 
 
-@pytest.mark.parametrize("path", [*NAMED, *keys.OF_PASSES.values()])
+@pytest.mark.parametrize("path", [*NAMED, *keys.OF_PASSES.values(), *sorted(keys.OF_A_JOB)])
 def test_every_named_key_path_is_one_of_a_job(path):
     schema = JobFile.model_json_schema()
     assert exists({"properties": schema["properties"]}, schema["$defs"], path.split("."))

@@ -13,7 +13,7 @@ import trimesh
 
 from opl.files.resources import folder
 from opl.job.load import load
-from opl.surfacing import cut_surface
+from opl.run.surfacing import cut_surface
 from tests.support.jobs import GONE, opl, write_job
 
 PARTS = ("v_shape", "s_shape", "faucet", "turbine_blade", "bent_tube")

@@ -14,7 +14,6 @@ import pytest
 import trimesh
 import yaml
 
-from opl import pipeline
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.job.load import load
@@ -24,6 +23,8 @@ from opl.program.inform.post import write_jobs
 from opl.program.profiles import DX200
 from opl.program.pulses import PulseScale
 from opl.proof.digest import digests_in
+from opl.run import stages
+from opl.run.stages import run_job
 from tests.support.jobs import V_SHAPE, opl, write_job, write_robot
 
 # two rows of the V, few contact positions, long steps, and a home near the wheel
@@ -44,7 +45,7 @@ HOMES = []
 def _no_pictures():
     """Leave the pictures out: they take longer than the proof."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "draw", lambda outcome, problem: None)
+        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
         yield
 
 
@@ -335,10 +336,10 @@ def parts():
     """Return the two-row program in parts, as a controller of few steps takes it."""
     home = planned(short=False)
     job = load(home / "job.yaml")
-    outcome = pipeline.run(job)
-    assert outcome.file.proven
-    few = replace(DX200, step_limit=len(outcome.program.moves) * 2 // 3)
-    written = write_jobs(outcome.program, job.cell.robot, job.program, few, datetime(2024, 1, 1))
+    run = run_job(job)
+    assert run.read_back.proven
+    few = replace(DX200, step_limit=len(run.program.moves) * 2 // 3)
+    written = write_jobs(run.program, job.cell.robot, job.program, few, datetime(2024, 1, 1))
     folder = home / "parts"
     folder.mkdir()
     for name, text in written.files.items():
@@ -412,18 +413,17 @@ def test_a_job_for_another_maker_is_refused(tmp_path):
 
 
 def test_a_run_that_writes_something_else_writes_nothing(tmp_path, monkeypatch):
-    honest = pipeline.write_program
+    honest = stages.render_program
 
-    def dishonest(outcome, verified):
-        program = honest(outcome, verified)
-        lines = outcome.files["V_SHAPE.JBI"].split("\r\n")
+    def dishonest(proven):
+        program, files = honest(proven)
+        lines = files["V_SHAPE.JBI"].split("\r\n")
         k = next(k for k, line in enumerate(lines) if line.startswith("C00010="))
         s, rest = lines[k].removeprefix("C00010=").split(",", 1)
         lines[k] = f"C00010={int(s) + 1},{rest}"
-        outcome.files["V_SHAPE.JBI"] = "\r\n".join(lines)
-        return program
+        return program, {**files, "V_SHAPE.JBI": "\r\n".join(lines)}
 
-    monkeypatch.setattr(pipeline, "write_program", dishonest)
+    monkeypatch.setattr(stages, "render_program", dishonest)
     job = write_job(tmp_path, COARSE)
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 4 and "file at V_SHAPE line" in ended.err

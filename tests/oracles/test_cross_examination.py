@@ -15,7 +15,7 @@ from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import part_tree, signed_wheel_distance
 from opl.files.resources import folder
 from opl.job.load import load
-from opl.pipeline import cutter_points
+from opl.run.surfacing import cut_surface
 from opl.verification.replay import GAP_ACCURACY
 from opl.verification.world import World
 from tests.support.bare_cells import random_postures
@@ -73,7 +73,7 @@ def examined(part, count=COUNT):
     """Ask all libraries about the same postures."""
     job = load(folder("workpieces") / part / "job.yaml")
     cell = job.cell
-    postures = postures_of_interest(job, cutter_points(job), count)
+    postures = postures_of_interest(job, cut_surface(job).points, count)
     Ts = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, postures))
     exact = signed_wheel_distance(part_tree(cell.part), cell.wheel, Ts, 0.02)
     fcl_scene = FclScene(cell)

@@ -10,10 +10,10 @@ from opl.files.resources import folder
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import load
 from opl.motion.timing import time_motion
-from opl.pipeline import cutter_points
-from opl.planning.problem import build_problem
 from opl.planning.scene import planning_scene
 from opl.planning.starts import plan_recursive
+from opl.run.preparing import problem_in
+from opl.run.surfacing import cut_surface
 from opl.verification.replay import replay
 
 V_JOB = folder("workpieces") / "v_shape" / "job.yaml"
@@ -38,16 +38,14 @@ def small_job():
 
 def problem_of(job, points_of=None):
     """Return the problem of a job, or of a slice of its cutter points."""
-    points = cutter_points(job)
+    points = cut_surface(job).points
     if points_of is not None:
         points = CutterPoints(
             points.Ts_workpiece_cutter[points_of],
             points.pass_index[points_of],
             points.arc_length[points_of],
         )
-    positions = job.cell.wheel.positions(job.search.n_contact_positions)
-    scene = planning_scene(job.cell)
-    return build_problem(scene, points, positions, job.search.interpolation, job.process)
+    return problem_in(planning_scene(job.cell), job, points)
 
 
 @cache

@@ -3,55 +3,47 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from datetime import datetime, timezone
 
 from opl.errors import InputError
 from opl.geometry.frames import transform
 from opl.geometry.mesh import box_corners
-from opl.motion.motion import VerifiedMotion
-from opl.outcome import Outcome
-from opl.planning.problem import GrindingProblem
 from opl.planning.states import NodeState, node_states
 from opl.program.moves import Program
-from opl.program.write import StraightLimit
-from opl.program.write import write_program as write_files
+from opl.program.write import StraightLimit, write_program
 from opl.report.pictures import contact_chart, joint_chart
+from opl.run.values import Planned, Proven
 
 
-def write_program(outcome: Outcome, verified: VerifiedMotion) -> Program:
-    """Render the job files and the table of a verified motion."""
-    job, found = outcome.job, outcome.verification
-    assert found is not None
+def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
+    """Return the program of a verified motion, and its files and table by file name."""
+    job = proven.surfaced.job
     vertices = transform(job.cell.T_flange_workpiece, job.cell.part.vertices)
     # what the proven path leaves of the allowed contact error
-    limit = StraightLimit(
-        box_corners(vertices), job.search.max_contact_error - found.max_contact_error
+    left = job.search.max_contact_error - proven.verification.max_contact_error
+    limit = StraightLimit(box_corners(vertices), left)
+    return write_program(
+        proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), ["OPL"]
     )
-    program, files = write_files(
-        verified, job.name, job.cell.robot, job.program, limit, job_date(), ["OPL"]
-    )
-    outcome.files.update(files)
-    return program
 
 
-def draw(outcome: Outcome, problem: GrindingProblem) -> None:
-    """Draw the contact chart and the joint angles."""
-    plan, fixed, points, job = outcome.plan, outcome.fixed, outcome.points, outcome.job
-    assert plan is not None and fixed is not None and points is not None
-    path = plan.path
-    outcome.files[f"{job.name}_contact.svg"] = contact_chart(
+def draw_charts(planned: Planned) -> Mapping[str, str]:
+    """Return the contact chart and the joint angles, by file name."""
+    surfaced, prepared, path = planned.surfaced, planned.prepared, planned.plan.path
+    job, pass_index, robot = surfaced.job, surfaced.points.pass_index, surfaced.job.cell.robot
+    contact = contact_chart(
         title=f"{job.name}: where the part touches the wheel",
-        contact_positions=problem.field.contact_positions,
-        states=node_states(problem, path.ik_branch),
+        contact_positions=prepared.problem.field.contact_positions,
+        states=node_states(prepared.problem, path.ik_branch),
         state_names=[state.value for state in NodeState],
-        pass_index=points.pass_index,
+        pass_index=pass_index,
         flat_end=job.cell.wheel.flat_end,
         path_cutter_point=path.cutter_point,
         path_contact_position=path.contact_position,
         path_pass=path.pass_index,
     )
-    robot = job.cell.robot
-    outcome.files[f"{job.name}_joints.svg"] = joint_chart(
+    joints = joint_chart(
         title=f"{job.name}: joint angles along the path",
         joint_names=robot.joint_names,
         lower=robot.lower,
@@ -59,13 +51,18 @@ def draw(outcome: Outcome, problem: GrindingProblem) -> None:
         found_cutter_point=path.cutter_point,
         found_q=path.q,
         found_pass=path.pass_index,
-        fixed_q=fixed.q,
-        pass_index=points.pass_index,
+        fixed_q=prepared.fixed.q,
+        pass_index=pass_index,
     )
+    return {f"{job.name}_contact.svg": contact, f"{job.name}_joints.svg": joints}
 
 
 def job_date() -> datetime:
-    """Return SOURCE_DATE_EPOCH, which makes runs repeatable to the byte, or the time now."""
+    """Return SOURCE_DATE_EPOCH, which makes runs repeatable to the byte, or the time now.
+
+    Raises:
+        InputError: If that variable holds no time.
+    """
     epoch = os.environ.get("SOURCE_DATE_EPOCH")
     if epoch is None:
         return datetime.now()

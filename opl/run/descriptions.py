@@ -1,4 +1,4 @@
-"""A cell in words: what stands where, what may be near to what, how the wheels were found."""
+"""Jobs and cells in words and figures: what stands where, and what a run would do."""
 
 from __future__ import annotations
 
@@ -14,19 +14,57 @@ from opl.geometry.shapes import Body, Box, Cylinder
 from opl.job.cell import Cell
 from opl.job.pairs import Names
 from opl.job.wheel import PlacedWheel
+from opl.run.values import Surfaced
 
 MM = 1e3
 TOUCHING = 1e-4  # [m] an error of touching that people can think of
 
 
-def cell_lines(cell: Cell) -> Iterator[str]:
-    """Yield what a cell holds, one line each."""
+def describe_job(surfaced: Surfaced) -> list[str]:
+    """Return in words what a run of a job would do, one line each.
+
+    Args:
+        surfaced: The cutter points of the job.
+    """
+    job, points = surfaced.job, surfaced.points
+    cell, wheel, search = job.cell, job.cell.wheel, job.search
+    lines = [
+        f"program {job.name} for {cell.robot.title}",
+        f"wheel {MM * wheel.width:g} mm wide, radius {MM * wheel.radius:g} mm, roll up to "
+        f"{np.rad2deg(wheel.max_roll):g} deg about its edges",
+        f"{len(points)} cutter points in {points.n_passes} passes ({job.passes.order.value}), bow "
+        f"height {MM * job.passes.max_bow_height:g} mm",
+        f"node matrix {len(points)} x {search.n_contact_positions}, search "
+        f"{search.method.value} for the least {search.objective.value}",
+    ]
+    around = job.around
+    if around.cell is not None:
+        lines.append(f"cell {around.cell.path}:")
+        lines += [f"  {line}" for line in describe_cell(around.cell)]
+    else:
+        lines += _fit_lines(around.placed)
+        lines.append(f"obstacles: {', '.join(body.name for body in cell.obstacles) or 'none'}")
+    if cell.robot.unverified_pulses:
+        lines.append(f"pulse ratios not verified: {', '.join(cell.robot.unverified_pulses)}")
+    return [*lines, *(f"warning: {finding}" for finding in surfaced.warnings)]
+
+
+def describe_cell(cell: Cell) -> list[str]:
+    """Return what a cell holds in words, one line each.
+
+    Args:
+        cell: The cell.
+    """
+    return list(_cell_lines(cell))
+
+
+def _cell_lines(cell: Cell) -> Iterator[str]:
     robot = cell.robot
     x, y, z, *turned = pendant_figures(cell.T_cell_base)
-    told = f", turned {_numbers(turned)} deg about x, y, z" if any(turned) else ""
-    yield f"robot {robot.title}, its base frame at {_numbers((x, y, z))} mm in the cell{told}"
+    turn = f", turned {_numbers(turned)} deg about x, y, z" if any(turned) else ""
+    yield f"robot {robot.title}, its base frame at {_numbers((x, y, z))} mm in the cell{turn}"
     for wheel in cell.wheels:
-        yield from wheel_lines(robot, wheel)
+        yield from _wheel_lines(robot, wheel)
     yield f"obstacles: {_bodies(cell.obstacles)}"
     yield f"gripper: {_bodies(cell.gripper)}"
     kept = [(pair, distance) for pair, distance in cell.said.said if distance is not None]
@@ -39,13 +77,17 @@ def cell_lines(cell: Cell) -> Iterator[str]:
         yield f"home {_numbers(np.rad2deg(cell.home))} deg"
 
 
-def wheel_lines(robot: Robot, placed: PlacedWheel) -> Iterator[str]:
-    """Yield where a wheel is, and how well its touched points fit."""
+def _wheel_lines(robot: Robot, placed: PlacedWheel) -> Iterator[str]:
     wheel = placed.wheel
     yield (
         f"{placed.name}: {MM * wheel.width:g} mm wide, radius {MM * wheel.radius:g} mm, "
         f"contact frame 0 on the pendant: {_pose(seen_by(robot, wheel.T_base_contact0))}"
     )
+    yield from _fit_lines(placed)
+
+
+def _fit_lines(placed: PlacedWheel) -> Iterator[str]:
+    """Yield how well the touched points of a wheel fit, nothing if it was not found by touching."""
     fit = placed.fit
     if fit is None:
         return
@@ -61,7 +103,11 @@ def wheel_lines(robot: Robot, placed: PlacedWheel) -> Iterator[str]:
 
 
 def cell_figures(cell: Cell) -> dict[str, Any]:
-    """Return what a cell holds, for other programs."""
+    """Return what a cell holds in plain numbers, in mm and degrees.
+
+    Args:
+        cell: The cell.
+    """
     return {
         "cell": str(cell.path),
         "robot": cell.robot.name,
@@ -110,7 +156,7 @@ def _wheel_figures(robot: Robot, placed: PlacedWheel) -> dict[str, Any]:
 
 def seen_by(robot: Robot, T_base_frame: Array) -> Array:
     """Return a pose from the frame that the robot's own controller counts from, shape (4, 4)."""
-    seen = T_base_frame.copy()
+    seen: Array = T_base_frame.copy()
     seen[2, 3] += robot.base_height - robot.controller_base_height
     return seen
 
@@ -122,9 +168,10 @@ def pendant_figures(T: Array) -> tuple[float, ...]:
 
 
 def _matrix(T: Array) -> list[list[float]]:
-    told = T.copy()
-    told[:3, 3] *= MM
-    return (np.round(told, 9) + 0.0).tolist()
+    in_mm = T.copy()
+    in_mm[:3, 3] *= MM
+    rows: list[list[float]] = (np.round(in_mm, 9) + 0.0).tolist()
+    return rows
 
 
 def _pose(T: Array) -> str:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from opl.cell.robot import ASSUMED_RAMP, Robot
-from opl.cell.robot_file import N_JOINTS, RobotFile, Sourced
+import opl
 
 WIDTH = 80  # columns
 
 
-def show_robots(robots: Sequence[Robot]) -> None:
+def show_robots(robots: Sequence[opl.Robot]) -> None:
     """Print the robots that are known."""
     table = Table(box=None, pad_edge=False)
     for heading in ("name", "robot", "reach\nmm", "payload\nkg", "axes", "pulse ratios"):
@@ -35,7 +35,7 @@ def show_robots(robots: Sequence[Robot]) -> None:
     _print(table)
 
 
-def show_robot(robot: Robot, file: RobotFile) -> None:
+def show_robot(robot: opl.Robot, file: Any) -> None:
     """Print what is known of a robot, every number with source and certainty."""
     notes = _Notes()
     arm, base = file.arm, file.base
@@ -59,7 +59,8 @@ def show_robot(robot: Robot, file: RobotFile) -> None:
         f"{' '.join('+' if sign > 0 else '-' for sign in arm.signs)} {notes.mark(arm)}",
     ]
     if file.acceleration is None:
-        lines.append(f"acceleration not known: top speed is taken to need {ASSUMED_RAMP:g} s")
+        ramp = robot.max_speed[0] / robot.max_acceleration[0]
+        lines.append(f"acceleration not known: top speed is taken to need {ramp:g} s")
     else:
         most = " ".join(f"{value:g}" for value in file.acceleration.max_deg_s2)
         lines.append(f"acceleration {most} deg/s2 {notes.mark(file.acceleration)}")
@@ -74,7 +75,7 @@ def show_robot(robot: Robot, file: RobotFile) -> None:
         _print(line)
 
 
-def _joints(file: RobotFile, notes: _Notes) -> Table:
+def _joints(file: Any, notes: _Notes) -> Table:
     table = Table(box=None, pad_edge=False)
     table.add_column("joint")
     for heading in ("lower deg", "upper deg", "", "deg/s", "", "pulses/deg", ""):
@@ -82,10 +83,10 @@ def _joints(file: RobotFile, notes: _Notes) -> Table:
     for joint in file.joints:
         limits, pulses = joint.limits, joint.pulses
         of_limits, of_speed = notes.mark(limits), notes.mark(joint.speed)
-        counted, told = "not known", ""
+        counted, note = "not known", ""
         if pulses is not None:
             counted = f"{pulses.per_degree:.3f}"
-            told = notes.mark(pulses) + ("" if pulses.verified else " not verified")
+            note = notes.mark(pulses) + ("" if pulses.verified else " not verified")
         cells = (
             joint.name,
             f"{limits.lower_deg:g}",
@@ -94,7 +95,7 @@ def _joints(file: RobotFile, notes: _Notes) -> Table:
             f"{joint.speed.max_deg_s:g}",
             of_speed,
             counted,
-            told,
+            note,
         )
         table.add_row(*(Text(cell) for cell in cells))
     return table
@@ -106,7 +107,7 @@ class _Notes:
     def __init__(self) -> None:
         self._seen: dict[tuple[str, str], int] = {}
 
-    def mark(self, sourced: Sourced) -> str:
+    def mark(self, sourced: Any) -> str:
         key = (sourced.source, sourced.certainty)
         return f"[{self._seen.setdefault(key, len(self._seen) + 1)}]"
 
@@ -119,20 +120,20 @@ class _Notes:
 def _axes(names: Sequence[str]) -> str:
     """Return the names of the joints, the first and last where they are long or only numbered."""
     numbered = all(name[1:] == str(number) for number, name in enumerate(names, start=1))
-    told = " ".join(names)
-    return f"{names[0]} to {names[-1]}" if numbered or len(told) > 20 else told
+    listed = " ".join(names)
+    return f"{names[0]} to {names[-1]}" if numbered or len(listed) > 20 else listed
 
 
-def _pulses(robot: Robot) -> str:
-    missing, unsure = robot.missing_pulses, robot.unverified_pulses
+def _pulses(robot: opl.Robot) -> str:
+    missing, unsure, every = robot.missing_pulses, robot.unverified_pulses, robot.joint_names
     if missing:
         counts = robot.maker in ("Yaskawa", "unknown")
-        return _all_or(missing, "not known") if counts else "not needed"
-    return _all_or(unsure, "not verified") if unsure else "verified"
+        return _all_or(missing, every, "not known") if counts else "not needed"
+    return _all_or(unsure, every, "not verified") if unsure else "verified"
 
 
-def _all_or(names: Sequence[str], told: str) -> str:
-    return told if len(names) == N_JOINTS else f"{told}: {' '.join(names)}"
+def _all_or(names: Sequence[str], every: Sequence[str], what: str) -> str:
+    return what if len(names) == len(every) else f"{what}: {' '.join(names)}"
 
 
 def _print(what: str | Table) -> None:

@@ -8,46 +8,47 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from opl.cell.wheel_distance import use_threads
-from opl.deliver import deliver
-from opl.errors import InputError, NoPathError, OplError, UnsafeError
+from opl.errors import InputError, OplError
 from opl.files import documents
-from opl.job.load import load
-from opl.pipeline import run
-from opl.result import reasons, result
+from opl.job import keys
+from opl.job.load import load_job
+from opl.run.delivery import deliver
+from opl.run.reporting import make_report
+from opl.run.result import Report
+from opl.run.stages import run_job
+from opl.run.values import Refused
 
-JOB_KEYS = {"workpiece", "wheel", "passes"}  # a YAML file that speaks of one of these is a job
 BUG = 1  # exit status of a job that ended with an error that is not opl's own
 
 
 @dataclass(frozen=True)
-class Row:
+class BatchRow:
     """What became of one job of a batch.
 
     Attributes:
         job: The job file.
         status: ``ok``, ``no_path``, ``unsafe``, ``bad input`` or ``error``.
         exit_status: What ``opl run`` would have ended with.
-        message: Why there is no program; empty if there is one.
         folder: Where the files lie, None if there are none.
-        result: As in ``result.json``, None if the job was not run to its end.
+        message: Why there is no program; empty if there is one.
+        result: The content of ``result.json``, None if the job was not run to its end.
     """
 
     job: Path
     status: str
     exit_status: int
-    message: str
     folder: Path | None
-    result: dict[str, Any] | None
+    message: str
+    result: Report | None
 
 
 def find_jobs(paths: Sequence[Path]) -> list[Path]:
     """Return the job files named, and for a folder every job file in and below it, sorted.
 
-    In a folder every YAML file counts that has a key of `JOB_KEYS`, or cannot be read at all;
-    hidden files and folders do not. A file that is named twice counts once.
+    In a folder every YAML file counts that has a key which only jobs have, or cannot be read at
+    all; hidden files and folders do not. A file that is named twice counts once.
 
     Raises:
         InputError: If a path does not exist or a folder holds no job.
@@ -74,24 +75,24 @@ def _is_job(path: Path, folder: Path) -> bool:
     if hidden or path.suffix not in (".yaml", ".yml") or not path.is_file():
         return False
     try:
-        return not JOB_KEYS.isdisjoint(documents.keys(path))
+        return not keys.OF_A_JOB.isdisjoint(documents.keys(path))
     except InputError:
-        return True  # it will be told what is wrong with it
+        return True  # loading it says what is wrong
 
 
 def run_batch(
     jobs: Sequence[Path],
     out: Path,
     workers: int,
-    done: Callable[[Row], None] = lambda row: None,
-) -> list[Row]:
+    done: Callable[[BatchRow], None] = lambda row: None,
+) -> list[BatchRow]:
     """Run jobs in worker processes.
 
     Args:
         jobs: The job files.
         out: Each job's files go to the folder of its name in here.
         workers: Number of processes.
-        done: Told each job as it ends.
+        done: Called with each job as it ends.
 
     Returns:
         One row per job, in the order of ``jobs``.
@@ -105,7 +106,7 @@ def run_batch(
     return [rows[job] for job in jobs]
 
 
-def _rows(jobs: Sequence[Path], out: Path, workers: int) -> Iterator[Row]:
+def _rows(jobs: Sequence[Path], out: Path, workers: int) -> Iterator[BatchRow]:
     """Yield the row of each job as it ends."""
     bereft = []
     with _pool(workers) as pool:
@@ -121,7 +122,7 @@ def _rows(jobs: Sequence[Path], out: Path, workers: int) -> Iterator[Row]:
             try:
                 yield pool.submit(_run_one, job, out).result()
             except BrokenProcessPool:
-                yield Row(job, "error", BUG, f"{job}: its worker process died", None, None)
+                yield _failed(job, "error", BUG, f"{job}: its worker process died")
 
 
 def _pool(workers: int) -> ProcessPoolExecutor:
@@ -130,20 +131,20 @@ def _pool(workers: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(workers, mp_context=context, initializer=_one_thread)
 
 
-def _clashes(jobs: Sequence[Path]) -> dict[Path, Row]:
+def _clashes(jobs: Sequence[Path]) -> dict[Path, BatchRow]:
     """Refuse jobs of one name: each would overwrite the files of the other."""
     by_name: dict[str, list[Path]] = {}
     for job in jobs:
         try:
-            by_name.setdefault(str(documents.keys(job)["name"]), []).append(job)
+            by_name.setdefault(str(documents.keys(job)[keys.NAME]), []).append(job)
         except (InputError, KeyError):
-            continue  # told when it is run
+            continue  # refused when it is run
     rows = {}
     for name, sharers in by_name.items():
         for job in sharers if len(sharers) > 1 else ():
             others = ", ".join(str(other) for other in sharers if other is not job)
-            message = f"{job}: name: must be another for each job, {name} is also that of {others}"
-            rows[job] = Row(job, "bad input", InputError.exit_status, message, None, None)
+            message = f"must be another for each job, {name} is also that of {others}"
+            rows[job] = _refused(job, InputError(f"{job}: {keys.NAME}", message))
     return rows
 
 
@@ -151,22 +152,26 @@ def _one_thread() -> None:
     use_threads(1)  # the processes share the cores
 
 
-def _run_one(path: Path, out: Path) -> Row:
+def _run_one(path: Path, out: Path) -> BatchRow:
     try:
-        job = load(path)
-        outcome = run(job)
+        job = load_job(path)
+        run = run_job(job)
         folder = out / job.name
-        deliver(outcome, folder)
+        deliver(run, folder)
     except OplError as error:
-        status = "bad input" if isinstance(error, InputError) else "error"
-        return Row(path, status, error.exit_status, str(error), None, None)
+        return _refused(path, error)
     except Exception as error:  # a bug in one job must not take the night's other jobs with it
         message = f"{type(error).__name__}: {error} (a bug: run it alone to see where)"
-        return Row(path, "error", BUG, message, None, None)
-    exit_status = {
-        "ok": 0,
-        "no_path": NoPathError.exit_status,
-        "unsafe": UnsafeError.exit_status,
-    }[outcome.status]
-    message = "\n".join(reasons(outcome))
-    return Row(path, outcome.status, exit_status, message, folder, result(outcome))
+        return _failed(path, "error", BUG, message)
+    report = make_report(run)
+    exit_status = run.error.exit_status if isinstance(run, Refused) else 0
+    return BatchRow(path, run.status, exit_status, folder, "\n".join(report.reasons), report)
+
+
+def _refused(job: Path, error: OplError) -> BatchRow:
+    status = "bad input" if isinstance(error, InputError) else "error"
+    return _failed(job, status, error.exit_status, str(error))
+
+
+def _failed(job: Path, status: str, exit_status: int, message: str) -> BatchRow:
+    return BatchRow(job, status, exit_status, None, message, None)
