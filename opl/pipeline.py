@@ -22,7 +22,7 @@ from opl.outcome import Outcome
 from opl.planning.fixed import keep_contact, runs_of
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import unreachable_points
-from opl.proof.read_back import as_told, read_back
+from opl.proof.read_back import in_file_digits, read_back
 from opl.remedies import find_remedies
 from opl.searches import compare, from_paper_start, search_path
 from opl.surfacing import cut_surface
@@ -68,7 +68,7 @@ def run(job: Job, progress: Progress = lambda stage, fraction: None) -> Outcome:
         outcome.compared = compare(outcome)
     with clock("motion"):
         # what is proven is what the digits of the program can say
-        told = as_told(plan.motion, job)
+        told = in_file_digits(plan.motion, job)
         timing = time_motion(told, points, job.pace, job.cell.robot)
         outcome.slow = slow_stretches(timing, job.pace)
     outcome.refusal = dwell_refusal(outcome.slow, job.pace)

@@ -8,11 +8,8 @@ from pathlib import Path
 import click
 
 from opl.cell.robot import load_robot
-from opl.program.inform import InformJob
-from opl.program.inform.compare import differences_in_meaning
-from opl.program.inform.files import load_jobs
-from opl.program.inform.summary import describe
-from opl.program.posts import find_post, known_posts
+from opl.errors import InputError
+from opl.program.posts import find_post, known_posts, reader_for
 from opl.program.ratios import with_ratios
 
 FILE = click.Path(dir_okay=False, path_type=Path)
@@ -24,38 +21,32 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--robot", default="mh24", show_default=True, help="Whose program it is.")
 @click.option("--pulses", type=FILE, help="Pulse ratios of the robot's own controller.")
 def show(program: Path, other: Path | None, robot: str, pulses: Path | None) -> None:
-    """Show a Yaskawa job in words: positions as angles and poses, moves, speeds, signals.
+    """Show a program in words: positions as angles and poses, moves, speeds, signals.
+
+    The suffix of the file names its language: .JBI, .mod, .src, .LS or .script.
 
     With --diff, ends with status 0 if both programs do the same, with 1 if not.
 
     Example: opl show programs/V_SHAPE.JBI --diff programs/V_SHAPE_OLD.JBI
     """
-    jobs = load_jobs(program)
+    reader, content = reader_for(program), _content(program)
     if other is not None:
-        lines = _differences(jobs, load_jobs(other))
+        if reader_for(other) is not reader:
+            raise InputError(str(other), f"is not of the language of {program}")
+        lines = reader.differences((str(program), content), (str(other), _content(other)))
         click.echo("\n".join(lines) or "both do the same")
         sys.exit(1 if lines else 0)
     owner = load_robot(robot)
     if pulses is not None:
         owner = with_ratios(owner, pulses)
-    unsure = ", ".join(owner.unverified_pulses)
-    click.echo(
-        f"read as a program of {owner.title}"
-        + (f", whose pulse ratios of {unsure} are not verified" if unsure else "")
-    )
-    for job in jobs:
-        click.echo("\n".join(describe(job, owner)))
+    click.echo("\n".join(reader.describe(str(program), content, owner)))
 
 
-def _differences(first: tuple[InformJob, ...], second: tuple[InformJob, ...]) -> list[str]:
-    lines = [
-        line
-        for one, two in zip(first, second, strict=False)
-        for line in differences_in_meaning(one, two)
-    ]
-    if len(first) != len(second):
-        lines.append(f"{len(first)} jobs against {len(second)}")
-    return lines
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror}") from error
 
 
 @click.group()
