@@ -20,7 +20,9 @@ EXISTING = click.Path(dir_okay=False, path_type=Path)
 @click.option("--robot", default="mh24", show_default=True, help="Whose program it is.")
 @click.option("--pulses", type=EXISTING, help="Pulse ratios of the robot's own controller.")
 def show(program: Path, other: Path | None, robot: str, pulses: Path | None) -> None:
-    """Show a Yaskawa job in words: positions as angles and poses, moves, speeds, signals.
+    """Show a program in words: positions as angles and poses, moves, speeds, signals.
+
+    The suffix of the file names its language: .JBI, .mod, .src, .LS or .script.
 
     With --diff, ends with status 0 if both programs do the same, with 1 if not.
 
@@ -38,16 +40,17 @@ def show(program: Path, other: Path | None, robot: str, pulses: Path | None) -> 
 
 @click.command()
 @click.argument("job", type=FILE)
-@click.argument("programs", type=FILE, nargs=-1, required=True, metavar="PROGRAM.JBI...")
+@click.argument("programs", type=FILE, nargs=-1, required=True, metavar="PROGRAM...")
 @click.option("--json", "as_json", is_flag=True, help="Print what was proven as JSON.")
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 def verify(job: Path, programs: tuple[Path, ...], as_json: bool, quiet: bool) -> None:
-    """Read a Yaskawa program back and prove it against the cell of a job.
+    """Read a program back and prove it against the cell of a job.
 
-    Nothing is known of how it was planned: pulses or positions are turned back into postures, the
-    moves made as the controller makes them, and what is ground is recognised from where the part
-    is. Give the master and all parts of a program that is split. Beside the result.json of its run,
-    a program must be what was written then to the last byte.
+    It may be of any controller that opl reads: INFORM, RAPID, KRL, FANUC TP or UR script. Nothing
+    is known of how it was planned: its positions are turned back into joint angles, the moves made
+    as the controller makes them, and what is ground is recognised from where the part is. Give the
+    master and all parts of a program that is split. Beside the result.json of its run, a program
+    must be what was written then to the last byte.
 
     Ends with status 0 if the program is proven, with 4 and the reasons if not.
 

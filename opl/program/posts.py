@@ -6,6 +6,9 @@ in the site's own package, which leaves opl as it is::
 
     [project.entry-points."opl.posts"]
     OUR_CELL = "our_package.our_module:POST"
+
+A post that has a `Reader` gets its programs read back and proven from their bytes. Without one they
+are written and not read back, and nothing claims more.
 """
 
 from __future__ import annotations
@@ -16,11 +19,16 @@ from datetime import datetime
 from importlib.metadata import entry_points
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from opl.cell.robot import Robot
 from opl.errors import InputError, OplError
-from opl.program.controller import ControllerProfile
 from opl.program.moves import PassTime, Program
+from opl.program.played import Corners, Reading, Speed
 from opl.program.settings import ProgramSettings
+
+Array = NDArray[np.float64]
 
 GROUP = "opl.posts"
 
@@ -47,6 +55,31 @@ class Written:
 
 
 @dataclass(frozen=True)
+class Reader:
+    """How the programs of a language are read back.
+
+    Attributes:
+        suffix: How the names of its files end, e.g. ``.mod``.
+        read: Reads all files of a program, content by what messages call them.
+        rounded: Returns the configurations nearest to some, shape (n, 6) in [rad], that the digits
+            of a program can express: these are proven, and these are read back.
+        start: The fastest first move of a program: nobody knows from where it comes.
+        corners: The largest corners that a job allows.
+        describe: Says in lines what a file does, given its name, content and robot.
+        differences: Says in lines what one file does and another does not, ``-`` and ``+``, given
+            the name and content of both.
+    """
+
+    suffix: str
+    read: Callable[[Mapping[str, bytes], Robot, ProgramSettings], Reading]
+    rounded: Callable[[Array, Robot, ProgramSettings], Array]
+    start: Callable[[Robot], Speed]
+    corners: Callable[[ProgramSettings], Corners]
+    describe: Callable[[str, bytes, Robot], list[str]]
+    differences: Callable[[tuple[str, bytes], tuple[str, bytes]], list[str]]
+
+
+@dataclass(frozen=True)
 class Post:
     """One way to write programs.
 
@@ -57,7 +90,7 @@ class Post:
         template: The layout that comes with the post.
         variables: What its templates get: name and meaning.
         counts_pulses: Whether positions may be written in encoder pulses.
-        profile: The Yaskawa controller whose INFORM jobs it writes, None for other languages.
+        reader: Reads its programs back; None where they are written and not read back.
     """
 
     title: str
@@ -65,7 +98,7 @@ class Post:
     template: Path
     variables: Mapping[str, str]
     counts_pulses: bool = False
-    profile: ControllerProfile | None = None
+    reader: Reader | None = None
 
 
 def known_posts() -> list[str]:
@@ -93,6 +126,29 @@ def find_post(name: str, where: str = "program.controller") -> Post:
     if not isinstance(post, Post):
         raise InputError(where, f"post {found[0].value} is no opl.program.posts.Post")
     return post
+
+
+def suffixes_read() -> dict[str, str]:
+    """Return a post for each suffix of files that opl can read, its name by the suffix."""
+    found: dict[str, str] = {}
+    for name in known_posts():
+        reader = find_post(name).reader
+        if reader is not None:
+            found.setdefault(reader.suffix.upper(), name)
+    return found
+
+
+def reader_for(path: Path) -> Reader:
+    """Return the reader of a program file by its suffix, in either case.
+
+    Raises:
+        InputError: If no post reads such files.
+    """
+    known = suffixes_read()
+    reader = find_post(known[path.suffix.upper()]).reader if path.suffix.upper() in known else None
+    if reader is None:
+        raise InputError(str(path), f"is no program that can be read: {', '.join(sorted(known))}")
+    return reader
 
 
 def pass_times(

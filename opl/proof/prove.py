@@ -1,9 +1,10 @@
-"""What is proven of a program is what its files say: parsed, played, recognised, replayed."""
+"""What is proven of a program is what its files say: read, played, recognised, replayed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -12,10 +13,7 @@ from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import TimedMotion
-from opl.program.controller import ControllerProfile
-from opl.program.inform.files import program_jobs
-from opl.program.inform.playback import play
-from opl.program.posts import find_post
+from opl.program.posts import Reader, find_post, suffixes_read
 from opl.proof.written import written_findings
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import Verification, replay
@@ -27,7 +25,7 @@ class Proof:
 
     Attributes:
         files: Names of the files.
-        foreign: Names of the user's own jobs that are called and were not looked at.
+        foreign: Names of the user's own programs that are called and were not looked at.
         moves: Number of moves.
         timed: The motion as recognised and its times, None if the files do not tell one.
         verification: What the replay found, None without a motion.
@@ -58,22 +56,23 @@ def prove(
     files: Mapping[str, bytes],
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> Proof:
-    """Prove job files against the cell of a job, knowing nothing of how they were planned.
+    """Prove the files of a program against the cell of a job, knowing nothing of its planning.
 
     Args:
         job: Cell, feed and tolerances.
         points: The cutter points of the job.
-        files: Content of the job files, the master and all parts, by what messages call them.
+        files: Content of all files of the program by what messages call them.
         progress: Told the part of the motion that is replayed, 0 to 1.
 
     Raises:
-        InputError: If the files are no jobs, not those of one program, or of another robot.
+        InputError: If the files are not those of one program of the job's controller and robot.
     """
-    jobs, refused = program_jobs(files, profile_of(job))
-    playback, doubtful = play(jobs, job.cell.robot, job.program)
-    foreign = tuple(sorted({name for one in jobs.values() for name in one.calls} - jobs.keys()))
+    reader = reader_of(job)
+    _require_language(job, files, reader)
+    reading = reader.read(files, job.cell.robot, job.program)
+    playback = reading.playback
     if playback is None:
-        return Proof(tuple(files), foreign, 0, None, None, (*refused, *doubtful))
+        return Proof(tuple(files), reading.foreign, 0, None, None, reading.findings)
     search = job.search
     rule = Rule(
         search.max_contact_error,
@@ -86,26 +85,34 @@ def prove(
     # the written configurations; of one that grinds several cutter points, the last of its rows
     rows = np.searchsorted(found.source, playback.stations, side="right") - 1
     findings = (
-        *refused,
-        *doubtful,
+        *reading.findings,
         *replayed.findings,
         *found.findings,
-        *written_findings(job, points, found.timed.take(rows), playback),
+        *written_findings(job, points, found.timed.take(rows), playback, reader),
     )
-    moves = len(playback.visits)
-    return Proof(tuple(files), foreign, moves, found.timed, replayed, findings)
+    moves = len(playback.moves)
+    return Proof(tuple(files), reading.foreign, moves, found.timed, replayed, findings)
 
 
-def profile_of(job: Job) -> ControllerProfile:
-    """Return the Yaskawa controller that a job is for.
+def reader_of(job: Job) -> Reader:
+    """Return the reader of the language that a job's program is written in.
 
     Raises:
-        InputError: If it is for another one.
+        InputError: If programs of its controller cannot be read.
     """
-    post = find_post(job.program.controller, f"{job.path}: program.controller")
-    if post.profile is None:
-        raise InputError(
-            f"{job.path}: program.controller",
-            f"programs of Yaskawa controllers can be read, not those for {post.title}",
-        )
-    return post.profile
+    where = f"{job.path}: program.controller"
+    post = find_post(job.program.controller, where)
+    if post.reader is None:
+        raise InputError(where, f"programs for {post.title} are written, not read back")
+    return post.reader
+
+
+def _require_language(job: Job, files: Mapping[str, bytes], reader: Reader) -> None:
+    """Refuse files that by their names are of another language than the job's controller."""
+    for name in files:
+        suffix = Path(name).suffix.upper()
+        if suffix in suffixes_read() and suffix != reader.suffix.upper():
+            raise InputError(
+                f"{job.path}: program.controller",
+                f"{job.program.controller} takes {reader.suffix} files, got {name}",
+            )

@@ -1,8 +1,9 @@
 """The end of a run: the texts that will be written are read back and compared with the proof.
 
-The postures of a motion are rounded to what a job can tell before they are proven (`as_told`), so
-what is read back must be the proven motion itself, to the last bit. Where it is not, because
-straight moves lead between the same postures on other ways, the files are proven on their own.
+The configurations of a motion are rounded to the digits of the language before they are proven
+(`in_file_digits`), so what is read back must be the proven motion itself, to the last bit. Where it
+is not, because straight moves lead between the same configurations on other paths, the files are
+proven on their own.
 """
 
 from __future__ import annotations
@@ -19,13 +20,9 @@ from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion, TimedMotion, VerifiedMotion
-from opl.program.inform.files import program_jobs
-from opl.program.inform.playback import Playback, play
-from opl.program.inform.render import FILE_SUFFIX
-from opl.program.inform.told import told_postures
 from opl.program.moves import SAME_POSTURE, Program
+from opl.program.played import Playback
 from opl.program.posts import find_post
-from opl.program.pulses import PulseScale
 from opl.proof.prove import prove
 from opl.proof.written import written_findings
 from opl.verification.limits import limit_findings
@@ -38,7 +35,7 @@ class FileProof:
     """What was found when the files of a run were read back.
 
     Attributes:
-        files: Names of the job files.
+        files: Names of the program's files.
         postures: Number of postures in them, in order, repeated ones once.
         largest_rounding: Farthest in [m] that rounding to the digits of the file moved any corner
             of the box around the part, before the proof.
@@ -61,16 +58,18 @@ class FileProof:
         return not self.findings
 
 
-def as_told(motion: Motion, job: Job) -> Motion:
-    """Return a motion whose postures the job's program can tell; others than Yaskawa's as they are.
+def in_file_digits(motion: Motion, job: Job) -> Motion:
+    """Return a motion whose configurations the digits of the job's program can express.
+
+    As it is where programs of the controller cannot be read: nobody knows their digits.
 
     Raises:
-        UnsafeError: If a posture cannot be told.
+        UnsafeError: If a configuration cannot be expressed.
     """
-    profile = find_post(job.program.controller).profile
-    if profile is None:
+    reader = find_post(job.program.controller).reader
+    if reader is None:
         return motion
-    return replace(motion, q=told_postures(motion.q, job.cell.robot, job.program, profile))
+    return replace(motion, q=reader.rounded(motion.q, job.cell.robot, job.program))
 
 
 def read_back(
@@ -81,49 +80,48 @@ def read_back(
     program: Program,
     texts: Mapping[str, str],
 ) -> FileProof | None:
-    """Compare the texts of job files with what was proven; None if they are not Yaskawa's.
+    """Compare the texts of a program with what was proven; None if they cannot be read.
 
     Args:
         job: The job.
         points: Its cutter points.
-        planned: The motion before its postures were rounded.
+        planned: The motion before its configurations were rounded.
         verified: What was proven.
         program: The moves that were to be written.
         texts: All files of the run.
     """
-    profile = find_post(job.program.controller).profile
-    if profile is None:
+    reader = find_post(job.program.controller).reader
+    if reader is None:
         return None
     files = {
-        name: text.encode("utf-8") for name, text in texts.items() if name.endswith(FILE_SUFFIX)
+        name: text.encode("utf-8") for name, text in texts.items() if name.endswith(reader.suffix)
     }
-    jobs, refused = program_jobs(files, profile)
-    playback, doubtful = play(jobs, job.cell.robot, job.program)
-    findings = (*refused, *doubtful)
+    reading = reader.read(files, job.cell.robot, job.program)
+    playback, findings = reading.playback, reading.findings
     rounding = _apart(job, planned.q, verified.motion.q)
     if playback is None:
         return FileProof(tuple(files), 0, rounding, 0.0, False, findings)
     kept = _without_repeats(playback)
     postures = [move.posture for move in program.moves]
     if len(kept.stations) != len(postures):
-        told = f"{len(kept.stations)} postures read back, {len(postures)} proven"
-        findings = (*findings, Finding(Level.ERROR, "file", "program", told))
+        message = f"{len(kept.stations)} postures read back, {len(postures)} proven"
+        findings = (*findings, Finding(Level.ERROR, "file", "program", message))
         return FileProof(tuple(files), len(kept.stations), rounding, 0.0, False, findings)
     q, proven = kept.q[kept.stations], verified.motion.q[postures]
     difference = np.abs(q - proven).max()
-    other_ways = difference > EXACT or len(kept.stations) < len(kept.q)
-    findings = (*findings, *_differences(job, kept, program))
-    if other_ways:
+    other_paths = difference > EXACT or len(kept.stations) < len(kept.q)
+    findings = (*findings, *_differences(kept, program))
+    if other_paths:
         findings = (*findings, *prove(job, points, files).findings)
     else:
         written = TimedMotion(verified.motion.take(postures), kept.duration)
         findings = (
             *findings,
             *limit_findings(job.cell, written),
-            *written_findings(job, points, written, kept),
+            *written_findings(job, points, written, kept, reader),
         )
     apart = _apart(job, q, proven) if difference > EXACT else 0.0
-    return FileProof(tuple(files), len(q), rounding, apart, bool(other_ways), findings)
+    return FileProof(tuple(files), len(q), rounding, apart, bool(other_paths), findings)
 
 
 def _without_repeats(playback: Playback) -> Playback:
@@ -138,25 +136,23 @@ def _without_repeats(playback: Playback) -> Playback:
         playback.q[all_but],
         playback.duration[all_but],
         np.searchsorted(all_but, playback.stations[kept]),
-        tuple(playback.visits[k] for k in kept),
+        tuple(playback.moves[k] for k in kept),
     )
 
 
-def _differences(job: Job, playback: Playback, program: Program) -> Iterator[Finding]:
+def _differences(playback: Playback, program: Program) -> Iterator[Finding]:
     """Give what differs, move by move: where it leads, how, and whether it stops."""
-    half_pulse = 0.5 / PulseScale.of(job.cell.robot).pulses_per_radian
-    slack = np.where(np.isnan(half_pulse), SAME_POSTURE, half_pulse)
-    for k, (visit, move) in enumerate(zip(playback.visits, program.moves, strict=True)):
+    for k, (read, move) in enumerate(zip(playback.moves, program.moves, strict=True)):
         away = np.abs(playback.q[playback.stations[k]] - move.q)
-        told = []
-        if (away > slack).any():
-            told.append(f"leads {np.rad2deg(away.max()):.4f} deg away from the proven posture")
-        if visit.step.word == "MOVL" and not move.straight:
-            told.append("is straight, a joint move was proven")
-        if move.exact_stop and visit.step.tag("PL") != "0":
-            told.append("does not stop")
-        for line in told:
-            yield Finding(Level.ERROR, "file", visit.place, line)
+        messages = []
+        if (away > read.resolution).any():
+            messages.append(f"leads {np.rad2deg(away.max()):.4f} deg away from the proven posture")
+        if read.straight and not move.straight:
+            messages.append("is straight, a joint move was proven")
+        if move.exact_stop and not read.corner.exact_stop:
+            messages.append("does not stop")
+        for message in messages:
+            yield Finding(Level.ERROR, "file", read.place, message)
 
 
 def _apart(job: Job, q: Array, other: Array) -> float:

@@ -12,9 +12,7 @@ from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
-from opl.program.inform.compare import differences_in_meaning
-from opl.program.inform.files import load_jobs
-from opl.program.inform.summary import describe
+from opl.program.posts import reader_for
 from opl.proof.digest import changed_since, digests_in
 from opl.proof.prove import Proof, prove
 from opl.run.delivery import RESULT
@@ -124,37 +122,29 @@ def _content(path: Path) -> bytes:
 
 
 def describe_program(file: Path, robot: Robot) -> list[str]:
-    """Return a Yaskawa program in words, one line each: positions, moves, speeds, signals.
+    """Return a program in words, one line each: positions, moves, speeds, signals.
 
     Args:
-        file: The program.
+        file: The program; its suffix names the language.
         robot: Whose program it is taken for.
 
     Raises:
         InputError: If the file cannot be read or is no program.
     """
-    unsure = ", ".join(robot.unverified_pulses)
-    about = f"read as a program of {robot.title}"
-    about += f", whose pulse ratios of {unsure} are not verified" if unsure else ""
-    return [about, *(line for job in load_jobs(file) for line in describe(job, robot))]
+    return [*reader_for(file).describe(str(file), _content(file), robot)]
 
 
 def compare_programs(file: Path, other: Path) -> list[str]:
-    """Return how two Yaskawa programs differ in what they do, one line each; empty if they do not.
+    """Return how two programs differ in what they do, one line each; empty if they do not.
 
     Args:
-        file: The one.
-        other: The other.
+        file: The one; its suffix names the language.
+        other: The other, of the same language.
 
     Raises:
-        InputError: If a file cannot be read or is no program.
+        InputError: If a file cannot be read, is no program, or they are of two languages.
     """
-    first, second = load_jobs(file), load_jobs(other)
-    lines = [
-        line
-        for one, two in zip(first, second, strict=False)
-        for line in differences_in_meaning(one, two)
-    ]
-    if len(first) != len(second):
-        lines.append(f"{len(first)} jobs against {len(second)}")
-    return lines
+    reader = reader_for(file)
+    if reader_for(other) is not reader:
+        raise InputError(str(other), f"is not of the language of {file}")
+    return [*reader.differences((str(file), _content(file)), (str(other), _content(other)))]

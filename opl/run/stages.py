@@ -7,7 +7,7 @@ from opl.job.load import Job
 from opl.job.refusals import dwell_refusal
 from opl.motion.feed import slow_stretches
 from opl.motion.timing import time_motion
-from opl.proof.read_back import as_told, read_back
+from opl.proof.read_back import in_file_digits, read_back
 from opl.run.exporting import draw_charts, job_date, render_program
 from opl.run.preparing import prepare
 from opl.run.remedies import find_remedies
@@ -68,7 +68,7 @@ def plan_path(surfaced: Surfaced, watch: Watch | None = None) -> Planned | Refus
         compared = compare(prepared, found)
     with watch.stage(Stage.MOTION):
         # what is proven is what the digits of the program can say
-        motion = as_told(found.plan.motion, job)
+        motion = in_file_digits(found.plan.motion, job)
         timing = time_motion(motion, surfaced.points, job.process, job.cell.robot)
         slow = slow_stretches(timing, job.process)
     planned = Planned(prepared, found.plan, compared, timing, slow)

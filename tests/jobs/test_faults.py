@@ -23,10 +23,8 @@ from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job, load
-from opl.program.inform.files import program_jobs
-from opl.program.inform.playback import play
 from opl.program.pulses import PulseScale
-from opl.proof.prove import profile_of, prove
+from opl.proof.prove import prove, reader_of
 from opl.run.surfacing import cut_surface
 from tests.support.bare_cells import with_obstacle
 from tests.support.jobs import opl
@@ -284,8 +282,8 @@ def test_a_limit_crossed_between_two_postures_is_found(written):
     """On a straight move a joint can go beyond what both ends have; on a joint move none can."""
     text = Text(written).replace(r"MOVJ (C00001) VJ=\S+", r"MOVL \1 V=50.0")
     robot = written.job.cell.robot
-    jobs, _ = program_jobs({"a": text.text.encode("ascii")}, profile_of(written.job))
-    playback, _ = play(jobs, robot, written.job.program)
+    files = {"a": text.text.encode("ascii")}
+    playback = reader_of(written.job).read(files, robot, written.job.program).playback
     end = int(playback.stations[1])
     rest = np.concatenate([playback.q[:1], playback.q[end:]])
     above = playback.q[:end].max(axis=0) - rest.max(axis=0)

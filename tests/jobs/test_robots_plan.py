@@ -116,7 +116,7 @@ def test_a_gp12_in_poses_still_keeps_its_limits(tmp_path):
 
 @pytest.mark.parametrize(("maker", "height"), [("krl", 640.0), ("rapid", 640.0)])
 def test_straight_moves_are_told_from_where_the_controller_counts(maker, height):
-    post = importlib.import_module(f"opl.program.makers.{maker}").POST
+    post = importlib.import_module(f"opl.program.{maker}").POST
     q = np.array([[0.0, 0, 0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0]])
     moves = tuple(
         Move(posture, 0.1, exact_stop=True, on_wheel=False, posture=k, duration=d, straight=k > 0)

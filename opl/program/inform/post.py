@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
 
 import numpy as np
+from numpy.typing import NDArray
 
 from opl.cell.robot import Robot
 from opl.errors import InputError
 from opl.program.controller import ControllerProfile
 from opl.program.inform.cartesian import frame_pose
+from opl.program.inform.compare import differences_in_meaning
+from opl.program.inform.files import decode, program_jobs
 from opl.program.inform.layout import VARIABLES
-from opl.program.inform.parse import parse
+from opl.program.inform.parse import parse, read_jobs
+from opl.program.inform.playback import corners, play, start_speed
 from opl.program.inform.render import FILE_SUFFIX, TEMPLATE, render, split_for
+from opl.program.inform.rounding import rounded
+from opl.program.inform.summary import describe
 from opl.program.inform.times import move_times
 from opl.program.moves import Program
-from opl.program.posts import Post, Written, pass_times
+from opl.program.played import Reading
+from opl.program.posts import Post, Reader, Written, pass_times
 from opl.program.profiles import PROFILES
 from opl.program.pulses import require_accepted, require_known
 from opl.program.settings import PositionForm, ProgramSettings
+
+Array = NDArray[np.float64]
 
 
 def write_jobs(
@@ -69,14 +79,68 @@ def write_jobs(
     return Written(files, speeds, times, pass_times(program, times, profile.name))
 
 
+def read(
+    files: Mapping[str, bytes], robot: Robot, settings: ProgramSettings, profile: ControllerProfile
+) -> Reading:
+    """Read the job files of a program: the master and all parts it calls.
+
+    Args:
+        files: Content by what messages call the file.
+        robot: Whose program.
+        settings: Tool, user frame, and which jobs of the user's own may be called.
+        profile: The controller.
+
+    Raises:
+        InputError: If the files are no jobs, not those of one program, or of another robot.
+    """
+    jobs, refused = program_jobs(files, profile)
+    playback, doubtful = play(jobs, robot, settings)
+    foreign = sorted({name for job in jobs.values() for name in job.calls} - jobs.keys())
+    return Reading(playback, tuple(foreign), (*refused, *doubtful))
+
+
+def describe_file(name: str, content: bytes, robot: Robot) -> list[str]:
+    """Say what each job of a file does.
+
+    Raises:
+        InputError: If the file holds what is no job.
+    """
+    jobs = read_jobs(decode(content)[0], name)
+    unsure = ", ".join(robot.unverified_pulses)
+    about = f"read as a program of {robot.title}"
+    about += f", whose pulse ratios of {unsure} are not verified" if unsure else ""
+    return [about, *(line for job in jobs for line in describe(job, robot))]
+
+
+def file_differences(first: tuple[str, bytes], second: tuple[str, bytes]) -> list[str]:
+    """Say what differs in meaning between two files of jobs.
+
+    Raises:
+        InputError: If a file holds what is no job.
+    """
+    one, other = (read_jobs(decode(content)[0], name) for name, content in (first, second))
+    pairs = zip(one, other, strict=False)
+    lines = [line for pair in pairs for line in differences_in_meaning(*pair)]
+    return lines if len(one) == len(other) else [*lines, f"{len(one)} jobs against {len(other)}"]
+
+
 def post_of(profile: ControllerProfile) -> Post:
     """Return the post of a controller."""
 
     def write(program: Program, robot: Robot, settings: ProgramSettings, date: datetime) -> Written:
         return write_jobs(program, robot, settings, profile, date)
 
+    def read_files(files: Mapping[str, bytes], robot: Robot, settings: ProgramSettings) -> Reading:
+        return read(files, robot, settings, profile)
+
+    def rounded_q(q: Array, robot: Robot, settings: ProgramSettings) -> Array:
+        return rounded(q, robot, settings, profile)
+
+    reader = Reader(
+        FILE_SUFFIX, read_files, rounded_q, start_speed, corners, describe_file, file_differences
+    )
     title = f"Yaskawa {profile.name} (INFORM)"
-    return Post(title, write, TEMPLATE, VARIABLES, counts_pulses=True, profile=profile)
+    return Post(title, write, TEMPLATE, VARIABLES, counts_pulses=True, reader=reader)
 
 
 NX100, DX100, DX200, YRC1000 = (

@@ -1,4 +1,4 @@
-"""The postures that positions stand for once they are written: digits are few."""
+"""The configurations that an INFORM job can express: pulses are whole, poses have few digits."""
 
 from __future__ import annotations
 
@@ -15,21 +15,19 @@ from opl.program.settings import PositionForm, ProgramSettings
 Array = NDArray[np.float64]
 
 
-def told_postures(
-    q: Array, robot: Robot, settings: ProgramSettings, profile: ControllerProfile
-) -> Array:
-    """Return the postures that a job can tell, nearest to some postures, shape (n, 6).
+def rounded(q: Array, robot: Robot, settings: ProgramSettings, profile: ControllerProfile) -> Array:
+    """Return the configurations nearest to some that a job can express, shape (n, 6).
 
-    Within the limits: a posture at its limit is rounded inwards.
+    Within the limits: a joint at its limit is rounded inwards.
 
     Args:
         q: Joint positions in [rad], shape (n, 6).
-        robot: Whose postures.
+        robot: Whose.
         settings: How positions are written.
         profile: The controller.
 
     Raises:
-        UnsafeError: If a posture is beyond the limits, or a Cartesian position cannot tell it.
+        UnsafeError: If one is beyond the limits, or no Cartesian position names it.
     """
     if settings.positions is PositionForm.PULSES:
         scale = PulseScale.of(robot)
@@ -41,4 +39,4 @@ def told_postures(
         )
         return scale.to_angles(np.clip(scale.to_pulses(q), lowest, highest))
     moves = tuple(Move(p, 1.0, exact_stop=True, on_wheel=False, posture=k) for k, p in enumerate(q))
-    return write_positions(Program("TOLD", moves=moves), robot, settings, profile).q
+    return write_positions(Program("ROUNDED", moves=moves), robot, settings, profile).q

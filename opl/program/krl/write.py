@@ -1,4 +1,4 @@
-"""KUKA KRL programs (KRC2 and later), positions inline, so that no .dat file is needed.
+"""Writing KRL programs, positions inline, so that no .dat file is needed.
 
 Axis speeds are whole percents (``BAS(#VEL_PTP, n)``): coarse at grinding feed, so passes keep their
 time as a whole. Straight moves have their own speed of four decimals.
@@ -15,10 +15,13 @@ import numpy as np
 from opl.cell.robot import Robot, controller_poses
 from opl.files import resources
 from opl.geometry.frames import roll_pitch_yaw
+from opl.program import dialect
 from opl.program.actions import Action, Call, Dwell, SetOutput, WaitInput
-from opl.program.makers.text import VARIABLES, Dialect, angles, write_steps, written
+from opl.program.dialect import Dialect, write_steps, written
+from opl.program.digits import degrees
+from opl.program.krl.rounding import DECIMALS
 from opl.program.moves import Move, Program
-from opl.program.posts import Post, Written
+from opl.program.posts import Written
 from opl.program.settings import Array, ProgramSettings
 from opl.program.speeds import SpeedRange, speeds_keeping_time
 
@@ -34,7 +37,12 @@ _DIALECT = Dialect(
 )
 _PERCENT = SpeedRange(1.0, 100.0, 0)
 _METRES_PER_SECOND = SpeedRange(0.0001, 2.0, 4)
-_VARIABLES = {**VARIABLES, "step.speed": "instruction that sets the speed of the move"}
+VARIABLES = {**dialect.VARIABLES, "step.speed": "instruction that sets the speed of the move"}
+
+
+def tool_name(settings: ProgramSettings) -> str:
+    """Return the tool of a job as programs name it."""
+    return f"TOOL_DATA[{settings.tool}]" if settings.tool else "$NULLFRAME"
 
 
 def write(program: Program, robot: Robot, settings: ProgramSettings, date: datetime) -> Written:
@@ -54,7 +62,7 @@ def write(program: Program, robot: Robot, settings: ProgramSettings, date: datet
         "name": program.name,
         "date": f"{date:%Y-%m-%d %H:%M}",
         "title": settings.title,
-        "tool": f"TOOL_DATA[{settings.tool}]" if settings.tool else "$NULLFRAME",
+        "tool": tool_name(settings),
         "comments": program.comments,
     }
     text = _DIALECT.render(settings.template or TEMPLATE, values, steps)
@@ -99,7 +107,7 @@ def _move(move: Move, T_base_tool: Array) -> tuple[str, str]:
         c, b, a = np.rad2deg(roll_pitch_yaw(T_base_tool))
         target = f"{{X {x:.3f},Y {y:.3f},Z {z:.3f},A {a:.4f},B {b:.4f},C {c:.4f}}}"
         return f"LIN {target}{'' if move.exact_stop else ' C_DIS'}", target
-    named = zip("123456", angles(move.q, 4), strict=True)
+    named = zip("123456", degrees(move.q, DECIMALS), strict=True)
     target = "{" + ",".join(f"A{axis} {angle}" for axis, angle in named) + "}"
     return f"PTP {target}{'' if move.exact_stop else ' C_PTP'}", target
 
@@ -131,6 +139,3 @@ def _action(action: Action) -> Iterator[str]:
 
 def _bool(state: bool) -> str:
     return "TRUE" if state else "FALSE"
-
-
-POST = Post("KUKA KRL", write, TEMPLATE, _VARIABLES)

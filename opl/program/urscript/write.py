@@ -1,4 +1,4 @@
-"""Universal Robots scripts (URScript): joint positions in [rad], each move with its time."""
+"""Writing UR scripts: joint positions in [rad], each move with its time."""
 
 from __future__ import annotations
 
@@ -12,10 +12,13 @@ from scipy.spatial.transform import Rotation
 from opl.cell.robot import Robot, controller_poses
 from opl.files import resources
 from opl.program.actions import Action, Call, Dwell, SetOutput, WaitInput
-from opl.program.makers.text import VARIABLES, Dialect, rounded_times, write_steps, written
+from opl.program.dialect import Dialect, rounded_times, write_steps, written
+from opl.program.digits import fixed
 from opl.program.moves import Program
-from opl.program.posts import Post, Written
+from opl.program.posts import Written
 from opl.program.settings import Array, ProgramSettings
+from opl.program.urscript.read import LARGEST_BLEND, tool_text
+from opl.program.urscript.rounding import DECIMALS
 
 TEMPLATE = resources.folder("templates") / "urscript" / "program.script.j2"
 
@@ -27,10 +30,19 @@ _DIALECT = Dialect(
     motion=re.compile(r"^(?:move[jlpc]|servo[jc]|speed[jl])\("),
     line_end="\n",
 )
-# Blends of two neighbouring points must not overlap, and none needs more than this in [m].
-_BLEND_SHARE = 0.4
-_LARGEST_BLEND = 0.001
+_BLEND_SHARE = 0.4  # of the shorter neighbouring move: two blends must not overlap
 _START_ACCELERATION = 0.3  # [rad/s^2] of the move to the first posture
+
+
+def tool_name(settings: ProgramSettings) -> str:
+    """Return the pose of a job's tool as a reader names it."""
+    return tool_text([float(value) for value in _tool_pose(settings)])
+
+
+def _tool_pose(settings: ProgramSettings) -> list[str]:
+    x, y, z = settings.T_flange_tool[:3, 3]
+    turn = Rotation.from_matrix(settings.T_flange_tool[:3, :3]).as_rotvec()
+    return [f"{value + 0.0:.6f}" for value in (x, y, z, *turn)]
 
 
 def write(program: Program, robot: Robot, settings: ProgramSettings, date: datetime) -> Written:
@@ -42,20 +54,18 @@ def write(program: Program, robot: Robot, settings: ProgramSettings, date: datet
     blends = _blends(program, Ts_base_tool)
     moves = []
     for move, time, blend in zip(program.moves, times, blends, strict=True):
-        target = "[" + ", ".join(f"{round(float(a), 6) + 0.0:.6f}" for a in move.q) + "]"
+        target = "[" + ", ".join(fixed(float(a), DECIMALS) for a in move.q) + "]"
         speed = f"t={time:.4f}"
         if np.isnan(time):
             speed = f"a={_START_ACCELERATION}, v={move.speed * robot.max_speed.min():.4f}"
         word = "movel" if move.straight else "movej"
         moves.append((f"{word}({target}, {speed}, r={blend:.5f})", target, speed, float(time)))
     steps = write_steps(program, moves, lambda action: [*_action(action)])
-    x, y, z = settings.T_flange_tool[:3, 3]
-    turn = Rotation.from_matrix(settings.T_flange_tool[:3, :3]).as_rotvec()
     values = {
         "name": program.name,
         "date": f"{date:%Y-%m-%d %H:%M}",
         "title": settings.title,
-        "tool": "p[" + ", ".join(f"{value + 0.0:.6f}" for value in (x, y, z, *turn)) + "]",
+        "tool": "p[" + ", ".join(_tool_pose(settings)) + "]",
         "comments": program.comments,
     }
     text = _DIALECT.render(settings.template or TEMPLATE, values, steps)
@@ -66,7 +76,7 @@ def _blends(program: Program, Ts_base_tool: Array) -> Array:
     """Return the blend radius at the end of each move in [m]."""
     lengths = np.linalg.norm(np.diff(Ts_base_tool[:, :3, 3], axis=0), axis=1)
     before, after = np.r_[0.0, lengths], np.r_[lengths, 0.0]
-    room = np.minimum(_BLEND_SHARE * np.minimum(before, after), _LARGEST_BLEND)
+    room = np.minimum(_BLEND_SHARE * np.minimum(before, after), LARGEST_BLEND)
     stops = np.array([move.exact_stop for move in program.moves], dtype=bool)
     return np.where(stops, 0.0, room)
 
@@ -95,6 +105,3 @@ def _action(action: Action) -> Iterator[str]:
         yield f"{action.name}()"
     else:
         yield f"# {action.text}"
-
-
-POST = Post("Universal Robots URScript", write, TEMPLATE, VARIABLES)

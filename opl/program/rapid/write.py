@@ -1,4 +1,4 @@
-"""ABB RAPID modules (IRC5 and later).
+"""Writing RAPID modules.
 
 Each move carries its time (argument T), so no speed is rounded. Signals are named ``do12`` and
 ``di3`` for the numbers of the job, tools other than tool0 ``tool3``: the names must exist on the
@@ -17,9 +17,12 @@ from scipy.spatial.transform import Rotation
 from opl.cell.robot import Robot, controller_poses
 from opl.files import resources
 from opl.program.actions import Action, Call, Dwell, SetOutput, WaitInput
-from opl.program.makers.text import VARIABLES, Dialect, angles, rounded_times, write_steps, written
+from opl.program.dialect import Dialect, rounded_times, write_steps, written
+from opl.program.digits import degrees
 from opl.program.moves import Move, Program
-from opl.program.posts import Post, Written
+from opl.program.posts import Written
+from opl.program.rapid.read import START
+from opl.program.rapid.rounding import DECIMALS
 from opl.program.settings import Array, ProgramSettings
 
 TEMPLATE = resources.folder("templates") / "rapid" / "module.mod.j2"
@@ -33,14 +36,17 @@ _DIALECT = Dialect(
     line_end="\r\n",
 )
 _NO_AXES = "[9E9,9E9,9E9,9E9,9E9,9E9]"
-# Speed of the move to the first posture, which has no time: 50 mm/s at the tool point.
-_START = "v50"
+
+
+def tool_name(settings: ProgramSettings) -> str:
+    """Return the tool of a job as modules name it."""
+    return f"tool{settings.tool}"
 
 
 def write(program: Program, robot: Robot, settings: ProgramSettings, date: datetime) -> Written:
     """Return the module of a program."""
     _DIALECT.require_legal(program, settings)
-    tool = f"tool{settings.tool}"
+    tool = tool_name(settings)
     times = rounded_times(program.moves, 4, 0.0001)
     q = np.array([move.q for move in program.moves]).reshape(-1, 6)
     Ts_base_tool = controller_poses(robot, q) @ settings.T_flange_tool
@@ -62,12 +68,12 @@ def write(program: Program, robot: Robot, settings: ProgramSettings, date: datet
 
 def _move(move: Move, T_base_tool: Array, time: float, tool: str) -> tuple[str, str, str]:
     """Return instruction, target and speed."""
-    speed = _START if np.isnan(time) else f"v1000\\T:={time:.4f}"
+    speed = f"v{START}" if np.isnan(time) else f"v1000\\T:={time:.4f}"
     zone = "fine" if move.exact_stop else "z0"
     if move.straight:
         target = _robtarget(move.q, T_base_tool)
         return f"MoveL {target}, {speed}, {zone}, {tool};", target, speed
-    target = f"[[{','.join(angles(move.q, 4))}],{_NO_AXES}]"
+    target = f"[[{','.join(degrees(move.q, DECIMALS))}],{_NO_AXES}]"
     return f"MoveAbsJ {target}\\NoEOffs, {speed}, {zone}, {tool};", target, speed
 
 
@@ -100,6 +106,3 @@ def _action(action: Action) -> Iterator[str]:
         yield f"{action.name};"
     else:
         yield f"! {action.text}"
-
-
-POST = Post("ABB RAPID", write, TEMPLATE, VARIABLES)

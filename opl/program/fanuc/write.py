@@ -1,8 +1,4 @@
-"""FANUC TP programs as text (.LS), positions as joint angles, moves with their time in [ms].
-
-FANUC counts J3 from the horizontal; opl, as robot descriptions do, from the upper arm. Straight
-moves go to joint positions too, which leaves the controller no choice between postures.
-"""
+"""Writing FANUC TP programs as text, positions as joint angles, moves with their time in [ms]."""
 
 from __future__ import annotations
 
@@ -14,11 +10,14 @@ import numpy as np
 from opl.cell.robot import Robot
 from opl.errors import InputError
 from opl.files import resources
+from opl.program import dialect
 from opl.program.actions import Action, Call, Dwell, SetOutput, WaitInput
-from opl.program.makers.text import VARIABLES, Dialect, angles, rounded_times, write_steps, written
+from opl.program.dialect import Dialect, rounded_times, write_steps, written
+from opl.program.digits import degrees
+from opl.program.fanuc.rounding import DECIMALS, to_fanuc
 from opl.program.moves import Move, Program
-from opl.program.posts import Post, Written
-from opl.program.settings import Array, ProgramSettings
+from opl.program.posts import Written
+from opl.program.settings import ProgramSettings
 
 TEMPLATE = resources.folder("templates") / "fanuc" / "program.ls.j2"
 
@@ -31,8 +30,8 @@ _DIALECT = Dialect(
     line_end="\r\n",
 )
 _AXIS = re.compile(r"J[1-6]= *([-0-9.]+) deg")
-_VARIABLES = {
-    **VARIABLES,
+VARIABLES = {
+    **dialect.VARIABLES,
     "title": "line about the program of 16 characters at most",
     "day": "of the date",
     "time": "of the date",
@@ -41,12 +40,17 @@ _VARIABLES = {
 }
 
 
+def tool_name(settings: ProgramSettings) -> str:
+    """Return the tool of a job as programs name it."""
+    return str(settings.tool)
+
+
 def write(program: Program, robot: Robot, settings: ProgramSettings, date: datetime) -> Written:
     """Return the program as FANUC text."""
     _DIALECT.require_legal(program, settings)
     times = rounded_times(program.moves, 3, 0.001)
     q = np.array([move.q for move in program.moves]).reshape(-1, 6)
-    axes = [angles(_fanuc_angles(posture), 3) for posture in q]
+    axes = [degrees(row, DECIMALS) for row in to_fanuc(q)]
     moves = []
     for number, (move, time, row) in enumerate(zip(program.moves, times, axes, strict=True), 1):
         instruction, speed = _move(move, number, time)
@@ -54,7 +58,7 @@ def write(program: Program, robot: Robot, settings: ProgramSettings, date: datet
     actions = _Actions()
     steps = write_steps(program, moves, actions.lines)
     lines = [f"  !{comment}" for comment in program.comments]
-    lines += ["  UFRAME_NUM=0", f"  UTOOL_NUM={settings.tool}"]
+    lines += ["  UFRAME_NUM=0", f"  UTOOL_NUM={tool_name(settings)}"]
     for step in steps:
         lines += [f"  !{step.comment}"] if step.comment else []
         lines += [step.move, *step.actions]
@@ -64,7 +68,7 @@ def write(program: Program, robot: Robot, settings: ProgramSettings, date: datet
         "day": f"{date:%y-%m-%d}",
         "time": f"{date:%H:%M:%S}",
         "title": (settings.title or "")[:16],
-        "tool": str(settings.tool),
+        "tool": tool_name(settings),
         "comments": program.comments,
         "lines": lines,
         "positions": [{"number": str(k), "axes": row} for k, row in enumerate(axes, start=1)],
@@ -74,13 +78,6 @@ def write(program: Program, robot: Robot, settings: ProgramSettings, date: datet
     if _AXIS.findall(text) != [axis for row in axes for axis in row]:
         raise InputError(str(template), "loses or changes a position")
     return written(program, f"{program.name}.LS", text, steps)
-
-
-def _fanuc_angles(q: Array) -> Array:
-    """Return joint positions as FANUC counts them: J3 from the horizontal."""
-    turned = q.copy()
-    turned[2] -= q[1]
-    return turned
 
 
 def _move(move: Move, number: int, time: float) -> tuple[str, str]:
@@ -131,6 +128,3 @@ class _Actions:
 
 def _state(on: bool) -> str:
     return "ON" if on else "OFF"
-
-
-POST = Post("FANUC TP (.LS)", write, TEMPLATE, _VARIABLES)

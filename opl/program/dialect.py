@@ -1,4 +1,8 @@
-"""What the posts of all makers share: steps as texts, templates, and reading back what came out."""
+"""What the writers of RAPID, KRL, FANUC and UR programs share: steps as texts, templates, times.
+
+A template may lay a program out anew; that no move or action got lost or changed is seen from the
+text, whatever the language (`Dialect.render`). What the program does then is for its reader.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +23,7 @@ from opl.program.settings import ProgramSettings
 
 Array = NDArray[np.float64]
 
-# Name and meaning of what the templates of all makers get.
+# Name and meaning of what the templates of all these languages get.
 VARIABLES = {
     "name": "program name",
     "date": "of the program",
@@ -57,7 +61,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Dialect:
-    """The rules of a language that are checked the same way for every maker.
+    """The rules of a language that are checked the same way for all of them.
 
     Attributes:
         maker: For messages.
@@ -178,8 +182,3 @@ def rounded_times(moves: Sequence[Move], decimals: int, shortest: float) -> Arra
         times[k] = max(round(move.duration - late, decimals), shortest)
         late += times[k] - move.duration
     return times
-
-
-def angles(q: Array, decimals: int) -> list[str]:
-    """Return joint positions [rad] in [deg] as written, never -0."""
-    return [f"{round(float(a), decimals) + 0.0:.{decimals}f}" for a in np.rad2deg(q)]

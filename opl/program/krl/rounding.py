@@ -1,0 +1,18 @@
+"""The configurations that a KRL program can express: degrees of four decimals."""
+
+from __future__ import annotations
+
+from opl.cell.robot import Robot
+from opl.program.digits import rounded_degrees
+from opl.program.settings import Array, ProgramSettings
+
+DECIMALS = 4
+
+
+def rounded(q: Array, robot: Robot, settings: ProgramSettings) -> Array:
+    """Return the configurations nearest to some that a program can express, shape (n, 6).
+
+    Raises:
+        UnsafeError: If one is beyond the limits.
+    """
+    return rounded_degrees(q, robot, DECIMALS)

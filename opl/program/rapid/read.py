@@ -1,0 +1,158 @@
+"""Reading RAPID modules: MoveAbsJ to joint targets and MoveL to poses, each with its time.
+
+RAPID ignores case. The zones of the moves are read, not played: z0 lets the controller leave the
+written points by up to 0.3 mm of the tool point, which is not replayed.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from opl.cell.robot import Robot
+from opl.geometry.frames import pose
+from opl.program.played import Corner, Corners, ReadMove, Speed, SpeedUnit
+from opl.program.rapid.rounding import DECIMALS
+from opl.program.settings import Array, ProgramSettings
+from opl.program.statements import NUMBER, Listing, Notes, Words, code_lines
+
+# Speed of the move to the first configuration, which has no time: 50 mm/s at the tool point.
+START = 50
+
+_WORDS = Words(
+    passing=re.compile(r'(?:SetDO do[0-9]+, ?[01]|TPWrite "[^"]*"|TPErase) ?;', re.I),
+    waits=re.compile(
+        rf"(?:WaitTime {NUMBER}|Stop"
+        rf"|WaitDI di[0-9]+, ?[01](?: ?\\MaxTime ?:= ?{NUMBER} ?\\TimeFlag ?:= ?late)?) ?;",
+        re.I,
+    ),
+    opens=re.compile(r"WHILE late DO", re.I),
+    closes=re.compile(r"ENDWHILE", re.I),
+    call=re.compile(r"([A-Za-z]\w*) ?;"),
+)
+_ROW = rf"\[((?:{NUMBER},)*{NUMBER})\]"
+_NO_AXES = r"\[9E9(?:,9E9){5}\]"
+_REST = rf",v([0-9]+)(?:\\T:=({NUMBER}))?,(fine|z[0-9]+),(\w+);"
+_ABSOLUTE = re.compile(rf"MoveAbsJ\[{_ROW},{_NO_AXES}\](?:\\NoEOffs)?{_REST}", re.I)
+_LINE = re.compile(rf"MoveL\[{_ROW},{_ROW},{_ROW},{_NO_AXES}\]{_REST}", re.I)
+_FINEST_ZONE = 0.3  # z0 in [mm] of the tool point; the others are named after theirs
+_HALF_DIGIT = np.full(6, 0.5 * np.deg2rad(10.0**-DECIMALS))
+# What the digits of a pose may do to a joint in [rad], in no singularity.
+_POSE_DIGITS = np.full(6, 1e-4)
+
+
+def parse(text: str, source: str) -> Listing:
+    """Return the program of a module.
+
+    Args:
+        text: Of the file.
+        source: The file, for messages.
+
+    Raises:
+        InputError: If it holds no procedure.
+    """
+    notes = Notes(source, _WORDS)
+    passed = 0  # of the lines that enclose the procedure
+    free = False  # whether ConfL is off
+    line = 0
+    for line, code in code_lines(text, "!"):
+        if passed < len(_FRAME) and (found := _FRAME[passed].fullmatch(code)):
+            passed += 1
+            if passed == _INSIDE:
+                notes.name = found["name"]
+        elif passed == _INSIDE - 1 and _VARIABLE.fullmatch(code):
+            continue
+        elif passed != _INSIDE:
+            notes.doubt(line, f"{code} stands outside of the procedure")
+        elif switch := _CONF.fullmatch(code):
+            free = switch[1].lower() == "off"
+            notes.setting(line, code)
+        else:
+            _statement(notes, line, code, free)
+    if passed < len(_FRAME):
+        notes.doubt(line, "the module does not end")
+    return notes.listing(line)
+
+
+_FRAME = (
+    re.compile(r"MODULE \w+", re.I),
+    re.compile(r"PROC (?P<name>\w+) ?\( ?\)", re.I),
+    re.compile(r"ENDPROC", re.I),
+    re.compile(r"ENDMODULE", re.I),
+)
+_INSIDE = 2  # lines of them before the statements of the procedure
+_VARIABLE = re.compile(r"VAR bool late ?:= ?FALSE ?;", re.I)
+_CONF = re.compile(r"ConfL ?\\(On|Off) ?;", re.I)
+
+
+def _statement(notes: Notes, line: int, code: str, free: bool) -> None:
+    tight = code.replace(" ", "")
+    if found := _ABSOLUTE.fullmatch(tight):
+        angles, *rest = found.groups()
+        target = _numbers(angles)
+        if len(target) == 6:
+            move = _move(notes, line, np.deg2rad(target), rest, straight=False)
+            notes.move(line, code, move, tight)
+            return
+    elif found := _LINE.fullmatch(tight):
+        at, turned, quarters, *rest = found.groups()
+        p, quaternion, turns = _numbers(at), _numbers(turned), _numbers(quarters)
+        if (len(p), len(quaternion), len(turns)) == (3, 4, 4):
+            if not free:
+                notes.doubt(line, "MoveL stands where ConfL is not off")
+            if abs(np.linalg.norm(quaternion) - 1.0) > 1e-4:
+                notes.doubt(line, "the quaternion is not of length 1")
+                return
+            w, *xyz = quaternion
+            T = pose(Rotation.from_quat([*xyz, w]).as_matrix(), p * 1e-3)
+            cf = tuple(int(turn) for turn in turns[:3])
+            move = _move(notes, line, T, rest, straight=True, quarters=cf)
+            notes.move(line, code, move, tight)
+            return
+    notes.other(line, code)
+
+
+def _move(
+    notes: Notes,
+    line: int,
+    target: Array,
+    rest: list[str],
+    straight: bool,
+    quarters: tuple[int, ...] = (),
+) -> ReadMove:
+    v, time, zone, tool = rest
+    if time is None:
+        if notes.begun:
+            notes.doubt(line, "a move after the first one needs its time (argument T)")
+        speed = Speed(SpeedUnit.TOOL_POINT, float(v) * 1e-3, f"v{v}")
+    else:
+        speed = Speed(SpeedUnit.SECONDS, float(time), f"\\T:={time}")
+    zone = zone.lower()
+    size = 0.0 if zone == "fine" else float(zone[1:]) or _FINEST_ZONE
+    return ReadMove(
+        target=target,
+        straight=straight,
+        speed=speed,
+        corner=Corner(size, zone),
+        tool=tool.lower(),
+        place=notes.place(line),
+        resolution=_POSE_DIGITS if straight else _HALF_DIGIT,
+        quarters=quarters,
+    )
+
+
+def _numbers(text: str) -> Array:
+    return np.array([float(number) for number in text.split(",")])
+
+
+def start_speed(robot: Robot) -> Speed:
+    """Return the fastest first move."""
+    return Speed(SpeedUnit.TOOL_POINT, START * 1e-3, f"v{START}")
+
+
+def corners(settings: ProgramSettings) -> Corners:
+    """Return the largest zones: the finest there is wherever the robot need not stop."""
+    zone = Corner(_FINEST_ZONE, "z0")
+    return Corners(Corner(0.0, "fine"), zone, zone, zone)
