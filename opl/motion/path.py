@@ -35,7 +35,7 @@ class GrindingPath:
     @property
     def joint_ranges(self) -> Array:
         """Largest minus smallest value of each joint in [rad], shape (6,)."""
-        return np.ptp(self.q, axis=0)
+        return np.asarray(np.ptp(self.q, axis=0))
 
     @property
     def joint_range_sum(self) -> float:
@@ -55,4 +55,4 @@ class GrindingPath:
     @property
     def _on_wheel(self) -> np.ndarray:
         """Which moves stay on the wheel, shape (n - 1,)."""
-        return np.diff(self.pass_index) == 0
+        return np.asarray(np.diff(self.pass_index) == 0)

@@ -37,7 +37,7 @@ class Sampled:
     from_start: bool
 
 
-class _Asked(base.MotionValidator):
+class _Asked(base.MotionValidator):  # type: ignore[misc]
     """Asks whether moves are free, and keeps account of what each tree has reached."""
 
     def __init__(

@@ -177,7 +177,7 @@ def _path_speed(
     while True:
         near = maximum_filter1d(hot.astype(int), 2 * around + 1, mode="constant")
         edges = np.flatnonzero(np.diff(near, prepend=0, append=0))
-        path_speed = steady.copy()
+        path_speed: Array = steady.copy()
         for start, end in edges.reshape(-1, 2):
             part = slice(start, end + 1)
             found = _fastest_path_speed(
@@ -241,7 +241,7 @@ def require_limits(law: TimeLaw, limits: JointLimits) -> None:
             )
 
 
-class _Place(AbstractGeometricPath):
+class _Place(AbstractGeometricPath):  # type: ignore[misc]
     """All that toppra asks of a path whose constraint brings its own derivatives."""
 
     def __init__(self, place: Array) -> None:
@@ -256,7 +256,7 @@ class _Place(AbstractGeometricPath):
         return self._ends
 
 
-class _Limits(LinearConstraint):
+class _Limits(LinearConstraint):  # type: ignore[misc]
     """Speed and acceleration of all joints, at both ends of each piece of the grid.
 
     toppra's own constraint takes second derivatives at the grid alone; where they jump, it would

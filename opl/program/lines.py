@@ -72,7 +72,7 @@ def stray(robot: Robot, q: Array, T_flange_tool: Array, corners: Array) -> Array
     apart = transform(Ts_joint[..., None, :, :], corners) - transform(
         Ts_straight[..., None, :, :], corners
     )
-    return np.linalg.norm(apart, axis=-1).max(axis=(0, 2))
+    return np.asarray(np.linalg.norm(apart, axis=-1).max(axis=(0, 2)))
 
 
 def _straight(Ts_start: Array, Ts_end: Array) -> Array:

@@ -50,7 +50,8 @@ class SpeedRange:
         lowest, highest = round(self.lowest * digits), round(self.highest * digits)
         below = math.floor(min(max(exact, lowest), highest))
         candidates = [min(max(n, lowest), highest) / digits for n in (below, below + 1)]
-        return min(candidates, key=lambda value: abs(way / value - time))
+        nearest: float = min(candidates, key=lambda value: abs(way / value - time))
+        return nearest
 
 
 def speeds_keeping_time(

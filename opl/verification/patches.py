@@ -43,7 +43,8 @@ class Patches:
         way out, as well: along the normal of that plane there is one.
         """
         distance, outward = drum.distances(transform(T_base_workpiece, self.middle))
-        return distance - (np.abs(outward @ T_base_workpiece[:3, :3]) * self.half).sum(axis=1)
+        reach = (np.abs(outward @ T_base_workpiece[:3, :3]) * self.half).sum(axis=1)
+        return np.asarray(distance - reach)
 
 
 def _halved(triangles: Array) -> Iterator[Array]:

@@ -80,7 +80,7 @@ class Ways:
             ground: Indices of the chosen touches, in order.
             allowed: Distance from the contact model that every posture of a way should keep in [m].
         """
-        chosen = ground.copy()
+        chosen: NDArray[np.intp] = ground.copy()
         for m in range(1, len(chosen)):
             if not self._goes_on(chosen, m) or self._farthest(chosen, m) <= allowed:
                 continue

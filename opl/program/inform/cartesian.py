@@ -116,7 +116,8 @@ def require_read_back(robot: Robot, q: Array, values: str, numbers: tuple[int, .
             raise _untold(robot, q, joint, f"{np.rad2deg(other[joint]):.1f} deg")
     if not len(found):
         raise _untold(robot, q, 4, "a posture out of reach")
-    return found[0]
+    posture: Array = found[0]
+    return posture
 
 
 def _untold(robot: Robot, q: Array, joint: int, other: str) -> UnsafeError:
