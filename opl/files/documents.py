@@ -47,7 +47,8 @@ class _Loader(yaml.CSafeLoader if hasattr(yaml, "CSafeLoader") else yaml.SafeLoa
                 message = f"key {key!r} is given twice"
                 raise yaml.constructor.ConstructorError(None, None, message, node_of_key.start_mark)
             seen.append(key)
-        return super().construct_mapping(node, deep)
+        made: dict[Any, Any] = super().construct_mapping(node, deep)
+        return made
 
 
 # YAML 1.1 takes 1e-05 for text, which is how JSON writes 0.00001
@@ -216,7 +217,7 @@ def model_in(annotation: Any) -> Any:
 def _seen(value: object) -> str:
     """Return a value as it stands in the file, as far as one line can tell."""
     if value is None or isinstance(value, (bool, float)):
-        text = yaml.safe_dump(value).splitlines()[0]
+        text = str(yaml.safe_dump(value)).splitlines()[0]
     else:
         text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
