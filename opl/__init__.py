@@ -25,7 +25,8 @@ first used, so ``import opl`` costs next to nothing. The folder ``examples`` sho
 Jobs
     `load_job` makes a `Job` of a file or a mapping; surface and part may be made by a program, as
     `NurbsSurface` and `TriangleMesh`. `start_job` copies an example. `json_schema` is for editors,
-    `keys_page` for people; `keys` are the key paths that messages name. `describe_job` says what a run would do.
+    `keys_page` for people; `keys` are the key paths that messages name. `describe_job` says what a
+    run would do.
 Runs
     `run_job`, or its stages `cut_surface`, `plan_path`, `verify_motion` and `write_program`, which
     make `Surfaced`, `Prepared` and `Planned`, `Proven`, and a `Run`: `Written` or `Refused`.
