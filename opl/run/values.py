@@ -79,7 +79,7 @@ class Planned:
         plan: The path, and its motion as planned.
         compared: The figures of this path and of those that it is compared with, by what they are:
             ``fixed``, ``paper_start``, ``recursive``, ``optimal``; those that exist.
-        timing: The motion in the digits of the program, with its times.
+        timing: The motion in the digits of the program, its times, and what sets them.
         slow: Where the ground point is slower than the feed.
     """
 

@@ -160,17 +160,20 @@ def test_without_a_path_the_comparison_is_reached(tmp_path, monkeypatch):
 
 
 def test_a_belt_that_dwells_too_long_leaves_the_plan_and_no_program(job):
-    pace = replace(job.pace, max_dwell=1e-6, contact_speed=0.5)
-    report = refused(opl.run_job(replace(job, pace=pace)), "no_path", opl.Planned, opl.NoPathError)
+    process = replace(job.process, max_dwell=1e-6, contact_speed=0.5)
+    report = refused(
+        opl.run_job(replace(job, process=process)), "no_path", opl.Planned, opl.NoPathError
+    )
     assert report.path is not None and report.feed.lowered and report.verification is None
 
 
 def test_a_replay_with_findings_is_reported_without_a_program(watched, monkeypatch):
     planned = watched[0].proven.planned
-    motion = planned.timing.motion
-    q = motion.q.copy()
+    timed = planned.timing.timed
+    q = timed.motion.q.copy()
     q[len(q) // 2] += np.deg2rad(5.0)
-    timing = replace(planned.timing, motion=replace(motion, q=q))
+    timed = replace(timed, motion=replace(timed.motion, q=q))
+    timing = replace(planned.timing, timed=timed)
     run = opl.verify_motion(replace(planned, timing=timing))
     report = refused(run, "unsafe", opl.Planned, Verification)
     assert report.verification.file is None and run.error.exit_status == 4
