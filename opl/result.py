@@ -235,6 +235,8 @@ def _program(outcome: Outcome) -> dict[str, Any] | None:
     return {
         "files": list(outcome.files),
         "sha256": {name: digest(text.encode()) for name, text in outcome.files.items()},
+        # false where the controller's language has no reader: written, nothing more is claimed
+        "read_back": outcome.file is not None,
         "moves": len(outcome.program.moves),
         "duration_s": round(float(verified.motion.duration.sum()), 3),
         "passes": [

@@ -137,6 +137,11 @@ def _facts(outcome: Outcome) -> Iterator[str]:
             f"{found.max_contact_error * 1e3:.3f} mm at most, "
             f"{found.limit_violations} limit violations"
         )
+    if outcome.file is None and outcome.program is not None:
+        yield (
+            f"written, not read back: opl has no reader for {outcome.job.program.controller}, so "
+            "nothing is proven of the file itself"
+        )
     if outcome.file is not None and outcome.file.proven:
         yield (
             f"read back from {', '.join(outcome.file.files)}: {outcome.file.postures} postures, "

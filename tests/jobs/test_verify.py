@@ -240,6 +240,13 @@ def test_full_speed_on_the_wheel_is_found(tmp_path):
     assert refuses(ended, "speed at pass 1", "times the feed")
 
 
+@pytest.mark.parametrize("line", ["TIMER T=2.00", "WAIT IN#(1)=ON", "PAUSE"])
+def test_standing_still_on_the_wheel_is_found(tmp_path, line):
+    text = Text().replace(rf"(MOVJ C{ground(20):05d} .*\r\n)", rf"\1{line}\r\n")
+    ended = verify(tmp_path, text)
+    assert refuses(ended, "wait at pass 1, cutter point 20", "stands still on the wheel", line)
+
+
 def test_a_fast_first_move_and_rounded_corners_are_found(tmp_path):
     text = Text().replace(r"C00000 VJ=5.00", "C00000 VJ=50.00")
     text.replace(r"(C00001 VJ=\S+) PL=0", r"\1 PL=8")
