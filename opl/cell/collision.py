@@ -1,4 +1,4 @@
-"""Whether robot, held part or fixture touch anything at a posture, by pinocchio and coal.
+"""Whether robot, held part or fixture touch anything at a configuration, by pinocchio and coal.
 
 Part against wheel is not checked here: that pair may touch, and has a closed form in
 `opl.cell.wheel_distance`. A collision is a yes or a no, never a cost.
@@ -103,7 +103,8 @@ class CollisionScene:
     def levers(self) -> Array:
         """Return how far from each joint's axis anything it moves can be, in [m], shape (6,).
 
-        In any posture: when joint k turns by d [rad], no point moves farther than d times lever k.
+        In any configuration: when joint k turns by d [rad], no point moves farther than d times
+            lever k.
         """
         model = self._model
         data = model.createData()
@@ -129,7 +130,7 @@ class CollisionScene:
         return levers
 
     def collides(self, q: Array) -> np.ndarray:
-        """Return which postures collide.
+        """Return which configurations collide.
 
         Args:
             q: Joint positions in [rad], shape (n, 6).
@@ -137,10 +138,10 @@ class CollisionScene:
         Returns:
             Shape (n,) of bool.
         """
-        return np.array([self._compute(posture, True) for posture in q], dtype=bool)
+        return np.array([self._compute(configuration, True) for configuration in q], dtype=bool)
 
     def colliding_pairs(self, q: Array) -> list[Pair]:
-        """Return the names of every pair in collision at one posture, shape (6,)."""
+        """Return the names of every pair in collision at one configuration, shape (6,)."""
         results = self._geometry_data.collisionResults
         for result in results:
             result.clear()  # the broad phase leaves those of the pairs it passes over as they were
@@ -201,11 +202,11 @@ class CollisionScene:
 
 
 def enclosing_bodies(cell: WorkCell, q: Array) -> list[tuple[str, str]]:
-    """Return flange or part with each obstacle they are inside of, at one posture, shape (6,).
+    """Return flange or part with each obstacle they are inside of, at ``q``, shape (6,).
 
     Collisions with a mesh are collisions with its triangles: whoever is wholly inside touches none
     of them. A motion that starts outside of a mesh and never meets its surface stays outside, so it
-    is enough to look at one posture.
+    is enough to look at one configuration.
     """
     T_base_flange = forward_kinematics(cell.robot, q)
     p_base_part = transform(T_base_flange @ cell.T_flange_workpiece, cell.part.vertices[0])

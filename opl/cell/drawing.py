@@ -20,7 +20,7 @@ _CIRCLE = 48  # corners of a drawn circle
 
 @dataclass(frozen=True, eq=False)
 class DrawnArm:
-    """An arm at its zero posture, in the base frame.
+    """An arm at its zero configuration, in the base frame.
 
     Attributes:
         outlines: Of each collision shape the joint that moves it, 0 for the foot, and points whose
@@ -38,7 +38,7 @@ class DrawnArm:
 
 
 def drawn_arm(robot: Robot) -> DrawnArm:
-    """Return what there is to draw of a robot at its zero posture."""
+    """Return what there is to draw of a robot at its zero configuration."""
     model, geometry = collision_shapes(robot)
     data, shapes = model.createData(), geometry.createData()
     pin.computeJointJacobians(model, data, np.zeros(6))

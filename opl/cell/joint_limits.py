@@ -16,8 +16,8 @@ import numpy as np
 
 from opl.geometry.frames import Array, read_only
 
-# [rad] postures are rounded to what a program can express before they are proven; pulses and digits
-# are finer than this, for each joint in the sum
+# [rad] configurations are rounded to what a program can express before they are proven; pulses and
+# digits are finer than this, for each joint in the sum
 ROUNDING = np.deg2rad(0.01)
 
 
@@ -41,7 +41,7 @@ class JointLimit:
         object.__setattr__(self, "coefficients", read_only(self.coefficients))
 
     def holds(self, q: Array) -> np.ndarray:
-        """Return which postures, shape (..., 6) in [rad], keep it; none with NaN; shape (...)."""
+        """Return which ``q``, shape (..., 6) in [rad], keep it; none with NaN; shape (...)."""
         total = q @ self.coefficients
         margin = ROUNDING * np.abs(self.coefficients).sum()
         return np.asarray((total >= self.lower + margin) & (total <= self.upper - margin))

@@ -16,8 +16,8 @@ So, with w where axes 5 and 6 meet,
 
 That w lies b to the left of axis 1 fixes theta1; how far z_flange leaves the plane of the three
 parallel axes fixes theta5, and its direction in that plane how the wrist is tilted. What is left is
-the triangle of axes 2, 3 and 4. Two answers each at shoulder, wrist and elbow make eight postures.
-The derivation is our own; EAIK is the second opinion of the tests.
+the triangle of axes 2, 3 and 4. Two answers each at shoulder, wrist and elbow make eight
+configurations. The derivation is our own; EAIK is the second opinion of the tests.
 """
 
 from __future__ import annotations

@@ -145,10 +145,10 @@ def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
 
 
 def forward_kinematics(robot: Robot, q: Array) -> Array:
-    """Return the flange poses Ts_base_flange of postures.
+    """Return the flange poses Ts_base_flange of configurations.
 
     Args:
-        robot: Whose postures.
+        robot: Whose configurations.
         q: Joint positions in [rad], shape (..., 6).
 
     Returns:
@@ -157,16 +157,16 @@ def forward_kinematics(robot: Robot, q: Array) -> Array:
     model = _model(robot.urdf)
     data = model.createData()
     base, flange = model.getFrameId("base"), model.getFrameId("tool0")
-    postures = np.asarray(q, dtype=float).reshape(-1, N_JOINTS)
-    Ts_base_flange = np.empty((len(postures), 4, 4))
-    for T_base_flange, posture in zip(Ts_base_flange, postures, strict=True):
-        pin.framesForwardKinematics(model, data, posture)
+    configurations = np.asarray(q, dtype=float).reshape(-1, N_JOINTS)
+    Ts_base_flange = np.empty((len(configurations), 4, 4))
+    for T_base_flange, configuration in zip(Ts_base_flange, configurations, strict=True):
+        pin.framesForwardKinematics(model, data, configuration)
         T_base_flange[:] = data.oMf[base].actInv(data.oMf[flange]).homogeneous
     return Ts_base_flange.reshape(*np.shape(q)[:-1], 4, 4)
 
 
 def controller_poses(robot: Robot, q: Array) -> Array:
-    """Return the flange poses of postures as the maker's controller counts them.
+    """Return the flange poses of configurations as the maker's controller counts them.
 
     As `forward_kinematics`, from the controller's own base frame instead of opl's.
     """
@@ -218,7 +218,7 @@ def _check_urdf(robot: Robot) -> None:
 
 
 def _arm_fits_urdf(robot: Robot) -> bool:
-    """Return whether the closed form finds postures again that the URDF was put in."""
+    """Return whether the closed form finds configurations again that the URDF was put in."""
     fractions = np.array([[0.3, 0.6, 0.4, 0.7, 0.2, 0.6], [0.8, 0.3, 0.7, 0.4, 0.6, 0.3]])
     q = robot.lower + fractions * (robot.upper - robot.lower)  # any two
     found = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)

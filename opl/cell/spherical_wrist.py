@@ -15,7 +15,7 @@ So, with p the wrist centre,
     p = p_base_flange - c4 z_flange.
 
 The position of p fixes theta1 to theta3 in a triangle; the orientation left over fixes theta4 to
-theta6. Two answers each at shoulder, elbow and wrist make eight postures, in slots
+theta6. Two answers each at shoulder, elbow and wrist make eight configurations, in slots
 ``4 * flip + 2 * back + elbow`` that keep their meaning along a path. The parameters are those of
 Brandstoetter, Angerer and Hofbaur (2014); the derivation beside the code is our own.
 """
@@ -74,7 +74,8 @@ class SphericalWristArm:
             y: As x.
             z: As x.
             p: Its origins in [m], shape (3, n).
-            near: Angles of a posture nearby in [rad], shape (6, n): theta4 of the straight wrist.
+            near: Angles of a configuration nearby in [rad], shape (6, n): theta4 of the straight
+                wrist.
 
         Returns:
             Six arrays that broadcast to (2 flip, 2 back, 2 elbow, n), in [rad]; NaN out of reach.

@@ -1,4 +1,4 @@
-"""The triangle of an arm's two long links: the two postures that bring its far end to a place."""
+"""The triangle of an arm's two long links: both ways to bring its far end to a place."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """From the joint axes of a URDF to the closed form of its arm.
 
-All is read off the zero posture, where every axis is a line in space. In the drawings of
+All is read off the zero configuration, where every axis is a line in space. In the drawings of
 `opl.cell.spherical_wrist` and `opl.cell.parallel_axes`: axis 1 gives z, axis 2 the side y of the
 arm, the line from axis 2 to axis 3 the tilt of the upper arm, axis 4 or the line to it that of the
 forearm, axes 5 and 6 the wrist. What a drawing leaves open (the same arm seen from behind, or with
@@ -94,9 +94,9 @@ def _spherical_wrist(
 
     Args:
         where: The file, for messages.
-        axes: Directions of the joint axes at the zero posture, shape (6, 3).
+        axes: Directions of the joint axes at the zero configuration, shape (6, 3).
         points: A point on each in [m], shape (6, 3).
-        T_root_flange: The flange at the zero posture, shape (4, 4).
+        T_root_flange: The flange at the zero configuration, shape (4, 4).
     """
     x_tool, z_tool = T_root_flange[:3, 0], T_root_flange[:3, 2]
     z = np.array([0.0, 0.0, 1.0])

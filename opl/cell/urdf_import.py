@@ -26,7 +26,7 @@ from opl.cell.xacro_file import SUFFIX, expand
 from opl.errors import InputError
 
 N_CHECKED = 500
-# Farthest that a posture found may be from its pose: what rounded right angles cost.
+# Farthest that a configuration found may be from its pose: what rounded right angles cost.
 CLOSURE = 2e-5  # [m], and as much in the entries of the rotation matrix
 # Stands for a speed that the URDF does not give: slow, for programs use a share of it.
 SLOW = np.deg2rad(10.0)
@@ -42,7 +42,8 @@ class ImportedRobot:
     Attributes:
         robot: The robot, as a job would load it.
         files: What was written.
-        closure: Largest error of FK(IK) over random postures, in [m] and in entries of rotations.
+        closure: Largest error of FK(IK) over random configurations, in [m] and in entries of
+            rotations.
         cautions: What the user should put right in ``robot.yaml``, one line each.
     """
 
@@ -116,10 +117,10 @@ def _read(urdf: Path) -> tuple[UrdfTree, UrdfArm]:
 
 
 def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:
-    """Return the largest error of FK(IK) over random postures within the limits.
+    """Return the largest error of FK(IK) over random configurations within the limits.
 
-    Infinite if a posture is not found again at all, apart from full turns; next to singularities,
-    where rounded right angles move joints far, that does not count.
+    Infinite if a configuration is not found again at all, apart from full turns; next to
+    singularities, where rounded right angles move joints far, that does not count.
     """
     q = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (n, 6))
     Ts_base_flange = forward_kinematics(robot, q)

@@ -105,14 +105,14 @@ class WorkCell:
         )
 
     def within_limits(self, q: Array) -> np.ndarray:
-        """Return which postures, shape (..., 6) in [rad], keep every limit, shape (...)."""
+        """Return which configurations, shape (..., 6) in [rad], keep every limit, shape (...)."""
         kept = ((q >= self.robot.lower) & (q <= self.robot.upper)).all(axis=-1)
         for limit in self.limits:
             kept &= limit.holds(q)
         return np.asarray(kept)
 
     def broken_limits(self, q: Array) -> list[str]:
-        """Return the names of the limits that any of the postures, shape (..., 6), breaks."""
+        """Return the names of the limits that any of the configurations, shape (..., 6), breaks."""
         q = q.reshape(-1, 6)
         beyond = ((q < self.robot.lower) | (q > self.robot.upper)).any(axis=0)
         names = [self.robot.joint_names[joint] for joint in np.flatnonzero(beyond)]

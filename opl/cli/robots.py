@@ -84,7 +84,8 @@ def import_description(file: Path, name: str, out: Path, maker: str, base: str) 
 
     The arm has a spherical wrist, or three parallel axes in the middle as those of Universal
     Robots. The closed form of its inverse kinematics is read off the joint axes and checked on
-    random postures. Meshes are copied. A frame base in the URDF is taken for the controller's own.
+    random configurations. Meshes are copied. A frame base in the URDF is taken for the controller's
+    own.
 
     Example: opl robots import-urdf my_arm.urdf --name my_arm --out robots/my_arm
     """
@@ -93,7 +94,7 @@ def import_description(file: Path, name: str, out: Path, maker: str, base: str) 
         f"{made.robot.name}: arm with {opl.read_robot_file(made.files[0]).arm.family}, "
         f"reach {made.robot.reach * 1e3:.0f} mm"
     )
-    click.echo(f"FK(IK) closes within {made.closure:.1g} on random postures")
+    click.echo(f"FK(IK) closes within {made.closure:.1g} on random configurations")
     for line in made.cautions:
         click.echo(f"caution: {line}", err=True)
     for path in made.files:

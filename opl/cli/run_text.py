@@ -85,17 +85,22 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
         yield f"verified in {_REPLAYED.format(**vars(found))}"
         if found.file is not None and found.file.proven:
             yield (
-                f"read back from {', '.join(found.file.files)}: {found.file.postures} postures, "
-                "moves and speeds as proven"
+                f"read back from {', '.join(found.file.files)}: {found.file.postures} "
+                "configurations, moves and speeds as proven"
             )
     if program is not None:
+        if not program.read_back:
+            yield (
+                f"written, not read back: opl has no reader for {job.program.controller}, so "
+                "nothing is proven of the file itself"
+            )
         worst = max((abs(one.error_percent) for one in program.passes), default=0.0)
         yield f"program: {program.moves} moves, passes within {worst:.2f} % of their time"
         yield from _times(report, job.cell.robot.title)
         yield from _caution(
             report.robot.unverified_pulse_ratios,
             job.cell.robot.title,
-            "compare a posture at the pendant before playing",
+            "compare a configuration at the pendant before playing",
         )
 
 

@@ -233,8 +233,8 @@ class ProgramSection(Document):
             if self.positions != "pulses" and not isinstance(robot.arm, SphericalWristArm):
                 raise InputError(
                     source.at("program.positions"),
-                    f"must be pulses: poses of {self.controller} name a posture as that of an arm "
-                    f"with a spherical wrist, which {robot.title} has not",
+                    f"must be pulses: poses of {self.controller} name a configuration as that of "
+                    f"an arm with a spherical wrist, which {robot.title} has not",
                 )
             return
         own = (

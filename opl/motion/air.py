@@ -22,7 +22,7 @@ from opl.motion.process import ProcessSettings
 
 
 class UnreachableApproachError(Exception):
-    """The postures that lead to or from the wheel do not exist.
+    """The configurations that lead to or from the wheel do not exist.
 
     Args:
         column: The cutter point.
@@ -39,12 +39,12 @@ class BlockedLinkError(Exception):
     """The robot cannot come from one place off the wheel to the next.
 
     Args:
-        move: Index in the motion of the posture that it cannot come to.
+        move: Index in the motion of the configuration that it cannot come to.
         error: Why.
     """
 
     def __init__(self, move: int, error: NoLinkError) -> None:
-        super().__init__(f"way to posture {move}: {error}")
+        super().__init__(f"way to configuration {move}: {error}")
         self.move = move
         self.error = error
 
@@ -130,7 +130,7 @@ def lead(
     contact_position: float,
     q_contact: Array,
 ) -> Array:
-    """Return postures from just off the wheel to the far end of a lead, shape (k, 6).
+    """Return configurations from just off the wheel to the far end of a lead, shape (k, 6).
 
     Args:
         cell: The cell.
@@ -140,7 +140,7 @@ def lead(
         ik_branch: Slot of the inverse kinematics.
         column: The cutter point that is ground.
         contact_position: Where on the wheel.
-        q_contact: The posture that grinds it in [rad], shape (6,).
+        q_contact: The configuration that grinds it in [rad], shape (6,).
 
     Raises:
         UnreachableApproachError: If it leaves reach or limits.

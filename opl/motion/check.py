@@ -1,4 +1,4 @@
-"""Is a whole motion free of collision, at its postures and between them?"""
+"""Is a whole motion free of collision, at its configurations and between them?"""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.motion.motion import Motion
 
-RESOLUTION = np.deg2rad(1.0)  # largest joint change between two postures that are asked
+RESOLUTION = np.deg2rad(1.0)  # largest joint change between two configurations that are asked
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class Fault:
     """A move that collides.
 
     Attributes:
-        move: Index of the posture that the move ends at.
+        move: Index of the configuration that the move ends at.
         pair: Names of the two bodies.
-        at_end: Whether the posture itself collides, not only the way to it.
+        at_end: Whether the configuration itself collides, not only the way to it.
     """
 
     move: int
@@ -32,15 +32,15 @@ class Fault:
 
 
 def densify(q: Array, resolution: float) -> tuple[Array, np.ndarray]:
-    """Put postures on the joint lines between postures.
+    """Put configurations on the joint lines between configurations.
 
     Args:
         q: Joint positions in [rad], shape (n, 6).
         resolution: Largest change of any joint between two of the result in [rad].
 
     Returns:
-        Postures, shape (m, 6), ending with the last; and for each the index of the move that it
-        belongs to (the posture that the move ends at), shape (m,).
+        Configurations, shape (m, 6), ending with the last; and for each the index of the move that
+        it belongs to (the configuration that the move ends at), shape (m,).
     """
     counts = np.maximum(np.ceil(np.abs(np.diff(q, axis=0)).max(axis=1) / resolution), 1).astype(int)
     move = np.repeat(np.arange(1, len(q)), counts)

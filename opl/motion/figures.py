@@ -57,7 +57,7 @@ def figures_of_path(
 def figures_of_points(
     q: Array, points: CutterPoints, process: ProcessSettings, robot: Robot
 ) -> Figures:
-    """Return the figures of a contact-fixed path, one posture per cutter point, shape (N, 6)."""
+    """Return the figures of a contact-fixed path, one ``q`` per cutter point, shape (N, 6)."""
     on_wheel = np.diff(points.pass_index) == 0
     turned = np.abs(np.diff(q, axis=0))
     arc = np.abs(np.diff(points.arc_length))

@@ -1,9 +1,9 @@
 """Is a straight joint move free of collision all along, and not only where one looks?
 
 No point of the robot or the part moves farther than the joints turn times their levers. So a
-posture that keeps a distance d beyond its clearance from all that stands still frees every posture
-that no point moves d away from. A move is cut into pieces that their middle frees, long ones first;
-where a piece is too near for that, it is cut again.
+configuration that keeps a distance d beyond its clearance from all that stands still frees every
+configuration that no point moves d away from. A move is cut into pieces that their middle frees,
+long ones first; where a piece is too near for that, it is cut again.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class FreeMoves:
     """
 
     def __init__(self, cell: WorkCell, scene: CollisionScene, part: PartTree) -> None:
-        self.asked = 0  # postures
+        self.asked = 0  # configurations
         self.levers = scene.levers()
         self._cell = cell
         self._scene = scene
@@ -48,14 +48,14 @@ class FreeMoves:
         }
 
     def free(self, start: Array, end: Array) -> bool:
-        """Return whether the move between two postures, shape (6,), is free and within limits."""
+        """Return whether the move between two ``q``, shape (6,), is free and within limits."""
         if not self._cell.within_limits(np.stack([start, end])).all():
             return False  # limits are linear in the joints: what both ends keep, the move keeps
         dense, _ = densify(np.stack([start, end]), RESOLUTION)
         # the middle first, then the quarters: a move that is not free is mostly known so sooner
-        for posture in dense[_halving(len(dense))]:
+        for configuration in dense[_halving(len(dense))]:
             self.asked += 1
-            if self._scene.collides(posture[None])[0]:
+            if self._scene.collides(configuration[None])[0]:
                 return False
         if self._too_near_wheel(dense, 0.0).any():
             return False
@@ -69,7 +69,7 @@ class FreeMoves:
         return False
 
     def pair_at(self, q: Array) -> Pair | None:
-        """Return the first pair that is too near at a posture, shape (6,), or None."""
+        """Return the first pair that is too near at a configuration, shape (6,), or None."""
         if self._too_near_wheel(q[None], RESERVES[-1])[0]:
             return PART, WHEEL
         return next(
@@ -82,9 +82,9 @@ class FreeMoves:
         )
 
     def first_pair(self, start: Array, end: Array) -> Pair | None:
-        """Return the first pair that is met on the way between two postures, or None."""
+        """Return the first pair that is met on the way between two configurations, or None."""
         dense, _ = densify(np.stack([start, end]), RESOLUTION)
-        pairs = (self.pair_at(posture) for posture in dense)
+        pairs = (self.pair_at(configuration) for configuration in dense)
         return next((pair for pair in pairs if pair is not None), None)
 
     def _near(self, start: Array, end: Array, pieces: Array, reserve: float) -> np.ndarray:
@@ -96,7 +96,7 @@ class FreeMoves:
         return near
 
     def _too_near_wheel(self, q: Array, reserve: float) -> np.ndarray:
-        """Return at which postures, shape (n, 6), the part does not keep away from the wheel."""
+        """Return at which ``q``, shape (n, 6), the part does not keep away from the wheel."""
         needed = self._cell.part_from_wheel + SECOND_OPINION + reserve
         wheel = self._cell.wheel
         Ts_contact0_workpiece = self._cell.Ts_contact0_workpiece(

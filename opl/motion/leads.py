@@ -13,8 +13,8 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.motion.motion import MoveKind
 
-LEAD_SPACING = 0.005  # [m] between postures of a lead: joint lines stay near it
-LEAD_TURN = np.deg2rad(5.0)  # between postures of an arc: chords stay within 0.06 mm of it
+LEAD_SPACING = 0.005  # [m] between configurations of a lead: joint lines stay near it
+LEAD_TURN = np.deg2rad(5.0)  # between configurations of an arc: chords stay within 0.06 mm of it
 
 
 def lead_count(length: float, turn: float) -> int:

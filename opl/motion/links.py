@@ -3,7 +3,7 @@
 The straight joint move is taken where it is free. Where it is not, a way of several straight moves
 is sought by sampling. A search that ends without one proves nothing, but costs seconds; so its ends
 are remembered. Whatever is joined to an end by a free straight move cannot do better than that end,
-and a posture that could not be joined with several others is taken to be shut in.
+and a configuration that could not be joined with several others is taken to be shut in.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from opl.geometry.frames import Array
 from opl.motion.free_moves import FreeMoves
 from opl.motion.sampling import fewest, sample_way
 
-MOST_ASKED = 60_000  # postures, of one search
-MOST_IN_VAIN = 4  # searches from one posture before it is taken to be shut in
+MOST_ASKED = 60_000  # configurations, of one search
+MOST_IN_VAIN = 4  # searches from one configuration before it is taken to be shut in
 MOST_NAMED = 100  # refused moves that are asked what is in their way
 # [rad] that a way may lead beyond both of its ends; less than half a turn of a wrist axis never was
 # seen to be too little, and the whole of its limits is much to search
@@ -31,7 +31,7 @@ Blocker = tuple[str, ...]
 
 
 class NoLinkError(Exception):
-    """No free way between two postures was found.
+    """No free way between two configurations was found.
 
     Args:
         pair: The two bodies that are in the way, most often where there are several; or what else
@@ -61,10 +61,10 @@ class Links:
         return FreeMoves(self.cell, self.scene, self.part)
 
     def find(self, start: Array, goal: Array) -> Array:
-        """Return the postures to visit between two postures, shape (n, 6); none if it is free.
+        """Return the configurations to visit between two, shape (n, 6); none if it is free.
 
         Args:
-            start: A posture in [rad], shape (6,).
+            start: A configuration in [rad], shape (6,).
             goal: Another.
 
         Raises:
@@ -76,7 +76,7 @@ class Links:
         return self._found[key]
 
     def joined(self, first: Array, second: Array) -> bool:
-        """Return whether the straight move between two postures is free."""
+        """Return whether the straight move between two configurations is free."""
         return self._moves.free(first, second)
 
     def _find(self, start: Array, goal: Array) -> Array:
@@ -116,7 +116,7 @@ class Links:
         return None
 
     def _shut_in(self, q: Array) -> Blocker | None:
-        """Return what shuts a posture in, if enough searches from it were in vain."""
+        """Return what shuts a configuration in, if enough searches from it were in vain."""
         pairs = [
             pair for one, other, pair in self._in_vain if (q == one).all() or (q == other).all()
         ]

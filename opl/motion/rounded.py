@@ -1,9 +1,10 @@
-"""A line through postures with its corners rounded, as a controller goes through it.
+"""A line through configurations with its corners rounded, as a controller goes through it.
 
-Straight from posture to posture, the joints would change their speeds in no time. A controller
-overlaps the end of a move with the beginning of the next; so does this line: around each posture
-the speeds change evenly, for half of the shorter of its two moves on either side. It leaves the
-straight line by no more than an eighth of what the two moves differ, and never swings beyond it.
+Straight from configuration to configuration, the joints would change their speeds in no time. A
+controller overlaps the end of a move with the beginning of the next; so does this line: around each
+configuration the speeds change evenly, for half of the shorter of its two moves on either side. It
+leaves the straight line by no more than an eighth of what the two moves differ, and never swings
+beyond it.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ class RoundedLine:
     Between knots the speeds change linearly, so positions are parabolas.
 
     Attributes:
-        nodes: Place of each posture, shape (n,).
+        nodes: Place of each configuration, shape (n,).
         knots: Where the speeds begin or end to change, ascending, shape (m,).
         q: Joint positions at the knots in [rad], shape (m, 6).
         slope: Their change with the place at the knots in [rad/s], shape (m, 6).
@@ -48,7 +49,7 @@ class RoundedLine:
         """Return the change of the joint positions with the place in [rad/s], shape (k, 6)."""
         return np.stack([np.interp(place, self.knots, joint) for joint in self.slope.T], axis=-1)
 
-    def postures(self, place: Array) -> Array:
+    def configurations(self, place: Array) -> Array:
         """Return the joint positions at places in [rad], shape (k, 6)."""
         last = np.clip(np.searchsorted(self.knots, place, side="right") - 1, 0, len(self.knots) - 1)
         way = (np.asarray(place) - self.knots[last])[:, None]
@@ -71,7 +72,7 @@ class RoundedLine:
 
 
 def rounded_line(q: Array, times: Array) -> RoundedLine:
-    """Round the corners between postures.
+    """Round the corners between configurations.
 
     Args:
         q: Joint positions in [rad], shape (n, 6), n >= 2.

@@ -1,4 +1,4 @@
-"""The fastest way along a line of postures that its wanted times and the joints allow.
+"""The fastest way along a line of configurations that its wanted times and the joints allow.
 
 The law is TOPP-RA's (Pham and Pham, 2018, by toppra): the path speed is as high as its own limit
 (the wanted times) and the speed and acceleration of each joint permit. Between two places of its
@@ -72,22 +72,22 @@ class TimeLaw:
 
     @property
     def node_index(self) -> np.ndarray:
-        """Which place is that of each posture of the line, shape (n,)."""
+        """Which place is that of each configuration of the line, shape (n,)."""
         return np.searchsorted(self.place, self.line.nodes - 1e-12)
 
     @property
     def node_times(self) -> Array:
-        """When it gets to each posture of the line in [s], shape (n,)."""
+        """When it gets to each configuration of the line in [s], shape (n,)."""
         times: Array = self.time[self.node_index]
         return times
 
-    def postures(self, time: Array) -> Array:
+    def configurations(self, time: Array) -> Array:
         """Return the joint positions at times in [rad], shape (k, 6)."""
         at = self.time
         piece = np.clip(np.searchsorted(at, time, side="right") - 1, 0, len(at) - 2)
         spent = time - at[piece]
         change = np.diff(self.path_speed) / np.diff(at)
-        return self.line.postures(
+        return self.line.configurations(
             self.place[piece] + (self.path_speed[piece] + change[piece] * spent / 2.0) * spent
         )
 
@@ -219,13 +219,13 @@ def _fastest_path_speed(
 
 
 def require_limits(law: TimeLaw, limits: JointLimits) -> None:
-    """Refuse a law whose postures, sampled, show more than the limits.
+    """Refuse a law whose configurations, sampled, show more than the limits.
 
     Nothing but positions is looked at: differences of samples never exceed what lies between.
     """
     duration = float(law.time[-1])
     step = min(SAMPLE, duration / 100.0)
-    q = law.postures(np.arange(0.0, duration, step))
+    q = law.configurations(np.arange(0.0, duration, step))
     # what is left of round-off in positions of some radians
     slack = 1e-14 / step ** np.arange(1, 3)
     for order, limit, what in (

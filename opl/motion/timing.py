@@ -23,7 +23,7 @@ from opl.motion.process import ProcessSettings
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, TimeLaw, fastest_law
 
-# Wanted time of a move in [s] below which its end is no posture of its own for the time law.
+# Wanted time of a move in [s] below which its end is no configuration of its own for the time law.
 SHORTEST = 1e-6
 FOLLOWED = 1.01  # a move that takes no longer than this times what is wanted keeps it
 

@@ -209,7 +209,7 @@ class BoxSearch:
         return None
 
     def _bulges(self, matrix: OpenMatrix, rows: np.ndarray, box: JointBox) -> np.ndarray:
-        """Return the columns from which a track steps through postures outside of a box."""
+        """Return the columns from which a track steps through configurations outside of a box."""
         problem = self.refined.problem
         try:
             path = fill_in(problem.cell, problem.points, matrix.nodes, rows, problem.interpolation)

@@ -39,7 +39,7 @@ def no_path(problem: GrindingProblem, matrices: list[OpenMatrix]) -> NoPathError
         )
     n, reached = len(problem.points), max((matrix.reached for matrix in matrices), default=0)
     if reached == 0:
-        where = f"no path: no free posture at cutter point 0 (0 of {n} reached)"
+        where = f"no path: no free configuration at cutter point 0 (0 of {n} reached)"
     elif reached == n:
         where = f"no path: every track through the {n} cutter points collides"
     else:
@@ -81,7 +81,7 @@ def explain_free_moves(cell: WorkCell, cut_off: Counter[tuple[FreeMove, Blocker]
     from_or_to_home = any(move is not FreeMove.BETWEEN_PASSES for (move, _), _ in met)
     movable = {body.name for body in cell.obstacles}
     elsewhere = sorted({name for (_, pair), _ in met for name in pair if name in movable})
-    helps = ["another home posture"] if from_or_to_home else ["a longer approach"]
+    helps = ["another home configuration"] if from_or_to_home else ["a longer approach"]
     helps += [f"{name} elsewhere or smaller" for name in elsewhere]
     lines.append(f"would help: {', or '.join(helps)}; no change of wheel or fixture was tried")
     return lines

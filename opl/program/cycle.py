@@ -22,11 +22,12 @@ from opl.program.settings import ProgramSettings
 def cycle_time(
     program: Program, times: Mapping[int, float], robot: Robot, settings: ProgramSettings
 ) -> CycleTime:
-    """Return how long a program takes from its first posture to its last.
+    """Return how long a program takes from its first configuration to its last.
 
     Args:
         program: The moves.
-        times: Time of the move to each posture at the written speed in [s], by the posture's index.
+        times: Time of the move to each configuration at the written speed in [s], by the
+            configuration's index.
         robot: Whose moves; where the job slows its ramps (ACC, DEC), so are they here.
         settings: How the program is written.
 
@@ -46,7 +47,7 @@ def cycle_time(
         ramps += longer
         spent[moves[1].kind] += longer
         for move, time in zip(moves[1:], wanted, strict=True):
-            spent[move.kind] += times.get(move.posture, float(time))
+            spent[move.kind] += times.get(move.motion_index, float(time))
     actions = [action for move in program.moves for action in move.actions]
     return CycleTime(
         passes=spent[Kind.WHEEL],

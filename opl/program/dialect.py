@@ -160,8 +160,8 @@ def written(program: Program, file_name: str, text: str, steps: Sequence[Step]) 
         OplError: If a pass does not keep its time.
     """
     both = list(zip(program.moves, steps, strict=True))
-    times = {move.posture: step.time for move, step in both if np.isfinite(step.time)}
-    speeds = {move.posture: step.speed for move, step in both}
+    times = {move.motion_index: step.time for move, step in both if np.isfinite(step.time)}
+    speeds = {move.motion_index: step.speed for move, step in both}
     return Written({file_name: text}, speeds, times, pass_times(program, times, "this controller"))
 
 

@@ -51,11 +51,11 @@ def with_straight_moves(
 
 
 def stray(robot: Robot, q: Array, T_flange_tool: Array, corners: Array) -> Array:
-    """Return how far straight moves lead from joint moves between the same postures.
+    """Return how far straight moves lead from joint moves between the same configurations.
 
     Args:
         robot: Whose moves.
-        q: Postures in [rad], shape (n, 6).
+        q: Configurations in [rad], shape (n, 6).
         T_flange_tool: The tool whose point runs straight, shape (4, 4).
         corners: Points that move along, in the flange frame in [m], shape (k, 3).
 

@@ -1,6 +1,6 @@
 """A robot program that belongs to no maker yet: moves with speeds, stops and comments.
 
-Every move is planned as a joint move. Between two postures the controller then does what the
+Every move is planned as a joint move. Between two configurations the controller then does what the
 verification replayed: all joints run linearly, in step with the slowest. A straight-line move leads
 the hand's tool point along a line instead, away from where the contact was proven;
 `opl.program.lines` makes one only where it stays near enough.
@@ -22,12 +22,12 @@ from opl.program.stops import actions_at, stops_at
 
 Array = NDArray[np.float64]
 
-# Speed of the move to the first posture. Nothing is known of where the robot starts from, so that
-# move is proven by nobody but the person who watches it.
+# Speed of the move to the first configuration. Nothing is known of where the robot starts from, so
+# that move is proven by nobody but the person who watches it.
 START_SPEED = 0.05
-# Postures nearer to each other than this in every joint [rad] are one: a micrometre at the end of
-# the arm, a tenth of an encoder pulse.
-SAME_POSTURE = 1e-6
+# Configurations nearer to each other than this in every joint [rad] are one: a micrometre at the
+# end of the arm, a tenth of an encoder pulse.
+SAME_CONFIGURATION = 1e-6
 # What a move may ask above a joint's top speed before it is refused: the last digit a controller
 # can be told.
 OVERSPEED = 1e-4
@@ -57,7 +57,7 @@ class Move:
         exact_stop: Whether the robot comes to rest there; if not, the next move may round the
             corner.
         on_wheel: Whether the part touches the wheel there.
-        posture: Index of that posture in the motion.
+        motion_index: Index of that configuration in the motion.
         kind: What it is for.
         ground_pass: The pass ground during the whole move, counted from 0, None off the wheel.
         straight: Whether the tool point runs on a straight line instead of the joints.
@@ -69,7 +69,7 @@ class Move:
     speed: float
     exact_stop: bool
     on_wheel: bool
-    posture: int
+    motion_index: int
     duration: float | None = None
     kind: Kind = Kind.AIR
     ground_pass: int | None = None
@@ -103,7 +103,7 @@ class PassTime:
 
 @dataclass(frozen=True)
 class CycleTime:
-    """How long a program runs, from its first posture to its last.
+    """How long a program runs, from its first configuration to its last.
 
     Attributes:
         passes: Grinding in [s].
@@ -158,9 +158,9 @@ def plan_moves(
 ) -> Program:
     """Turn a verified motion into moves.
 
-    A posture that repeats the one before needs no move; its time goes to the move that follows,
-    which so gets slower, never faster. The robot stops at home, where it enters and leaves the
-    wheel, where a phase ends, and at sharp corners off the wheel; it never stops within a pass.
+    A configuration that repeats the one before needs no move; its time goes to the move that
+    follows, which so gets slower, never faster. The robot stops at home, where it enters and leaves
+    the wheel, where a phase ends, and at sharp corners off the wheel; it never stops within a pass.
 
     Args:
         verified: What the program shall do.
@@ -176,7 +176,7 @@ def plan_moves(
     """
     if not isinstance(verified, VerifiedMotion):
         raise TypeError(f"a program is made of a VerifiedMotion, got {type(verified).__name__}")
-    kept = _distinct_postures(verified.motion.q)
+    kept = _distinct_configurations(verified.motion.q)
     motion = _without_repeats(verified.motion, kept)
     speeds = _speeds(verified.timed, kept, np.asarray(max_speed), joint_names)
     times = verified.timed.take(kept).duration.tolist()
@@ -184,7 +184,7 @@ def plan_moves(
     done_there = actions_at(motion, actions)
     moves = []
     pass_before: int | None = None
-    for m, (posture, phase) in enumerate(zip(kept, motion.phase, strict=True)):
+    for m, (configuration, phase) in enumerate(zip(kept, motion.phase, strict=True)):
         pass_here = int(motion.pass_index[m])
         comment = "HOME" if pass_here < 0 else f"PASS {pass_here + 1}"
         moves.append(
@@ -193,7 +193,7 @@ def plan_moves(
                 speed=float(speeds[m]),
                 exact_stop=stops[m],
                 on_wheel=bool(on_wheel[m]),
-                posture=int(posture),
+                motion_index=int(configuration),
                 duration=times[m] if m else None,
                 kind=Kind.of(phase),
                 ground_pass=pass_here if phase is Phase.GRINDING else None,
@@ -205,11 +205,11 @@ def plan_moves(
     return Program(name=name, comments=tuple(comments), moves=tuple(moves))
 
 
-def _distinct_postures(q: Array) -> NDArray[np.intp]:
-    """Return the indices of the postures that differ from the last one kept."""
+def _distinct_configurations(q: Array) -> NDArray[np.intp]:
+    """Return the indices of the configurations that differ from the last one kept."""
     kept = [0]
     for i in range(1, len(q)):
-        if np.abs(q[i] - q[kept[-1]]).max() > SAME_POSTURE:
+        if np.abs(q[i] - q[kept[-1]]).max() > SAME_CONFIGURATION:
             kept.append(i)
     return np.array(kept)
 
@@ -225,7 +225,7 @@ def _without_repeats(motion: Motion, kept: NDArray[np.intp]) -> Motion:
 def _speeds(
     timed: TimedMotion, kept: NDArray[np.intp], max_speed: Array, joint_names: Sequence[str]
 ) -> Array:
-    """Return the speed of the move to each kept posture, shape (len(kept),)."""
+    """Return the speed of the move to each kept configuration, shape (len(kept),)."""
     motion, times = timed.motion, timed.take(kept).duration[1:]
     joint_times = np.abs(np.diff(motion.q[kept], axis=0)) / max_speed  # at top speed, [s]
     with np.errstate(divide="ignore"):
@@ -234,7 +234,7 @@ def _speeds(
     if speeds[m] > 1.0 + OVERSPEED:
         joint = joint_names[int(np.argmax(joint_times[m - 1]))]
         raise UnsafeError(
-            f"posture {kept[m]} ({motion.kind[kept[m]].value}): joint {joint} would need "
+            f"configuration {kept[m]} ({motion.kind[kept[m]].value}): joint {joint} would need "
             f"{100.0 * speeds[m]:.1f} % of its top speed"
         )
     possible: Array = np.minimum(speeds, 1.0)

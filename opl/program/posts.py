@@ -43,7 +43,8 @@ class Written:
 
     Attributes:
         files: Text by file name, line ends as the controller wants them, the one to start first.
-        speeds: Speed of the move to each posture as written, by the posture's index in the motion.
+        speeds: Speed of the move to each configuration as written, by the configuration's index in
+            the motion.
         times: Time of that move at the written speed in [s], ramps left out, by the same index.
         pass_times: Of each pass.
     """
@@ -158,7 +159,8 @@ def pass_times(
 
     Args:
         program: The moves.
-        times: Time of the move to each posture as written in [s], by the posture's index.
+        times: Time of the move to each configuration as written in [s], by the configuration's
+            index.
         controller: For messages.
 
     Raises:
@@ -169,7 +171,9 @@ def pass_times(
     for move in program.moves:
         if move.ground_pass is not None and move.duration is not None:
             wanted[move.ground_pass] = wanted.get(move.ground_pass, 0.0) + move.duration
-            written[move.ground_pass] = written.get(move.ground_pass, 0.0) + times[move.posture]
+            written[move.ground_pass] = (
+                written.get(move.ground_pass, 0.0) + times[move.motion_index]
+            )
     found = {index: PassTime(wanted[index], written[index]) for index in sorted(wanted)}
     for index, one in found.items():
         if abs(one.error) > PASS_TIME_TOLERANCE:

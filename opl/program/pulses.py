@@ -87,21 +87,21 @@ class PulseScale:
 
         Raises:
             InputError: If the ratio of a joint is not known.
-            UnsafeError: If a joint is beyond its soft limit; the first such posture is named.
+            UnsafeError: If a joint is beyond its soft limit; the first such configuration is named.
         """
         if not self.complete:
             raise InputError("", "the pulses per degree are not known")
-        postures = np.atleast_2d(q)
-        if not np.all(np.isfinite(postures)):
+        stack = np.atleast_2d(q)
+        if not np.all(np.isfinite(stack)):
             raise UnsafeError("a joint position is not a number")
-        pulses = self._nearest(postures)
+        pulses = self._nearest(stack)
         lower, upper = self.soft_limits
         beyond = np.argwhere((pulses < lower) | (pulses > upper))
         if len(beyond):
             *_, joint = place = tuple(beyond[0])
             raise UnsafeError(
-                f"posture {place[-2]}: joint {self.joint_names[joint]} at "
-                f"{np.rad2deg(postures[place]):.3f} deg is {pulses[place]} pulses, the soft limits "
+                f"configuration {place[-2]}: joint {self.joint_names[joint]} at "
+                f"{np.rad2deg(stack[place]):.3f} deg is {pulses[place]} pulses, the soft limits "
                 f"are {lower[joint]} and {upper[joint]}"
             )
         return pulses.reshape(np.shape(q))

@@ -52,8 +52,8 @@ def _pieces(moves: tuple[Move, ...], step_limit: int) -> list[tuple[Move, ...]]:
         if end is None:
             nearest = min((k for k in cuts if k > start), default=len(moves))
             raise OplError(
-                f"postures {moves[start].posture} to {moves[nearest - 1].posture} take "
-                f"{nearest - start} moves between two places off the wheel where a job may be cut; "
+                f"configurations {moves[start].motion_index} to {moves[nearest - 1].motion_index} "
+                f"take {nearest - start} moves between two places off the wheel where a job may be cut; "
                 f"a job holds {step_limit}"
             )
         pieces.append((*entry, *moves[start:end]))

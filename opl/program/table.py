@@ -1,4 +1,4 @@
-"""The table of a motion (CSV): what the robot does, posture by posture."""
+"""The table of a motion (CSV): what the robot does, configuration by configuration."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def render_table(
     *,
     template: Path | None = None,
 ) -> str:
-    """Return the table, one row for each posture of the motion.
+    """Return the table, one row for each configuration of the motion.
 
     Passes count from 1 as in the job's comments, cutter points from 0. A cell is empty where a
     quantity is not defined: pass at home, cutter point and t off the wheel. Columns of pulses are
     there if all are known. Speed is what the program says, and
-    programmed_s the time of the move at it; both are empty for a posture that repeats the one
+    programmed_s the time of the move at it; both are empty for a configuration that repeats the one
     before and so has no move of its own (the time of that row is in the move that follows), and
     programmed_s where nobody knows from where it comes.
 
@@ -41,11 +41,11 @@ def render_table(
         verified: The motion.
         written: The program written from it.
         scale: Pulses of the robot.
-        Ts_base_flange: Pose of the flange at each posture, origin in [m], shape (n, 4, 4).
+        Ts_base_flange: Pose of the flange at each configuration, origin in [m], shape (n, 4, 4).
         template: Layout of the table; None for the one that comes with opl.
 
     Raises:
-        UnsafeError: If a posture is beyond the soft limits.
+        UnsafeError: If a configuration is beyond the soft limits.
         InputError: If the template is unusable.
     """
     motion = verified.motion

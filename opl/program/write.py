@@ -98,7 +98,7 @@ def try_out(name: str, home: Array, robot: Robot, settings: ProgramSettings) -> 
         *asked.at_end,
     )
     moves = tuple(
-        Move(home, START_SPEED, exact_stop=True, on_wheel=False, posture=k, kind=kind)
+        Move(home, START_SPEED, exact_stop=True, on_wheel=False, motion_index=k, kind=kind)
         for k, kind in enumerate(Kind)
     )
     last = replace(moves[-1], actions=actions)

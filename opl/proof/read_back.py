@@ -20,14 +20,14 @@ from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion, TimedMotion, VerifiedMotion
-from opl.program.moves import SAME_POSTURE, Program
+from opl.program.moves import SAME_CONFIGURATION, Program
 from opl.program.played import Playback
 from opl.program.posts import find_post
 from opl.proof.prove import prove
 from opl.proof.written import written_findings
 from opl.verification.limits import limit_findings
 
-EXACT = 1e-9  # [rad] of round-off between a posture and itself, read back
+EXACT = 1e-9  # [rad] of round-off between a configuration and itself, read back
 
 
 @dataclass(frozen=True)
@@ -36,17 +36,17 @@ class FileProof:
 
     Attributes:
         files: Names of the program's files.
-        postures: Number of postures in them, in order, repeated ones once.
+        configurations: Number of configurations in them, in order, repeated ones once.
         largest_rounding: Farthest in [m] that rounding to the digits of the file moved any corner
             of the box around the part, before the proof.
-        largest_difference: Farthest in [m] that a corner is, at a posture read back, from where it
-            was proven; 0 if they are one.
+        largest_difference: Farthest in [m] that a corner is, at a configuration read back, from
+            where it was proven; 0 if they are one.
         replayed: Whether the files were proven anew on their own.
         findings: What is wrong.
     """
 
     files: tuple[str, ...]
-    postures: int
+    configurations: int
     largest_rounding: float
     largest_difference: float
     replayed: bool
@@ -102,19 +102,19 @@ def read_back(
     if playback is None:
         return FileProof(tuple(files), 0, rounding, 0.0, False, findings)
     kept = _without_repeats(playback)
-    postures = [move.posture for move in program.moves]
-    if len(kept.stations) != len(postures):
-        message = f"{len(kept.stations)} postures read back, {len(postures)} proven"
+    configurations = [move.motion_index for move in program.moves]
+    if len(kept.stations) != len(configurations):
+        message = f"{len(kept.stations)} configurations read back, {len(configurations)} proven"
         findings = (*findings, Finding(Level.ERROR, "file", "program", message))
         return FileProof(tuple(files), len(kept.stations), rounding, 0.0, False, findings)
-    q, proven = kept.q[kept.stations], verified.motion.q[postures]
+    q, proven = kept.q[kept.stations], verified.motion.q[configurations]
     difference = np.abs(q - proven).max()
     other_paths = difference > EXACT or len(kept.stations) < len(kept.q)
     findings = (*findings, *_differences(kept, program))
     if other_paths:
         findings = (*findings, *prove(job, points, files).findings)
     else:
-        written = TimedMotion(verified.motion.take(postures), kept.duration)
+        written = TimedMotion(verified.motion.take(configurations), kept.duration)
         findings = (
             *findings,
             *limit_findings(job.cell, written),
@@ -127,9 +127,9 @@ def read_back(
 def _without_repeats(playback: Playback) -> Playback:
     """Leave out the moves of no length with which the parts of a program begin."""
     q = playback.q[playback.stations]
-    moved = np.abs(np.diff(q, axis=0)).max(axis=1) > SAME_POSTURE
+    moved = np.abs(np.diff(q, axis=0)).max(axis=1) > SAME_CONFIGURATION
     kept = np.flatnonzero(np.concatenate([[True], moved]))
-    # such a move is one posture of no duration, wherever it stands
+    # such a move is one configuration of no duration, wherever it stands
     gone = np.delete(playback.stations, kept)
     all_but = np.delete(np.arange(len(playback.q)), gone)
     return Playback(
@@ -146,7 +146,9 @@ def _differences(playback: Playback, program: Program) -> Iterator[Finding]:
         away = np.abs(playback.q[playback.stations[k]] - move.q)
         messages = []
         if (away > read.resolution).any():
-            messages.append(f"leads {np.rad2deg(away.max()):.4f} deg away from the proven posture")
+            messages.append(
+                f"leads {np.rad2deg(away.max()):.4f} deg away from the proven configuration"
+            )
         if read.straight and not move.straight:
             messages.append("is straight, a joint move was proven")
         if move.exact_stop and not read.corner.exact_stop:
@@ -156,7 +158,7 @@ def _differences(playback: Playback, program: Program) -> Iterator[Finding]:
 
 
 def _apart(job: Job, q: Array, other: Array) -> float:
-    """Return the farthest in [m] that a corner of the part's box is moved between postures."""
+    """Return the farthest in [m] that a corner of the part's box is moved between two ``q``."""
     cell = job.cell
     corners = box_corners(cell.part.vertices)
     places = [

@@ -29,7 +29,7 @@ ROUND_OFF = 1e-9  # of a number that was read from a file, as a fraction
 def written_findings(
     job: Job, points: CutterPoints, written: TimedMotion, playback: Playback, reader: Reader
 ) -> list[Finding]:
-    """Return what is wrong with speeds, stops, and the postures at both ends.
+    """Return what is wrong with speeds, stops, and the configurations at both ends.
 
     Args:
         job: What is asked for.
@@ -110,8 +110,8 @@ def _waits_on_wheel(motion: Motion, playback: Playback) -> Iterator[Finding]:
 
 def _ends_away_from_home(job: Job, motion: Motion) -> Iterator[Finding]:
     names = job.cell.robot.joint_names
-    for posture, place in ((0, "way from home"), (len(motion) - 1, "way home")):
-        away: Array = np.abs(motion.q[posture] - job.process.home)
+    for configuration, place in ((0, "way from home"), (len(motion) - 1, "way home")):
+        away: Array = np.abs(motion.q[configuration] - job.process.home)
         if away.max() > HOME_SLACK:
             joint = int(away.argmax())
             message = f"{np.rad2deg(away[joint]):.3f} deg from home"

@@ -32,8 +32,8 @@ LONGEST_STEP = 60.0  # [deg] between ticks of the limits
 
 @house_style()
 def arm_view(robot: Robot) -> str:
-    """Return the arm at its zero posture, seen from its right side, with its limits, as SVG."""
-    title = f"{robot.title}: zero posture, reach {MM * robot.reach:.0f} mm"
+    """Return the arm at all angles zero, seen from its right side, with its limits, as SVG."""
+    title = f"{robot.title}: zero configuration, reach {MM * robot.reach:.0f} mm"
     figure = blank_figure(title)
     side, limits = figure.subplots(1, 2, width_ratios=(2.3, 1.0))
     arm = drawn_arm(robot)

@@ -79,12 +79,12 @@ def line_by_pass(pass_index: np.ndarray, x: Array, y: Array) -> tuple[Array, Arr
     """Return a line that is not drawn where the pass changes.
 
     Args:
-        pass_index: Pass of each posture, shape (n,).
+        pass_index: Pass of each configuration, shape (n,).
         x: Across, shape (n,).
         y: Up, shape (n,).
 
     Returns:
-        The line with NaN between passes. A posture alone in its pass becomes a short stroke.
+        The line with NaN between passes. A configuration alone in its pass becomes a short stroke.
     """
     across: list[Array] = []
     up: list[Array] = []

@@ -67,9 +67,9 @@ def contact_chart(
         state_names: What the codes mean.
         pass_index: Pass of each cutter point, 0, 1, ..., shape (N,).
         flat_end: Contact position in belt units where the flat ends.
-        path_cutter_point: Cutter point of each posture, fractional in between, shape (n,).
-        path_contact_position: t of each posture, shape (n,). If n is 0 no path is drawn.
-        path_pass: Pass of each posture, shape (n,).
+        path_cutter_point: Cutter point of each configuration, fractional in between, shape (n,).
+        path_contact_position: t of each configuration, shape (n,). If n is 0 no path is drawn.
+        path_pass: Pass of each configuration, shape (n,).
 
     Returns:
         The picture as SVG text.
@@ -137,10 +137,11 @@ def joint_chart(
         joint_names: The six joints.
         lower: Lower limits in [rad], shape (6,).
         upper: Upper limits in [rad], shape (6,).
-        found_cutter_point: Cutter point of each posture, fractional in between, shape (n,).
-        found_q: The postures in [rad], shape (n, 6).
-        found_pass: Pass of each posture, shape (n,).
-        fixed_q: The contact-fixed posture at each cutter point in [rad], shape (N, 6), or None.
+        found_cutter_point: Cutter point of each configuration, fractional in between, shape (n,).
+        found_q: The configurations in [rad], shape (n, 6).
+        found_pass: Pass of each configuration, shape (n,).
+        fixed_q: The contact-fixed configuration at each cutter point in [rad], shape (N, 6), or
+            None.
         pass_index: Pass of each cutter point, 0, 1, ..., shape (N,).
 
     Returns:

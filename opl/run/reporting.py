@@ -208,7 +208,7 @@ def _file(proof: FileProof) -> result.FileReport:
     return result.FileReport(
         proof.proven,
         proof.files,
-        proof.postures,
+        proof.configurations,
         round(proof.largest_rounding * MM, 4),
         round(proof.largest_difference * MM, 4),
         proof.replayed,
@@ -219,6 +219,7 @@ def _program(written: Written) -> result.ProgramReport:
     return result.ProgramReport(
         files=list(written.files),
         sha256={name: digest(text.encode()) for name, text in written.files.items()},
+        read_back=written.read_back is not None,
         moves=len(written.program.moves),
         duration_s=round(written.proven.motion.timed.seconds, 3),
         passes=[

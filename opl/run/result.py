@@ -171,6 +171,7 @@ class ProgramReport:
 
     files: Sequence[str]
     sha256: Mapping[str, str]
+    read_back: bool  # false where the language has no reader: nothing is claimed of the file itself
     moves: int
     duration_s: float
     passes: Sequence[PassTimeReport]

@@ -38,7 +38,7 @@ class JointBox:
         return JointBox(self.lower - step, self.upper + step)
 
     def holds(self, q: Array) -> np.ndarray:
-        """Return which postures, shape (..., 6), lie inside; round-off at a face is forgiven."""
+        """Return which ``q``, shape (..., 6), lie inside; round-off at a face is forgiven."""
         inside = (q >= self.lower - 1e-12) & (q <= self.upper + 1e-12)
         return np.asarray(inside.all(axis=-1))
 

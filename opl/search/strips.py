@@ -55,7 +55,7 @@ def strips_of(q: Array, exact: np.ndarray, in_order: bool) -> Strips:
     """Return the strips of a ladder with columns between its cutter points.
 
     Args:
-        q: Joint positions in [rad], NaN where there is no posture, shape (n, n_rows, 6).
+        q: Joint positions in [rad], NaN where there is no configuration, shape (n, n_rows, 6).
         exact: Which columns are cutter points, shape (n,); those between two of them are evenly
             spaced.
         in_order: Whether each row is the next contact position after the row before.

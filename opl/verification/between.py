@@ -1,9 +1,10 @@
-"""Where between two cutter points postures grind, and how far they are off the contact model.
+"""Where between two cutter points configurations grind, and how far they are off the contact model.
 
-A posture alone does not always tell: in a hollow the part can lie on the flat and on an edge of the
+A configuration alone does not always tell: in a hollow the part can lie on the flat and on an edge
+    of the
 wheel at once, and a flat face lies on the flat with all its points. What counts is that there are
-places for all postures of the way that never go back, each within the contact model; of those, the
-ones are taken that lie nearest to it and move evenly over the wheel.
+places for all configurations of the way that never go back, each within the contact model; of
+those, the ones are taken that lie nearest to it and move evenly over the wheel.
 """
 
 from __future__ import annotations
@@ -32,12 +33,12 @@ def place_between(
     ends: tuple[int, int],
     t_ends: tuple[float, float],
 ) -> tuple[Array, Array, Array]:
-    """Place the postures of a way between two cutter points, none before the one ahead of it.
+    """Place the configurations of a way between two cutter points, none before the one ahead of it.
 
     Args:
         wheel: The wheel.
         points: The cutter points.
-        Ts_contact0_workpiece: Where the part is at each posture of the way, shape (n, 4, 4).
+        Ts_contact0_workpiece: Where the part is at each configuration of the way, shape (n, 4, 4).
         duration: Times of the moves, the one onto the second cutter point as well, shape (n + 1,).
         ends: The cutter points that are ground before and after.
         t_ends: The contact positions there.
@@ -70,9 +71,9 @@ def place_between(
 def _in_order(
     tried: Array, apart: Array, t: Array, even: Array, t_ends: tuple[float, float]
 ) -> NDArray[np.intp]:
-    """Choose one place for each posture so that none goes back, shape (n,).
+    """Choose one place for each configuration so that none goes back, shape (n,).
 
-    Dynamic programming over the postures; the sum of the squares of all misfits is least.
+    Dynamic programming over the configurations; the sum of the squares of all misfits is least.
 
     Args:
         tried: Places, shape (n, k).

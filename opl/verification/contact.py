@@ -22,22 +22,22 @@ ROLL_SLACK = 0.1  # [deg] beyond the largest roll that is taken for rounding
 
 @dataclass(frozen=True, eq=False)
 class Touches:
-    """Which cutter points are where they can be ground, at which postures; k items each.
+    """Which cutter points are where they can be ground, at which configurations; k items each.
 
     Attributes:
-        posture: Index of the posture, ascending.
-        point: Index of the cutter point, ascending within a posture.
+        configuration: Index of the configuration, ascending.
+        point: Index of the cutter point, ascending within a configuration.
         contact_position: t.
         distance: Of the cutter point from where the contact model has it, in [m].
     """
 
-    posture: NDArray[np.intp]
+    configuration: NDArray[np.intp]
     point: NDArray[np.intp]
     contact_position: Array
     distance: Array
 
     def __len__(self) -> int:
-        return len(self.posture)
+        return len(self.configuration)
 
 
 def contact_positions(wheel: ContactWheel, Ts_contact0_cutter: Array) -> Array:
@@ -77,7 +77,7 @@ def find_touches(
     """
     Ts_workpiece_cutter = points.Ts_workpiece_cutter
     found: list[tuple[Array, ...]] = []
-    for posture, T_contact0_workpiece in enumerate(Ts_contact0_workpiece):
+    for configuration, T_contact0_workpiece in enumerate(Ts_contact0_workpiece):
         p_contact0 = transform(T_contact0_workpiece, Ts_workpiece_cutter[:, :3, 3])
         near = np.flatnonzero(np.abs(wheel.signed_distance(p_contact0)) <= tolerance)
         Ts_contact0_cutter = T_contact0_workpiece @ Ts_workpiece_cutter[near]
@@ -86,8 +86,8 @@ def find_touches(
         fits = (distance <= tolerance) & (angle <= ALIGNED)
         fits &= np.abs(t) <= wheel.last_position + ROLL_SLACK
         point = near[fits]
-        found.append((np.full(len(point), posture), point, t[fits], distance[fits]))
-    posture_, point_, t_, distance_ = (
+        found.append((np.full(len(point), configuration), point, t[fits], distance[fits]))
+    configuration_, point_, t_, distance_ = (
         np.concatenate(column) if found else np.empty(0) for column in zip(*found, strict=True)
     )
-    return Touches(posture_.astype(np.intp), point_.astype(np.intp), t_, distance_)
+    return Touches(configuration_.astype(np.intp), point_.astype(np.intp), t_, distance_)

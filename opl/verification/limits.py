@@ -35,10 +35,10 @@ def limit_findings(cell: WorkCell, timed: TimedMotion) -> list[Finding]:
 
 
 def _limits_of_cell(cell: WorkCell, motion: Motion) -> Iterator[Finding]:
-    """Yield a finding for each posture beyond a limit that the cell adds.
+    """Yield a finding for each configuration beyond a limit that the cell adds.
 
-    Joints move linearly between the postures and what is limited is linear in them, so between two
-    postures it lies between its values at both.
+    Joints move linearly between the configurations and what is limited is linear in them, so
+    between two configurations it lies between its values at both.
     """
     for limit in cell.limits:
         for move, q in enumerate(motion.q):

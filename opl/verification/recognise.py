@@ -1,9 +1,10 @@
-"""What a robot grinds, recognised from its postures alone: nobody tells where the passes are.
+"""What a robot grinds, recognised from its configurations alone: nobody tells where the passes are.
 
-Postures and cutter points are aligned like two texts: both keep their order, a posture may lie
-between two cutter points or off the wheel, and a cutter point that no posture brings to the wheel
-is left out, which is dear. Between two cutter points the frame changes evenly; postures there get
-places that never go back and lie nearest to the contact model.
+Configurations and cutter points are aligned like two texts: both keep their order, a configuration
+    may lie
+between two cutter points or off the wheel, and a cutter point that no configuration brings to the
+wheel is left out, which is dear. Between two cutter points the frame changes evenly; configurations
+there get places that never go back and lie nearest to the contact model.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from opl.verification.contact import ALIGNED, Touches, find_touches
 from opl.verification.ways import Way, Ways
 from opl.verification.world import World
 
-# [m] that a posture may be off the contact model at the cutter point it grinds: what the digits of
-# a position leave. Farther off it passes by; that is for the way between cutter points.
+# [m] that a configuration may be off the contact model at the cutter point it grinds: what the
+# digits of a position leave. Farther off it passes by; that is for the way between cutter points.
 AT_POINT = 5e-5
-ASIDE = 2e-4  # [m] that a posture of an approach may be beside the contact normal or the arc
+ASIDE = 2e-4  # [m] that a configuration of an approach may be beside the contact normal or the arc
 FARTHER = 1e-3  # [m] than the approach is long that still is approach
 
 
@@ -37,7 +38,7 @@ class Rule:
     Attributes:
         max_contact_error: Farthest that a ground point may be from where the contact model has it,
             in [m].
-        max_contact_step: Largest change of t between neighbouring postures on the wheel.
+        max_contact_step: Largest change of t between neighbouring configurations on the wheel.
         approach_length: Of approach and retract in [m].
         approach_turn: What they turn by in [rad]: 0 if they run along the contact normal, else they
             are arcs that begin and end along the belt, y of the contact frame.
@@ -56,8 +57,8 @@ class Recognition:
     Attributes:
         timed: The configurations, labelled; one that grinds several cutter points at once is
             repeated, the move to itself taking no time.
-        source: Index of each of them in the postures that were given, shape (n,).
-        findings: Postures that leave the way between two cutter points.
+        source: Index of each of them in the configurations that were given, shape (n,).
+        findings: Configurations that leave the way between two cutter points.
     """
 
     timed: TimedMotion
@@ -79,17 +80,17 @@ def recognise(
         cell: The cell.
         points: The cutter points that may be ground.
         q: Joint positions in [rad], joined by linear joint interpolation, shape (n, 6).
-        duration: Time of the move that ends at each posture in [s], shape (n,).
-        stations: Indices of the postures at which a cutter point may be ground, in order.
+        duration: Time of the move that ends at each configuration in [s], shape (n,).
+        stations: Indices of the configurations at which a cutter point may be ground, in order.
         rule: What a motion over the wheel has to keep.
     """
     with World(cell) as world:
-        Ts_base_workpiece = np.array([world.move_to(posture) for posture in q])
+        Ts_base_workpiece = np.array([world.move_to(configuration) for configuration in q])
     Ts_contact0_workpiece = inverse(cell.wheel.T_base_contact0) @ Ts_base_workpiece
     tolerance = min(AT_POINT, rule.max_contact_error)
     touches = find_touches(cell.wheel, points, Ts_contact0_workpiece[stations], tolerance)
     ground = align(touches, points.pass_index, tolerance, rule.max_contact_step)
-    touches = replace(touches, posture=stations[touches.posture])
+    touches = replace(touches, configuration=stations[touches.configuration])
     ways = Ways(cell.wheel, points, Ts_contact0_workpiece, duration, touches)
     ground = ways.settled(ground, rule.max_contact_error)
     labels = _Labels(cell, points, Ts_contact0_workpiece, rule)
@@ -98,7 +99,7 @@ def recognise(
 
 
 class _Labels:
-    """What each posture is, being found out."""
+    """What each configuration is, being found out."""
 
     def __init__(
         self, cell: WorkCell, points: CutterPoints, Ts_contact0_workpiece: Array, rule: Rule
@@ -112,22 +113,22 @@ class _Labels:
         self._t = np.full(n, np.nan)
         self._place = np.full(n, np.nan)
         self._pass = np.full(n, -1)
-        self._also: dict[int, list[tuple[int, float]]] = {}  # more cutter points at a posture
+        self._also: dict[int, list[tuple[int, float]]] = {}  # more cutter points at a configuration
         self._astray: list[tuple[int, float]] = []
 
     def grind(self, touches: Touches, ground: NDArray[np.intp], ways: Ways) -> None:
         """Label everything, given which touches are the ground cutter points."""
-        posture, point = touches.posture[ground], touches.point[ground]
+        configuration, point = touches.configuration[ground], touches.point[ground]
         t = touches.contact_position[ground]
         pass_index = self._points.pass_index[point]
-        for k, i, position in zip(posture, point, t, strict=True):
+        for k, i, position in zip(configuration, point, t, strict=True):
             if self._kind[k] is MoveKind.GRIND:
                 self._also.setdefault(int(k), []).append((int(i), float(position)))
                 continue
             self._mark(k, MoveKind.GRIND, self._points.pass_index[i], position, i)
         for m in np.flatnonzero(np.diff(pass_index) == 0):
             self._fill_in(ways.between(int(ground[m]), int(ground[m + 1])), int(pass_index[m]))
-        first, last = self._lead_ins(posture, point, t, pass_index)
+        first, last = self._lead_ins(configuration, point, t, pass_index)
         self._name_the_air(first, last)
 
     def recognition(self, q: Array, duration: Array) -> Recognition:
@@ -165,8 +166,8 @@ class _Labels:
         self._t[k], self._place[k] = t, place
 
     def _fill_in(self, way: Way, pass_index: int) -> None:
-        """Label the postures between two that grind cutter points."""
-        columns = (way.postures, way.place, way.contact_position, way.apart)
+        """Label the configurations between two that grind cutter points."""
+        columns = (way.configurations, way.place, way.contact_position, way.apart)
         for k, place, t, apart in zip(*columns, strict=True):
             self._mark(int(k), MoveKind.BETWEEN, pass_index, t, place)
             if apart > self._rule.max_contact_error:
@@ -174,7 +175,7 @@ class _Labels:
 
     def _lead_ins(
         self,
-        posture: NDArray[np.intp],
+        configuration: NDArray[np.intp],
         point: NDArray[np.intp],
         t: Array,
         pass_index: NDArray[np.int64],
@@ -184,18 +185,18 @@ class _Labels:
         for index in np.unique(pass_index):
             on_pass = np.flatnonzero(pass_index == index)
             begin, end = on_pass[0], on_pass[-1]
-            reach = self._leading(posture[begin], point[begin], t[begin], -1)
+            reach = self._leading(configuration[begin], point[begin], t[begin], -1)
             for k in reach[:-1]:  # the move to the farthest of them is free
                 self._mark(k, MoveKind.APPROACH, index, np.nan, np.nan)
-            firsts.append(min(reach, default=int(posture[begin])))
-            away = self._leading(posture[end], point[end], t[end], 1)
+            firsts.append(min(reach, default=int(configuration[begin])))
+            away = self._leading(configuration[end], point[end], t[end], 1)
             for k in away:
                 self._mark(k, MoveKind.RETRACT, index, np.nan, np.nan)
-            lasts.append(max(away, default=int(posture[end])))
+            lasts.append(max(away, default=int(configuration[end])))
         return firsts, lasts
 
     def _leading(self, k: int, point: int, t: float, step: int) -> list[int]:
-        """Return the postures off the wheel along the lead next to posture k, nearest first."""
+        """Return the configurations off the wheel along the lead next to number k, nearest first."""
         T_cutter = self._points.Ts_workpiece_cutter[point]
         to_contact = inverse(self._wheel.T_contact0_contact(t))
         farthest, found = 0.0, []

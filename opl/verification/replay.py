@@ -1,8 +1,8 @@
 """Replay of a motion in PyBullet: a second opinion that shares no code with the planner.
 
-The controller moves all joints linearly between the postures of the program, so that is what is
-replayed, densely: between two checked poses no corner of the held part's box moves more than `STEP`
-and no joint turns more than `TURN`.
+The controller moves all joints linearly between the configurations of the program, so that is what
+is replayed, densely: between two checked poses no corner of the held part's box moves more than
+`STEP` and no joint turns more than `TURN`.
 
 A pair of solids is measured only when it could have come too near: since it was last measured its
 distance cannot have shrunk by more than the joints between the two moved times their levers. That
@@ -30,8 +30,8 @@ TURN = np.deg2rad(0.5)
 HORIZON = 0.1  # [m] clearances beyond this are not told, only known to be more
 AHEAD = 0.03  # [m] beyond what is asked that is measured: so long a pair can be left alone after
 # Bullet's distance of a mesh from the rim of a cylinder is too large by up to 0.083 mm, too small
-# by 0.025 mm: 2000 random postures each in the V and S cells, against the exact distance. Whether
-# the ground point lies on the wheel is checked without it
+# by 0.025 mm: 2000 random configurations each in the V and S cells, against the exact distance.
+# Whether the ground point lies on the wheel is checked without it
 GAP_ACCURACY = 1e-4  # [m]
 FARTHEST_GAP = 0.005  # [m] between part and wheel that is measured while grinding
 
@@ -52,7 +52,8 @@ class Verification:
         min_clearance: Smallest distance of any pair that needs clearance in [m], part on wheel
             aside; `HORIZON` if nothing came nearer than that.
         max_contact_error: Largest distance of the ground point from the wheel's surface in [m].
-        limit_violations: Number of postures beyond a joint limit or moves beyond a joint speed.
+        limit_violations: Number of configurations beyond a joint limit or moves beyond a joint
+            speed.
         findings: What is wrong, worst of each kind and place.
         verified: The motion with its clearances, or None if anything is wrong.
     """
@@ -140,7 +141,9 @@ class _Run:
         self.collisions = 0
         self.max_contact_error = 0.0
         self.findings = _Worst()
-        self.clearance = np.full(len(motion), HORIZON)  # of the move that ends at each posture
+        self.clearance = np.full(
+            len(motion), HORIZON
+        )  # of the move that ends at each configuration
         self._cell = cell
         self._points = points
         self._world = world
@@ -163,7 +166,7 @@ class _Run:
             self.findings.add("collision", "start", motion.place(0), told, 0.0, "one in the other")
 
     def make_move(self, move: int) -> None:
-        """Go on to a posture, checking on the way."""
+        """Go on to a configuration, checking on the way."""
         start, target = self._q, self._motion.q[move]
         done = 0.0
         stride = 1.0 / max(np.abs(target - start).max() / TURN, 1.0)

@@ -1,8 +1,8 @@
 """The ways between ground cutter points: what lies between two touches, and which touch it bears.
 
-Where the surface is flat, several postures in a row touch the same cutter point, each at another
-contact position. Which of them grinds it is told by the postures around: they have to lie on the
-way to it, or on the way from it.
+Where the surface is flat, several configurations in a row touch the same cutter point, each at
+another contact position. Which of them grinds it is told by the configurations around: they have to
+lie on the way to it, or on the way from it.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from opl.verification.contact import Touches
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """Postures between two touches.
+    """Configurations between two touches.
 
     Attributes:
-        postures: Their indices, shape (n,).
+        configurations: Their indices, shape (n,).
         place: Fractional cutter points, shape (n,).
         contact_position: t, shape (n,).
         apart: Distances from the contact model in [m], shape (n,).
     """
 
-    postures: NDArray[np.intp]
+    configurations: NDArray[np.intp]
     place: Array
     contact_position: Array
     apart: Array
@@ -47,9 +47,9 @@ class Ways:
     Args:
         wheel: The wheel.
         points: The cutter points.
-        Ts_contact0_workpiece: Where the part is at each posture, shape (n, 4, 4).
-        duration: Time of the move that ends at each posture in [s], shape (n,).
-        touches: Which cutter points are touched; their postures are indices of those.
+        Ts_contact0_workpiece: Where the part is at each configuration, shape (n, 4, 4).
+        duration: Time of the move that ends at each configuration in [s], shape (n,).
+        touches: Which cutter points are touched; their configurations are indices of those.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Ways:
 
         Args:
             ground: Indices of the chosen touches, in order.
-            allowed: Distance from the contact model that every posture of a way should keep in [m].
+            allowed: Farthest in [m] that a configuration between should be from the contact model.
         """
         chosen: NDArray[np.intp] = ground.copy()
         for m in range(1, len(chosen)):
@@ -94,19 +94,19 @@ class Ways:
 
     def _way(self, before: int, after: int) -> Way:
         touches = self._touches
-        first, last = int(touches.posture[before]), int(touches.posture[after])
-        postures = np.arange(first + 1, last)
-        if not len(postures):
-            return Way(postures, *np.empty((3, 0)))
+        first, last = int(touches.configuration[before]), int(touches.configuration[after])
+        configurations = np.arange(first + 1, last)
+        if not len(configurations):
+            return Way(configurations, *np.empty((3, 0)))
         found = place_between(
             self._wheel,
             self._points,
-            self._Ts[postures],
+            self._Ts[configurations],
             self._duration[first + 1 : last + 1],
             (int(touches.point[before]), int(touches.point[after])),
             (float(touches.contact_position[before]), float(touches.contact_position[after])),
         )
-        return Way(postures, *found)
+        return Way(configurations, *found)
 
     def _goes_on(self, chosen: NDArray[np.intp], m: int) -> bool:
         """Return whether a touch is on the same pass as the one before it."""
@@ -124,8 +124,8 @@ class Ways:
 
     def _instead(self, chosen: NDArray[np.intp], m: int) -> NDArray[np.intp]:
         """Return the other touches of a cutter point between its neighbours."""
-        posture = self._touches.posture
-        after = posture[chosen[m - 1]] if m else -1
-        before = posture[chosen[m + 1]] if m + 1 < len(chosen) else len(self._Ts)
+        configuration = self._touches.configuration
+        after = configuration[chosen[m - 1]] if m else -1
+        before = configuration[chosen[m + 1]] if m + 1 < len(chosen) else len(self._Ts)
         same = self._touches.point == self._touches.point[chosen[m]]
-        return np.flatnonzero(same & (posture > after) & (posture < before))
+        return np.flatnonzero(same & (configuration > after) & (configuration < before))

@@ -213,7 +213,8 @@ class World:
     def levers(self) -> Array:
         """Return how far from each joint's axis anything that it moves can ever be, in [m], (6,).
 
-        A bound for all postures: the arm stretched out from the joint on, then the largest link or
+        A bound for all configurations: the arm stretched out from the joint on, then the largest
+            link or
         held body all the way out.
         """
         self.move_to(np.zeros(len(self._joints)))

@@ -39,8 +39,8 @@ def with_limits(problem, *limits):
     return replace(with_scene(problem, cell=cell), field=field)
 
 
-def postures_of(field):
-    """Return every posture of every matrix, shape (n, 6)."""
+def configurations_of(field):
+    """Return every configuration of every matrix, shape (n, 6)."""
     return np.concatenate([nodes.q[nodes.exists] for nodes in field.matrices])
 
 
@@ -50,11 +50,11 @@ def postures_of(field):
     st.floats(-300, 300),
     st.floats(1, 300),
 )
-def test_the_nodes_are_all_postures_within_the_limits_and_no_others(weights, lowest, width):
+def test_the_nodes_are_all_configurations_within_the_limits_and_no_others(weights, lowest, width):
     problem, coefficients = tiny_problem(), np.array(weights)
     limit = limit_of("sum", coefficients, lowest, lowest + width)
     limited = with_limits(problem, limit).field
-    kept = postures_of(limited) if limited.matrices else np.empty((0, 6))
+    kept = configurations_of(limited) if limited.matrices else np.empty((0, 6))
     sums = np.rad2deg(kept @ coefficients)
     assert (sums >= lowest).all() and (sums <= lowest + width).all()
     # brute force over turns: nothing else was lost
@@ -98,8 +98,8 @@ def test_the_replay_finds_what_breaks_a_limit():
             assert found.findings[0].message.startswith(f"R+T: {np.rad2deg(sums[worst]):.3f} deg")
 
 
-def test_between_two_postures_a_sum_stays_between_its_values_at_both():
-    # why it is enough to look at the postures
+def test_between_two_configurations_a_sum_stays_between_its_values_at_both():
+    # why it is enough to look at the configurations
     motion, limit = tiny_motion(), R - 2.0 * T
     at = motion.q @ limit
     for fraction in (0.1, 0.5, 0.9):

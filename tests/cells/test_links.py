@@ -156,7 +156,7 @@ def test_an_end_that_is_too_near_is_named():
 
 
 def caged(cell, q):
-    """Return a cell with six walls around the part at a posture; one is behind it."""
+    """Return a cell with six walls around the part at a configuration; one is behind it."""
     T = forward_kinematics(cell.robot, q) @ cell.T_flange_workpiece
     low, high, thick = np.array([-0.06, -0.08, -0.045]), np.array([0.06, 0.08, 0.06]), 0.01
     walls = []
@@ -169,7 +169,7 @@ def caged(cell, q):
     return replace(cell, obstacles=tuple(walls))
 
 
-def test_a_posture_that_is_shut_in_is_told_with_what_shuts_it_in(monkeypatch):
+def test_a_configuration_that_is_shut_in_is_told_with_what_shuts_it_in(monkeypatch):
     monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
     links = links_in(caged(open_cell(), HOME))
     for way in ((HOME, AWAY), (AWAY, HOME)):

@@ -42,7 +42,7 @@ PAPER_RECURSIVE = 2.5287  # [rad]
 
 
 def hits_anything(cell, motion, every=1):
-    """Ask an independent scene about the postures of a motion and the ways between them."""
+    """Ask an independent scene about the configurations of a motion and the ways between them."""
     scene = FclScene(cell)
     dense, _ = densify(motion.q, RESOLUTION)
     return any(min(scene.clearances(q).values(), default=1.0) <= 0.0 for q in dense[::every])
@@ -61,7 +61,7 @@ def test_with_the_contact_kept_the_joint_ranges_are_those_of_the_paper():
     np.testing.assert_array_equal(fixed.joint_ranges, np.ptp(fixed.q, axis=0))
 
 
-def test_with_the_contact_kept_every_posture_grinds_at_the_middle():
+def test_with_the_contact_kept_every_configuration_grinds_at_the_middle():
     problem, fixed = v_problem(), keep_contact(v_problem())
     Ts = forward_kinematics(problem.cell.robot, fixed.q) @ problem.cell.T_flange_workpiece
     Ts_base_cutter = Ts @ problem.points.Ts_workpiece_cutter
@@ -115,7 +115,8 @@ def one_row_problem():
 
 
 def by_printed_recursion(problem):
-    """Return the node postures that Algorithm 1 finds from the nearest start that leads through.
+    """Return the node configurations that Algorithm 1 finds from the nearest start that leads
+    through.
 
     Every step is filled in and asked about on its own, when the recursion comes to it.
     """
@@ -163,7 +164,7 @@ def step_is_free(problem, nodes, column, here, there):
 def test_collisions_found_late_lead_to_the_track_of_the_printed_recursion(seed):
     problem = one_row_problem()
     free = plan_recursive(problem, Start.NEAREST).path
-    # some nodes of the free track and some postures between its nodes collide
+    # some nodes of the free track and some configurations between its nodes collide
     random = np.random.default_rng(seed)
     inner = np.flatnonzero((free.cutter_point > 3) & (free.cutter_point < 16))
     ghosts = Ghosts(free.q[random.choice(inner, 5, replace=False)], radius=0.02)

@@ -1,4 +1,4 @@
-"""What is ground is recognised from postures alone."""
+"""What is ground is recognised from configurations alone."""
 
 from dataclasses import replace
 from functools import cache
@@ -38,7 +38,7 @@ RULE = Rule(
 
 
 def recognised(problem, q, duration=None):
-    """Recognise postures, all of them written."""
+    """Recognise configurations, all of them written."""
     time = np.ones(len(q)) if duration is None else duration
     return recognise(problem.cell, problem.points, q, time, np.arange(len(q)), RULE)
 
@@ -68,14 +68,14 @@ def test_what_was_recognised_is_proven_by_the_same_replay():
 
 
 def about_an_edge():
-    """Return a posture about an edge; flat on the flat, those beside it touch the same points."""
+    """Return where the part leans on an edge; flat on the flat, neighbours touch the same points."""
     motion, wheel = small_motion(), small_problem().cell.wheel
     at_edge = np.abs(motion.contact_position) > wheel.flat_end + 5.0
     grinds = [k for k, s in enumerate(motion.kind) if s is MoveKind.GRIND and at_edge[k]]
     return grinds[len(grinds) // 4]
 
 
-def test_a_posture_off_the_wheel_costs_its_cutter_point_alone():
+def test_a_configuration_off_the_wheel_costs_its_cutter_point_alone():
     motion, problem, k = small_motion(), small_problem(), about_an_edge()
     q = motion.q.copy()
     q[k, 5] += 0.02
@@ -144,7 +144,7 @@ def test_a_pivot_through_the_hollow_is_followed(forwards):
     if not forwards:
         t = t[::-1]
     Ts = parts_at(wheel, points, place, t)
-    # alone, a posture may as well be a millimetre farther on
+    # alone, a configuration may as well be a millimetre farther on
     again = Ts[:, None] @ frames_at(points, place[:, None] + np.linspace(0.1, 0.3, 401))
     distance, _ = misfit(wheel, again, contact_positions(wheel, again))
     assert distance.min() < 1e-5
@@ -193,12 +193,12 @@ def test_of_several_touches_of_a_flat_the_one_is_taken_that_the_ways_around_bear
     t = [-23.7, 24.696, 24.943, 25.190, 25.684, 27.5, 29.7]
     found = find_touches(wheel, points, parts_at(wheel, points, place, t), 5e-5)
     at = [int(k) for k in np.flatnonzero(found.point == 26)]
-    assert found.posture[at].tolist() == [1, 3, 4]
+    assert found.configuration[at].tolist() == [1, 3, 4]
     ends = [int(np.flatnonzero(found.point == n)[0]) for n in (25, 27)]
     ways = Ways(wheel, points, parts_at(wheel, points, place, t), np.ones(7), found)
     assert ways.between(at[0], ends[1]).farthest > 1e-4
     settled = ways.settled(np.array([ends[0], at[0], ends[1]]), 1e-4)
-    assert found.posture[settled].tolist() == [0, 4, 6]
+    assert found.configuration[settled].tolist() == [0, 4, 6]
 
 
 def test_only_points_at_their_place_on_the_wheel_touch():
@@ -208,28 +208,28 @@ def test_only_points_at_their_place_on_the_wheel_touch():
     lifted = T.copy()
     lifted[2, 3] -= 2e-4
     found = find_touches(wheel, points, np.stack([T, lifted]), 1e-4)
-    assert 20 in found.point[found.posture == 0]
-    assert not (found.posture == 1).any()
+    assert 20 in found.point[found.configuration == 0]
+    assert not (found.configuration == 1).any()
 
 
 # alignment: a flat part touches in many places at once
 
 
 def touches(*rows):
-    posture, point, t, distance = (np.array(column) for column in zip(*rows, strict=True))
-    return Touches(posture, point, t.astype(float), distance * 1e-5)
+    configuration, point, t, distance = (np.array(column) for column in zip(*rows, strict=True))
+    return Touches(configuration, point, t.astype(float), distance * 1e-5)
 
 
 def test_of_many_touches_the_way_that_moves_least_is_taken():
-    # the part lies flat on the wheel: each of three postures touches all three points
+    # the part lies flat on the wheel: each of three configurations touches all three points
     rows = [(k, i, 4.0 * (i - k), 0.0) for k in range(3) for i in range(3)]
     found = touches(*rows)
     chosen = align(found, np.zeros(3, dtype=int), 1e-4, 1.0)
-    assert found.posture[chosen].tolist() == [0, 1, 2]
+    assert found.configuration[chosen].tolist() == [0, 1, 2]
     assert found.point[chosen].tolist() == [0, 1, 2]
 
 
-def test_one_posture_may_grind_two_points():
+def test_one_configuration_may_grind_two_points():
     found = touches((0, 0, 0.0, 0.0), (0, 1, 4.0, 0.0), (3, 2, 4.0, 0.0))
     assert len(align(found, np.zeros(3, dtype=int), 1e-4, 1.0)) == 3
 
@@ -246,7 +246,7 @@ def test_nothing_aligned_is_nothing():
     assert len(align(nothing, np.zeros(3, dtype=int), 1e-4, 1.0)) == 0
 
 
-def test_postures_that_grind_several_points_are_repeated():
+def test_configurations_that_grind_several_points_are_repeated():
     motion, problem, k = small_motion(), small_problem(), about_an_edge()
     point = int(motion.cutter_point[k])
     Ts = problem.points.Ts_workpiece_cutter.copy()

@@ -67,7 +67,7 @@ def test_the_passes_keep_joint_speeds_and_accelerations_seen_from_outside(name, 
         moves = np.flatnonzero(~np.isnan(ways) & (motion.pass_index == index))
         q = motion.q[np.concatenate([moves[:1] - 1, moves])]
         law = fastest_law(rounded_line(q, timing.timed.duration[moves]), limits, at_rest=True)
-        samples = law.postures(np.arange(0.0, law.time[-1], step))
+        samples = law.configurations(np.arange(0.0, law.time[-1], step))
         assert (np.abs(np.diff(samples, axis=0)) / step / robot.max_speed).max() <= 1.001
         second = samples[2:] - 2.0 * samples[1:-1] + samples[:-2]
         assert (np.abs(second) / step**2 / robot.max_acceleration).max() <= 1.001

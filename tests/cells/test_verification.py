@@ -24,7 +24,7 @@ from tests.support.bare_cells import (
     c_shape,
     convex_hull,
     free_move,
-    random_postures,
+    random_configurations,
     with_obstacle,
 )
 from tests.support.fcl_scene import FclScene
@@ -70,10 +70,10 @@ def indices(motion, kind):
 
 def test_bullets_link_poses_agree_with_forward_kinematics():
     cell = v_job().cell
-    postures = random_postures(cell.robot, 200)
+    configurations = random_configurations(cell.robot, 200)
     with World(cell) as world:
-        found = np.array([world.move_to(q) for q in postures])
-    wanted = forward_kinematics(cell.robot, postures) @ cell.T_flange_workpiece
+        found = np.array([world.move_to(q) for q in configurations])
+    wanted = forward_kinematics(cell.robot, configurations) @ cell.T_flange_workpiece
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-6)
 
 
@@ -83,13 +83,13 @@ def test_bullet_and_fcl_agree_on_what_is_too_near():
     random = np.random.default_rng(0)
     near = small_motion().q[random.integers(0, len(small_motion()), 150)]
     near = near + random.normal(scale=0.15, size=near.shape)
-    postures = np.concatenate(
-        [random_postures(cell.robot, 150), np.clip(near, cell.robot.lower, cell.robot.upper)]
+    configurations = np.concatenate(
+        [random_configurations(cell.robot, 150), np.clip(near, cell.robot.lower, cell.robot.upper)]
     )
     n_hits = 0
     with World(cell) as world:
         pairs = world.pairs()
-        for q in postures:
+        for q in configurations:
             margins = {frozenset(pair): margin for pair, margin in other.clearances(q).items()}
             world.move_to(q)
             for pair in pairs:
@@ -228,7 +228,7 @@ def test_clearances_are_those_of_an_independent_scene():
         nearest = min(
             margin + needed[pair] for pair, margin in margins.items() if needed[pair] > 0.0
         )
-        # that of the move is the least on the way to the posture
+        # that of the move is the least on the way to the configuration
         assert verified.clearance[k] <= min(nearest, HORIZON) + STATED
 
 
@@ -260,7 +260,7 @@ def test_the_tiny_motion_is_proven():
 
 
 @pytest.mark.parametrize("which", [2, 8, 15])
-def test_a_posture_that_cuts_into_the_wheel_is_caught(which):
+def test_a_configuration_that_cuts_into_the_wheel_is_caught(which):
     index = indices(tiny_motion(), MoveKind.GRIND)[which]
     verification = replay_tiny(moved_into_wheel(index, 0.002))
     assert refuses(verification, "collision", "part and wheel", "into each other")
@@ -274,7 +274,7 @@ def test_a_posture_that_cuts_into_the_wheel_is_caught(which):
     assert 1.0 < depth < 2.2
 
 
-def test_a_posture_that_leaves_the_wheel_is_caught():
+def test_a_configuration_that_leaves_the_wheel_is_caught():
     index = indices(tiny_motion(), MoveKind.GRIND)[8]
     verification = replay_tiny(moved_into_wheel(index, -0.001))
     assert refuses(verification, "contact", "part and wheel", "do not touch")
@@ -295,7 +295,7 @@ def test_an_obstacle_on_a_free_move_is_caught(kind):
     assert any(finding.where == place for finding in verification.findings)
 
 
-def test_a_collision_that_exists_only_between_two_postures_is_caught():
+def test_a_collision_that_exists_only_between_two_configurations_is_caught():
     ends = small_motion().q[:2]  # from home to the first pass, a long way
     middle = ends.mean(axis=0)
     cell = v_job().cell
@@ -321,7 +321,7 @@ def test_an_obstacle_thinner_than_a_large_step_is_caught():
     assert not FclScene(cell).clearances(q[0]).get(("part", "post"), 1.0) <= 0.0
 
 
-def test_a_posture_beyond_a_joint_limit_is_caught():
+def test_a_configuration_beyond_a_joint_limit_is_caught():
     motion, robot = tiny_motion(), tiny_problem().cell.robot
     q = motion.q.copy()
     q[0, 5] = robot.lower[5] - np.radians(0.5)
@@ -458,7 +458,7 @@ def test_levers_are_as_long_as_anything_moves():
             np.meshgrid(*zip(cell.part.vertices.min(0), cell.part.vertices.max(0), strict=True))
         )
         corners = corners.reshape(3, -1).T
-        for q in random_postures(cell.robot, 100):
+        for q in random_configurations(cell.robot, 100):
             for joint in range(6):
                 turned = q.copy()
                 turned[joint] += 1e-3 * random.choice([-1, 1])

@@ -118,7 +118,7 @@ def test_every_failure_says_why(mixed):
         "jobs/bad/job.yaml: 2 faults",
         "wheel.width_mm: must be more than 0, got -3",
     ]
-    assert narrow.startswith("no path: no free posture at cutter point 0")
+    assert narrow.startswith("no path: no free configuration at cutter point 0")
     assert "part cuts into wheel" in narrow
     assert first == (
         "jobs/twin1/job.yaml: name: must be another for each job, TWIN is also that of "

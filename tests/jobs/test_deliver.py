@@ -151,7 +151,7 @@ def run_without_path(job, out):
 
 def test_a_trough_too_narrow_for_the_wheel_says_how_deep_the_part_would_cut(tmp_path):
     first, *why = run_without_path(write_trough(tmp_path / "t"), tmp_path / "out")
-    assert first == "no path: no free posture at cutter point 0 (0 of 3 reached)"
+    assert first == "no path: no free configuration at cutter point 0 (0 of 3 reached)"
     assert len(why) == 1
     assert why[0].startswith(
         "cutter points 0 to 2 (pass 1): nothing is free: 100 % part cuts into wheel; the part cuts "
@@ -174,7 +174,7 @@ def test_a_joint_that_ends_short_is_named(tmp_path):
     write_robot(tmp_path / "j" / "tight", {"S": (60, 180)})
     changes = {"robot": "tight", "process.home_deg": [90, -45, -50, 0, 50, -180]}
     first, *why = run_without_path(write_job(tmp_path / "j", changes), tmp_path / "out")
-    assert first.startswith("no path: no free posture at cutter point 0 (0 of 19 reached)")
+    assert first.startswith("no path: no free configuration at cutter point 0 (0 of 19 reached)")
     assert why == ["cutter points 0 to 18 (pass 1): nothing is free: 100 % beyond the limits of S"]
 
 

@@ -44,8 +44,8 @@ class Written:
         job: Its job.
         points: The cutter points of the job.
         file: The program, with result.json beside it.
-        moves: Of each cutter point the number of the posture that grinds it.
-        last: Number of the last posture.
+        moves: Of each cutter point the number of the configuration that grinds it.
+        last: Number of the last configuration.
     """
 
     job: Job
@@ -86,7 +86,7 @@ def written(request, tmp_path_factory):
 
 
 class Text:
-    """A program that is tampered with; postures are told by their numbers."""
+    """A program that is tampered with; configurations are told by their numbers."""
 
     def __init__(self, written):
         self.text = written.file.read_bytes().decode("ascii")
@@ -108,20 +108,20 @@ class Text:
         return self
 
     def place(self, number):
-        """Return where a message says that the move to a posture is."""
+        """Return where a message says that the move to a configuration is."""
         before = self.text[: self.text.index(f"C{number:05d} ")]
         return f"line {before.count(chr(10)) + 1}"
 
     def reorder(self, numbers):
-        """Leave these postures and their moves, in this order, numbered anew."""
-        postures = dict(re.findall(r"C(\d{5})=(.*)\r\n", self.text))
+        """Leave these configurations and their moves, in this order, numbered anew."""
+        configurations = dict(re.findall(r"C(\d{5})=(.*)\r\n", self.text))
         moves = dict(re.findall(r"MOV[JL] C(\d{5}) (.*)\r\n", self.text))
         head, foot = self.text.split("C00000=")[0], self.text.split("MOVJ C00000 ")[0]
-        between = foot[foot.rindex(postures[max(postures)]) :].split("\r\n", 1)[1]
+        between = foot[foot.rindex(configurations[max(configurations)]) :].split("\r\n", 1)[1]
         told = [f"{number:05d}" for number in numbers]
         self.text = (
             re.sub(r"NPOS \d+,", f"NPOS {len(told)},", head)
-            + "".join(f"C{k:05d}={postures[number]}\r\n" for k, number in enumerate(told))
+            + "".join(f"C{k:05d}={configurations[number]}\r\n" for k, number in enumerate(told))
             + between
             + "".join(f"MOVJ C{k:05d} {moves[number]}\r\n" for k, number in enumerate(told))
             + "END\r\n"
@@ -266,7 +266,7 @@ def test_a_part_two_millimetres_too_big_is_found(written):
         assert refuses(proof, f"collision at {place}", "part and wheel", "into each other")
 
 
-def test_a_limit_that_cuts_the_farthest_posture_is_found(written):
+def test_a_limit_that_cuts_the_farthest_configuration_is_found(written):
     text, robot = Text(written), written.job.cell.robot
     q = np.array([text.angles(number) for number in written.moves])
     point, upper = int(q[:, 0].argmax()), robot.upper.copy()
@@ -278,7 +278,7 @@ def test_a_limit_that_cuts_the_farthest_posture_is_found(written):
 
 
 @pytest.mark.parametrize("written", ["s_shape"], indirect=True)  # the V has one in test_verify.py
-def test_a_limit_crossed_between_two_postures_is_found(written):
+def test_a_limit_crossed_between_two_configurations_is_found(written):
     """On a straight move a joint can go beyond what both ends have; on a joint move none can."""
     text = Text(written).replace(r"MOVJ (C00001) VJ=\S+", r"MOVL \1 V=50.0")
     robot = written.job.cell.robot
@@ -296,7 +296,7 @@ def test_a_limit_crossed_between_two_postures_is_found(written):
     else:
         lower[joint] = rest.min(axis=0)[joint] - below[joint] / 2.0
     narrow = in_cell(written, robot=replace(robot, lower=lower, upper=upper))
-    # as it was written, joint moves between the same postures, it stays within
+    # as it was written, joint moves between the same configurations, it stays within
     q = np.array([Text(written).angles(number) for number in range(written.last + 1)])
     assert (q > lower).all() and (q < upper).all()
     proof = proof_of(written, text, narrow)
@@ -304,15 +304,15 @@ def test_a_limit_crossed_between_two_postures_is_found(written):
     assert refuses(proof, "limit at way from home", f"joint {name}", "beyond its limit")
 
 
-def test_a_collision_only_between_two_postures_is_found(written):
+def test_a_collision_only_between_two_configurations_is_found(written):
     text, cell = Text(written), written.job.cell
     q = np.array([text.angles(number) for number in range(written.last + 1)])
 
-    def corners(postures):
-        Ts = forward_kinematics(cell.robot, postures) @ cell.T_flange_workpiece
+    def corners(configurations):
+        Ts = forward_kinematics(cell.robot, configurations) @ cell.T_flange_workpiece
         return transform(Ts[:, None], cell.part.vertices)
 
-    # the corner that, half-way, is farthest from all corners at the written postures
+    # the corner that, half-way, is farthest from all corners at the written configurations
     half_way = corners(q[:2].mean(axis=0)[None])[0]
     distance, _ = KDTree(corners(q).reshape(-1, 3)).query(half_way)
     narrow = with_obstacle(cell, half_way[distance.argmax()], (2e-3, 2e-3, 2e-3), "pin")

@@ -16,6 +16,7 @@ from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job, load
 from opl.program.posts import find_post
 from opl.proof.prove import prove
+from tests.support.example_post import install_example_post
 from tests.support.jobs import GONE, opl, write_job
 
 SHORT = {
@@ -196,6 +197,7 @@ def written(request, tmp_path_factory):
     labels = [line.split(",")[1] for line in lines[1:]]
     text = file.read_bytes().decode("ascii")
     result = json.loads((home / "out" / "result.json").read_text())
+    assert result["program"]["read_back"] is True
     assert len(labels) == result["program"]["moves"]  # each row of the table has a move
     move, following = (labels.index(f"{k:.4f}") for k in (point, point + 1))
     return Written(language, request.param, job, points, file, text, move, following, point)
@@ -220,7 +222,7 @@ def test_what_is_read_back_is_what_was_proven(written):
     file = result["verification"]["file"]
     assert file["proven"] is True and file["replayed"] is False
     assert file["largest_difference_mm"] == 0.0 and 0.0 < file["largest_rounding_mm"] < 0.05
-    assert file["postures"] == result["program"]["moves"]
+    assert file["configurations"] == result["program"]["moves"]
     ended = opl("verify", written.job.path, written.file, "--json")
     assert ended.status == 0, ended.err
     proof = json.loads(ended.out)
@@ -332,3 +334,18 @@ def test_a_file_of_another_language_is_refused(written, tmp_path):
     assert ended.status == 2 and "program.controller" in ended.err
     ended = opl("show", written.file, "--diff", other)
     assert ended.status == 2 and "is not of the language" in ended.err
+
+
+def test_a_program_without_a_reader_is_written_and_not_read_back(tmp_path, monkeypatch):
+    install_example_post(tmp_path, monkeypatch)
+    changes = {**SHORT, "program.controller": "OUR_CELL", "robot": "gp25"}
+    job = write_job(tmp_path / "job", changes)
+    monkeypatch.setattr(pipeline, "draw", lambda outcome, problem: None)
+    ended = opl("run", job, "--out", tmp_path / "out")
+    assert ended.status == 0, ended.err
+    assert "written, not read back" in " ".join(ended.out.split())
+    assert "read back from" not in ended.out
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert result["verification"]["file"] is None and result["program"]["read_back"] is False
+    ended = opl("verify", job, tmp_path / "out" / "V_SHAPE.txt")
+    assert ended.status == 2 and "our own cell are written, not read back" in ended.err

@@ -55,7 +55,7 @@ def under_the_hood():
 
 
 def table(folder):
-    """Return the kind of each move of the program, and its postures in [rad]."""
+    """Return the kind of each move of the program, and its configurations in [rad]."""
     with (folder / "HOOD.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     joints = [name for name in rows[0] if name.endswith("_deg")][:6]
@@ -84,14 +84,14 @@ def test_a_plate_between_two_passes_is_led_around():
     assert margin_along(cell, way, 2.0) > 0.0
 
 
-def test_a_program_with_postures_on_the_way_is_read_back_and_proven():
+def test_a_program_with_configurations_on_the_way_is_read_back_and_proven():
     _, job, out = under_the_hood()
     ended = opl("verify", job, out / "HOOD.JBI")
     assert ended.status == 0, ended.err
 
 
 def planned(job):
-    """Return the postures of the motion of a job, as bytes; for another process."""
+    """Return the configurations of the motion of a job, as bytes; for another process."""
     loaded = load(Path(job))
     problem = prepare(cut_surface(loaded)).problem
     return plan_recursive(problem, loaded.search.start).motion.q.tobytes()
@@ -153,7 +153,7 @@ def test_a_home_that_nothing_leads_out_of_is_refused_and_the_pair_named(tmp_path
     assert message.endswith("there is no way through the air")
     assert ways[0].startswith("way from home: ")
     assert " and cage " in ways[0]
-    assert advice.startswith("would help: another home posture, or cage ")
+    assert advice.startswith("would help: another home configuration, or cage ")
     assert all(line in ended.err for line in told["reasons"])
     # nothing at the wheel is to blame, so nothing there was tried
     assert told["remedies"] == []

@@ -59,8 +59,8 @@ UR10E = {"robot": "ur10e", "process.home_deg": [0.0, -110.0, 110.0, -90.0, -90.0
     [
         (
             {**UR10E, "robot": "mine", **program(positions="base")},
-            r"program\.positions: must be pulses: poses of DX200 name a posture as that of an arm "
-            r"with a spherical wrist, which mine has not",
+            r"program\.positions: must be pulses: poses of DX200 name a configuration as that of "
+            r"an arm with a spherical wrist, which mine has not",
         ),
         (
             {**IRB2600, **program()},
@@ -119,8 +119,16 @@ def test_straight_moves_are_told_from_where_the_controller_counts(maker, height)
     post = importlib.import_module(f"opl.program.{maker}").POST
     q = np.array([[0.0, 0, 0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0]])
     moves = tuple(
-        Move(posture, 0.1, exact_stop=True, on_wheel=False, posture=k, duration=d, straight=k > 0)
-        for k, (posture, d) in enumerate(zip(q, (None, 1.0), strict=True))
+        Move(
+            configuration,
+            0.1,
+            exact_stop=True,
+            on_wheel=False,
+            motion_index=k,
+            duration=d,
+            straight=k > 0,
+        )
+        for k, (configuration, d) in enumerate(zip(q, (None, 1.0), strict=True))
     )
     settings = ProgramSettings(controller=maker.upper())
     written = post.write(Program("SAMPLE", moves=moves), load_robot("kr16"), settings, DATE)

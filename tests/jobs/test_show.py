@@ -70,7 +70,7 @@ def test_wrong_count_of_positions_is_told():
     assert "caution: ///NPOS is 4,0,0,0,0,0, there are 3,0,0,0,0,0" in lines
 
 
-def test_job_written_by_opl_is_shown_posture_by_posture():
+def test_job_written_by_opl_is_shown_configuration_by_configuration():
     shown = "\n".join(describe(parse(written()), ROBOT))
     rows = re.findall(r"angles S (\S+) L (\S+) U (\S+) R (\S+) B (\S+) T (\S+)", shown)
     q = plan_moves(verified_motion(), "A", ROBOT.max_speed).moves

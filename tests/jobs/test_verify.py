@@ -69,13 +69,13 @@ def _tidy_up():
 
 @cache
 def columns():
-    """Return the table of the short program: one row a posture."""
+    """Return the table of the short program: one row a configuration."""
     lines = (planned() / "out" / "V_SHAPE.csv").read_text().splitlines()
     return [dict(zip(lines[0].split(","), line.split(","), strict=True)) for line in lines[1:]]
 
 
 def ground(n):
-    """Return the number of the posture that grinds a cutter point."""
+    """Return the number of the configuration that grinds a cutter point."""
     return next(k for k, row in enumerate(columns()) if row["cutter_point"] == f"{n:.4f}")
 
 
@@ -149,12 +149,12 @@ def test_a_run_ends_with_reading_back_what_it_writes():
     result = json.loads((planned() / "out" / "result.json").read_text())
     proof = result["verification"]["file"]
     assert proof["proven"] is True and proof["files"] == ["V_SHAPE.JBI"]
-    assert proof["postures"] == result["program"]["moves"]
+    assert proof["configurations"] == result["program"]["moves"]
     assert proof["largest_difference_mm"] == 0.0 and proof["replayed"] is False
     assert 0.0 < proof["largest_rounding_mm"] < 0.05
 
 
-def test_proven_and_written_postures_are_one():
+def test_proven_and_written_configurations_are_one():
     scale = PulseScale.of(load(planned() / "job.yaml").cell.robot)
     (job,) = load_jobs(planned() / "out" / "V_SHAPE.JBI")
     written = np.array([position.values for position in job.positions])
@@ -239,6 +239,13 @@ def test_full_speed_on_the_wheel_is_found(tmp_path):
     text = Text().replace(rf"(C{ground(20):05d}) VJ=[0-9.]+", r"\1 VJ=100.00")
     ended = verify(tmp_path, text)
     assert refuses(ended, "speed at pass 1", "times the feed")
+
+
+@pytest.mark.parametrize("line", ["TIMER T=2.00", "WAIT IN#(1)=ON", "PAUSE"])
+def test_standing_still_on_the_wheel_is_found(tmp_path, line):
+    text = Text().replace(rf"(MOVJ C{ground(20):05d} .*\r\n)", rf"\1{line}\r\n")
+    ended = verify(tmp_path, text)
+    assert refuses(ended, "wait at pass 1, cutter point 20", "stands still on the wheel", line)
 
 
 def test_a_fast_first_move_and_rounded_corners_are_found(tmp_path):

@@ -101,7 +101,7 @@ def test_without_strips_the_bound_is_that_of_the_nodes():
         assert bound == pytest.approx(least_box(ladder, NOTHING).lower_bound, abs=1e-8)
 
 
-def posture(s, t):
+def configuration(s, t):
     """Return a smooth motion with a corner where t passes 0.3, as at an edge of the wheel."""
     s, t = np.broadcast_arrays(s, t)
     corner = np.maximum(t - 0.3, 0.0)
@@ -123,14 +123,14 @@ def test_the_intervals_of_a_strip_hold_what_passes_there(n_cells):
     t_rows = np.linspace(-1.0, 1.0, 12)
     places = np.linspace(0.0, 1.0, n_cells + 1)
     exact = np.isin(places, [0.0, 1.0])
-    strips = strips_of(posture(places[:, None], t_rows[None, :]), exact, in_order=True)
+    strips = strips_of(configuration(places[:, None], t_rows[None, :]), exact, in_order=True)
     for cell, (before, after) in enumerate(pairwise(places)):
         s = np.linspace(before, after, 50)
-        passed = posture(s[:, None], t_rows[None, :])  # (50, n_rows, 6)
+        passed = configuration(s[:, None], t_rows[None, :])  # (50, n_rows, 6)
         assert np.greater_equal(passed.min(axis=0).T + 1e-12, strips.row_low[cell]).all()
         assert np.less_equal(passed.max(axis=0).T - 1e-12, strips.row_high[cell]).all()
         for row in range(1, len(t_rows)):
-            passed = posture(after, np.linspace(t_rows[row - 1], t_rows[row], 50))
+            passed = configuration(after, np.linspace(t_rows[row - 1], t_rows[row], 50))
             assert (passed.min(axis=0) >= strips.gap_low[cell, :, row] - 1e-12).all()
             assert (passed.max(axis=0) <= strips.gap_high[cell, :, row] + 1e-12).all()
 

@@ -73,7 +73,7 @@ def on_wheel(motion):
 
 
 def free_tracks(problem):
-    """Yield (posture at each cutter point, t at each) of every continuous track of a tiny field."""
+    """Yield (q at each cutter point, t at each) of every continuous track of a tiny field."""
     rule = problem.interpolation
     for nodes in problem.field.matrices:
         free = problem.free_nodes(nodes)
@@ -346,7 +346,7 @@ def test_one_part_alone_has_the_bound_of_that_part():
 # the tube around a path, and the box of low travel in it
 
 
-def test_a_tube_holds_the_path_and_only_postures_that_grind_near_it():
+def test_a_tube_holds_the_path_and_only_configurations_that_grind_near_it():
     problem, path = one_row(), recursive(one_row).path
     whole = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
     finer = halved(problem.field.contact_positions)

@@ -69,19 +69,19 @@ def bare_cell(part, obstacles=(), clearance=0.005):
 
 
 def free_move(q, seconds=10.0):
-    """Return a timed motion that visits postures and touches nothing."""
+    """Return a timed motion that visits configurations and touches nothing."""
     duration = np.full(len(q), seconds)
     duration[0] = 0.0
     motion = Motion.off_wheel(np.asarray(q, dtype=float), MoveKind.HOME, -1)
     return TimedMotion(motion, duration)
 
 
-def random_postures(robot, n, seed=0):
+def random_configurations(robot, n, seed=0):
     return np.random.default_rng(seed).uniform(robot.lower, robot.upper, (n, 6))
 
 
 class Ghosts:
-    """A scene in which postures near some others collide; stands in for a `CollisionScene`."""
+    """A scene in which all near some configurations collide; stands in for a `CollisionScene`."""
 
     def __init__(self, q, radius):
         self._q = np.atleast_2d(q)

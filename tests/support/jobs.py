@@ -31,7 +31,7 @@ QUICK = {
     "process.approach_mm": 20,
 }
 
-# a post where the part has to be when it is ground: every posture on the wheel hits it
+# a post where the part has to be when it is ground: every configuration on the wheel hits it
 POST = {"name": "post", "box_mm": [60, 60, 400], "at_mm": [800, 235, 320]}
 
 

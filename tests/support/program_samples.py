@@ -26,12 +26,12 @@ HOME = np.deg2rad([0.0, -20.0, 10.0, 0.0, -60.0, 0.0])
 def verified_motion(n_passes=2, n_points=4):
     """Passes of n_points cutter points with one node between the first two of them.
 
-    The approach ends where the grinding begins, so that posture is given twice.
+    The approach ends where the grinding begins, so that configuration is given twice.
     """
     q, rows = [HOME], [(0.0, MoveKind.HOME, np.nan, np.nan, -1, 0.5)]
 
-    def go(posture, *row):
-        q.append(posture)
+    def go(configuration, *row):
+        q.append(configuration)
         rows.append(row)
 
     for k in range(n_passes):
@@ -43,10 +43,10 @@ def verified_motion(n_passes=2, n_points=4):
         go(start, 0.1, MoveKind.APPROACH, np.nan, np.nan, k, 0.001)
         places = sorted([0.5, *range(n_points)])
         for place in places:
-            posture = start + place * np.deg2rad([0.11, 0.05, -0.07, 0.3, 0.02, -0.4])
+            configuration = start + place * np.deg2rad([0.11, 0.05, -0.07, 0.3, 0.02, -0.4])
             kind = MoveKind.BETWEEN if place == 0.5 else MoveKind.GRIND
             step = 0.0 if place == 0 else 0.05 if place in (0.5, 1) else 0.1
-            go(posture, step, kind, place - 1.0, k * n_points + place, k, 0.002)
+            go(configuration, step, kind, place - 1.0, k * n_points + place, k, 0.002)
         end = q[-1]
         for share in (0.5, 1.0):
             away = end + share * (before - start)

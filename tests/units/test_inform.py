@@ -41,8 +41,8 @@ def sample(**options):
     )
 
 
-def program_of(postures, speed=0.1):
-    return Program("ANY", moves=tuple(Move(q, speed, True, False, 0) for q in postures))
+def program_of(configurations, speed=0.1):
+    return Program("ANY", moves=tuple(Move(q, speed, True, False, 0) for q in configurations))
 
 
 def job_text(**changes):
@@ -110,10 +110,10 @@ def test_programmed_time_of_each_pass_is_the_wanted_one_within_two_percent():
     q = SCALE.to_angles(pulses)
     speed = np.array([float(move.tag("VJ")) / 100.0 for move in job.moves])
     times = (np.abs(np.diff(q, axis=0)) / MAX_SPEED).max(axis=1) / speed[1:]
-    posture = np.array([move.posture for move in sample(n_points=60).moves])
+    configuration = np.array([move.motion_index for move in sample(n_points=60).moves])
     for pass_index in (0, 1):
         ground = (motion.pass_index == pass_index) & ~np.isnan(motion.contact_position)
-        written = times[ground[posture[1:]] & ground[posture[:-1] + 1]].sum()
+        written = times[ground[configuration[1:]] & ground[configuration[:-1] + 1]].sum()
         assert written == pytest.approx(timed.duration[ground].sum(), rel=0.02)
 
 
@@ -137,7 +137,7 @@ def test_date_and_tool_are_the_ones_given():
     st.lists(st.lists(st.floats(0.0, 1.0), min_size=6, max_size=6), min_size=1, max_size=5),
     st.floats(0.0, 1.0, exclude_min=True),
 )
-def test_postures_come_back_within_half_a_pulse_and_speeds_in_range(shares, speed):
+def test_configurations_come_back_within_half_a_pulse_and_speeds_in_range(shares, speed):
     q = SCALE.lower + np.array(shares) * (SCALE.upper - SCALE.lower)
     job = parse(render(program_of(q, speed), ROBOT, DATE))
     pulses = np.array([position.values for position in job.positions])
@@ -148,7 +148,7 @@ def test_postures_come_back_within_half_a_pulse_and_speeds_in_range(shares, spee
         assert float(move.tag("VJ")) == pytest.approx(100.0 * speed, abs=0.0100001)
 
 
-def test_posture_beyond_the_soft_limits_gives_no_job():
+def test_configuration_beyond_the_soft_limits_gives_no_job():
     with pytest.raises(UnsafeError, match=r"joint S .* soft limits"):
         render(program_of([SCALE.upper + 0.01]), ROBOT, DATE)
 
@@ -340,7 +340,7 @@ def test_headers_hold_until_they_change():
         "///TOOL 2\n///POSTYPE PULSE\n///PULSE\nP00092=1,2,3,4,5,6\nP92=7,8,9,0,1,2",
     )
     job = parse(text)
-    seen = [(p.frame, p.coordinates, p.tool, p.user, p.configuration) for p in job.positions]
+    seen = [(p.frame, p.coordinates, p.tool, p.user, p.rconf) for p in job.positions]
     assert seen == [
         ("USER", "RECTAN", 4, 12, (1, 0, 0)),
         ("ROBOT", "RECTAN", 4, 12, (0, 1, 1)),

@@ -6,7 +6,7 @@ import pytest
 from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import rotation_angle
 from opl.program.inform import parse, write_jobs
-from opl.program.inform.times import job_postures
+from opl.program.inform.times import job_configurations
 from opl.program.lines import stray, with_straight_moves
 from opl.program.moves import Kind, plan_moves
 from opl.program.profiles import DX200
@@ -49,7 +49,7 @@ def test_speed_of_straight_moves_gives_each_its_wanted_time():
     written = write_jobs(program, ROBOT, ProgramSettings(), DX200, DATE)
     (text,) = written.files.values()
     job = parse(text)
-    q = job_postures(job, ROBOT, np.eye(4), T_FLANGE_TOOL)
+    q = job_configurations(job, ROBOT, np.eye(4), T_FLANGE_TOOL)
     p = forward_kinematics(ROBOT, q)[:, :3, 3] * 1e3
     lines = [k for k, move in enumerate(job.moves) if move.word == "MOVL"]
     assert len(lines) > 70

@@ -28,15 +28,17 @@ def test_only_a_verified_motion_becomes_a_program(motion):
         plan(motion)
 
 
-def test_every_distinct_posture_is_a_move_and_a_repeated_one_is_none():
+def test_every_distinct_configuration_is_a_move_and_a_repeated_one_is_none():
     verified = verified_motion()
     program = plan(verified)
     q = verified.motion.q
     repeated = [i for i in range(1, len(q)) if np.array_equal(q[i], q[i - 1])]
     assert len(repeated) == 2  # the first cutter point of each pass
-    assert [m.posture for m in program.moves] == [i for i in range(len(q)) if i not in repeated]
+    assert [m.motion_index for m in program.moves] == [
+        i for i in range(len(q)) if i not in repeated
+    ]
     for move in program.moves:
-        np.testing.assert_array_equal(move.q, q[move.posture])
+        np.testing.assert_array_equal(move.q, q[move.motion_index])
 
 
 def test_slow_drift_is_not_lost_by_dropping_small_steps():
@@ -58,14 +60,14 @@ def test_played_at_its_speeds_the_program_takes_the_time_of_the_motion():
     assert times.sum() == pytest.approx(timed.seconds)
 
 
-def test_time_of_a_repeated_posture_goes_to_the_move_that_follows():
+def test_time_of_a_repeated_configuration_goes_to_the_move_that_follows():
     verified = verified_motion()
     motion = verified.motion
     duration = verified.timed.duration.copy()
     (repeated, *_) = [i for i in range(1, len(motion)) if (motion.q[i] == motion.q[i - 1]).all()]
     duration[repeated] = 0.05
-    before = {m.posture: m.speed for m in plan(verified).moves}
-    after = {m.posture: m.speed for m in plan(with_times(verified, duration)).moves}
+    before = {m.motion_index: m.speed for m in plan(verified).moves}
+    after = {m.motion_index: m.speed for m in plan(with_times(verified, duration)).moves}
     assert after[repeated + 1] == pytest.approx(before[repeated + 1] / 2)
 
 
@@ -77,7 +79,7 @@ def test_first_move_is_slow_and_comes_to_rest():
 
 def test_robot_stops_at_home_at_stretch_ends_and_never_within_a_pass():
     verified = verified_motion(n_passes=1)
-    stops = [(m.posture, m.exact_stop, m.on_wheel) for m in plan(verified).moves]
+    stops = [(m.motion_index, m.exact_stop, m.on_wheel) for m in plan(verified).moves]
     assert stops == [
         (0, True, False),  # home
         (1, True, False),  # above the wheel
@@ -120,7 +122,9 @@ def test_comments_name_the_passes_and_home():
 def test_move_faster_than_a_joint_is_refused_by_name(duration):
     times = verified_motion().timed.duration.copy()
     times[1] = duration
-    with pytest.raises(UnsafeError, match=r"posture 1 \(home\): joint S would need (inf|1\d{3})"):
+    with pytest.raises(
+        UnsafeError, match=r"configuration 1 \(home\): joint S would need (inf|1\d{3})"
+    ):
         plan(with_times(verified_motion(), times))
 
 
@@ -131,7 +135,7 @@ def test_too_fast_joint_is_named_where_others_stand_still():
         plan(with_times(still, [0.0, 0.0], q))
 
 
-def test_move_keeps_its_own_read_only_posture():
+def test_move_keeps_its_own_read_only_configuration():
     q = HOME.copy()
     move = Move(q, 0.1, True, False, 0)
     q[0] = 9.0
@@ -174,7 +178,7 @@ def test_more_than_99_parts_keep_their_order_when_sorted_by_name():
 
 def test_pass_too_long_for_a_job_is_refused_with_its_size():
     program = plan(verified_motion(n_passes=1, n_points=50))
-    with pytest.raises(OplError, match=r"postures 2 to 56 take \d+ moves .* a job holds 20"):
+    with pytest.raises(OplError, match=r"configurations 2 to 56 take \d+ moves .* a job holds 20"):
         split(program, 20)
 
 

@@ -1,6 +1,5 @@
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,10 +12,11 @@ from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInp
 from opl.program.inform import find_faults, parse
 from opl.program.inform.layout import VARIABLES, JobLayout, Step
 from opl.program.moves import Program, plan_moves
-from opl.program.posts import GROUP, find_post, known_posts
+from opl.program.posts import find_post, known_posts
 from opl.program.profiles import PROFILES
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
 from opl.program.write import StraightLimit, write_program
+from tests.support.example_post import install, install_example_post
 from tests.support.program_samples import (
     DATE,
     MAX_SPEED,
@@ -183,7 +183,7 @@ def moves_read(controller, text):
 
 
 @pytest.mark.parametrize("controller", ["RAPID", "FANUC", "URSCRIPT"])
-def test_other_makers_go_to_the_same_postures_in_the_same_time(controller):
+def test_other_makers_go_to_the_same_configurations_in_the_same_time(controller):
     program, files = write(controller)
     (text,) = [text for name, text in files.items() if not name.endswith(".csv")]
     for move, (angles, time) in zip(program.moves, moves_read(controller, text), strict=True):
@@ -192,7 +192,7 @@ def test_other_makers_go_to_the_same_postures_in_the_same_time(controller):
             assert time == pytest.approx(move.duration, abs=6e-4)
 
 
-def test_krl_goes_to_the_same_postures_in_whole_percents():
+def test_krl_goes_to_the_same_configurations_in_whole_percents():
     program, files = write("KRL")
     text = files["SAMPLE.src"]
     rows = re.findall(r"BAS\(#VEL_PTP, (\d+)\)\r\nPTP \{(.*?)\}( C_PTP)?\r\n", text)
@@ -300,23 +300,8 @@ def test_unknown_controller_is_refused_with_the_known_ones():
     assert shown.exit_code == 2 and "unknown controller" in shown.output
 
 
-def install(folder, entries):
-    """Make what a package manager would: the entry points of an installed package."""
-    info = folder / "our_cell_post-1.0.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: our-cell-post\nVersion: 1.0\n")
-    rows = [f"{name} = {value}" for name, value in entries.items()]
-    (info / "entry_points.txt").write_text("\n".join([f"[{GROUP}]", *rows, ""]))
-
-
 def test_a_site_adds_its_own_post_without_touching_opl(tmp_path, monkeypatch):
-    package = Path(__file__).parents[1] / "example_post"
-    declared = (package / "pyproject.toml").read_text()
-    ((name, value),) = re.findall(r'^(OUR_CELL) = "(.*)"$', declared, re.MULTILINE)
-    assert f'[project.entry-points."{GROUP}"]' in declared
-    install(tmp_path, {name: value})
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.syspath_prepend(package)
+    install_example_post(tmp_path, monkeypatch)
     text = programs("OUR_CELL")["SAMPLE.txt"]
     assert text.startswith("PROGRAM SAMPLE 2024-03-05\nGO 0.000 -20.000 10.000 0.000 -60.000")
     assert "OUR_CELL: our own cell" in CliRunner().invoke(main, ["templates", "vars"]).output

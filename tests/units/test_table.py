@@ -48,7 +48,7 @@ def test_table_is_the_golden_one(assert_golden):
     assert_golden("SAMPLE.csv", table())
 
 
-def test_every_posture_has_a_row_and_every_row_every_column():
+def test_every_configuration_has_a_row_and_every_row_every_column():
     assert len(rows()) == len(verified_motion().motion)
     assert all(None not in row and None not in row.values() for row in rows())
     assert {row["kind"] for row in rows()} == {

@@ -1,4 +1,4 @@
-"""The time law against closed forms, a linear program, and differences of its own postures."""
+"""The time law against closed forms, a linear program, and differences of its own samples."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ LIMITS = JointLimits(np.array([3.0, 3.0, 3.5, 7.0, 7.0, 10.0]), np.full(6, 8.0))
 
 
 def joints(*columns):
-    """Return postures whose first joints go through columns, the others standing still."""
+    """Return configurations whose first joints go through columns, the others standing still."""
     q = np.zeros((len(columns[0]), 6))
     for k, column in enumerate(columns):
         q[:, k] = column
@@ -24,7 +24,7 @@ def joints(*columns):
 
 def sampled_loads(law, limits, step=1e-3):
     """Return the largest joint speed and acceleration, by limit, seen in samples of positions."""
-    q = law.postures(np.arange(0.0, law.time[-1], step))
+    q = law.configurations(np.arange(0.0, law.time[-1], step))
     speed = np.abs(np.diff(q, axis=0)) / step / limits.speed
     acceleration = np.abs(q[2:] - 2.0 * q[1:-1] + q[:-2]) / step**2 / limits.acceleration
     return speed.max(), acceleration.max()
@@ -115,7 +115,7 @@ def test_samples_keep_the_limits_and_the_law_is_no_faster_than_wanted(seed, at_r
     assert max(sampled_loads(law, limits)) <= 1.001
     assert (np.diff(law.node_times) >= times * (1.0 - 1e-9)).all()
     assert max(law.speed_load.max(), law.acceleration_load.max()) <= 1.0 + 1e-4
-    ends = law.postures(np.array([0.0, law.time[-1]]))
+    ends = law.configurations(np.array([0.0, law.time[-1]]))
     np.testing.assert_allclose(ends, q[[0, -1]], atol=1e-9)
     if at_rest:
         assert law.path_speed[[0, -1]] == pytest.approx(0.0, abs=1e-6)
@@ -123,15 +123,15 @@ def test_samples_keep_the_limits_and_the_law_is_no_faster_than_wanted(seed, at_r
 
 @given(seed=st.integers(0, 10**6))
 @settings(max_examples=30, deadline=None)
-def test_the_line_leaves_postures_and_straight_moves_by_no_more_than_the_cut(seed):
+def test_the_line_leaves_configurations_and_straight_moves_by_no_more_than_the_cut(seed):
     q, times = random_line(seed)
     line = rounded_line(q, times)
-    assert np.abs(line.postures(line.nodes) - q).max() <= CORNER_CUT + 1e-12
+    assert np.abs(line.configurations(line.nodes) - q).max() <= CORNER_CUT + 1e-12
     places = np.linspace(0.0, line.nodes[-1], 2000)
     straight = np.stack([np.interp(places, line.nodes, joint) for joint in q.T], axis=-1)
-    assert np.abs(line.postures(places) - straight).max() <= CORNER_CUT + 1e-12
+    assert np.abs(line.configurations(places) - straight).max() <= CORNER_CUT + 1e-12
     middles = (line.nodes[:-1] + line.nodes[1:]) / 2.0
-    np.testing.assert_allclose(line.postures(middles), (q[:-1] + q[1:]) / 2.0, atol=1e-9)
+    np.testing.assert_allclose(line.configurations(middles), (q[:-1] + q[1:]) / 2.0, atol=1e-9)
 
 
 def test_an_even_motion_is_a_straight_line_however_its_moves_are_cut():

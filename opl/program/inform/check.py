@@ -105,9 +105,9 @@ def _position_faults(job: InformJob, profile: ControllerProfile) -> Iterator[str
         elif (
             position.coordinates == "RECTAN"
             and position.kind == "C"
-            and (len(position.configuration) != profile.configuration_fields)
+            and (len(position.rconf) != profile.rconf_fields)
         ):
-            yield f"line {position.line}: RCONF has {profile.configuration_fields} numbers"
+            yield f"line {position.line}: RCONF has {profile.rconf_fields} numbers"
         elif not 0 <= position.tool <= profile.highest_tool:
             yield f"line {position.line}: tools are 0 to {profile.highest_tool}"
         if position.kind == "C" and len(position.label) != 1 + profile.label_digits:

@@ -61,7 +61,7 @@ def _position(job: InformJob, index: int) -> str:
         of.append(f"user frame {position.user}")
     if position.coordinates == "RECTAN":
         # numbers of RCONF after the sixth have no meaning
-        of.append(f"RCONF {','.join(map(str, position.configuration[:6]))}")
+        of.append(f"RCONF {','.join(map(str, position.rconf[:6]))}")
     return f"{values} ({', '.join(of)})"
 
 

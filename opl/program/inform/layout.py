@@ -25,7 +25,7 @@ VARIABLES = {
     "steps": "each position and the move to it, in order; no steps in a master job",
     "step.label": "of the position, e.g. C00000",
     "step.values": "pulses, or lengths in mm and angles in degrees",
-    "step.configuration": "numbers of RCONF where they change, else none",
+    "step.rconf": "numbers of RCONF where they change, else none",
     "step.word": "MOVJ or MOVL",
     "step.speed": "of the move, e.g. VJ=5.00, V=20.0 or VR=3.0",
     "step.level": "position level (PL)",
@@ -42,7 +42,7 @@ class Step:
 
     label: str
     values: str
-    configuration: str | None
+    rconf: str | None
     word: str
     speed: str
     level: str
@@ -124,21 +124,21 @@ def _positions_read(job: InformJob) -> list[str]:
         if position.frame == "USER":
             of += [f"user frame {position.user}"]
         if position.coordinates != "PULSE":
-            of += [f"RCONF {','.join(map(str, position.configuration))}"]
+            of += [f"RCONF {','.join(map(str, position.rconf))}"]
         rows.append(f"{job.lines[position.line - 1]} ({', '.join(of)})")
     return rows
 
 
 def _positions_wanted(layout: JobLayout) -> list[str]:
     rows = []
-    configuration = None
+    rconf = None
     for step in layout.steps:
-        configuration = step.configuration or configuration
+        rconf = step.rconf or rconf
         of = [layout.postype, f"tool {layout.tool}"]
         if layout.user:
             of += [f"user frame {layout.user}"]
-        if configuration:
-            of += [f"RCONF {configuration}"]
+        if rconf:
+            of += [f"RCONF {rconf}"]
         rows.append(f"{step.label}={step.values} ({', '.join(of)})")
     return rows
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import inverse, rotation_angle
 from opl.program.controller import ControllerProfile
-from opl.program.inform.cartesian import configuration, frame_pose, rectan, require_read_back
+from opl.program.inform.cartesian import frame_pose, rconf_of, rectan, require_read_back
 from opl.program.moves import Program
 from opl.program.pulses import PulseScale
 from opl.program.settings import PositionForm, ProgramSettings
@@ -29,12 +29,12 @@ class WrittenPositions:
 
     Attributes:
         values: Of each position.
-        configurations: The numbers of RCONF, one text a position; none for pulses.
+        rconfs: The numbers of RCONF, one text a position; none for pulses.
         q: Joint positions that the texts stand for in [rad], shape (n, 6).
     """
 
     values: tuple[str, ...]
-    configurations: tuple[str | None, ...]
+    rconfs: tuple[str | None, ...]
     q: Array
 
 
@@ -44,7 +44,7 @@ def write_positions(
     """Write the positions of a program.
 
     Raises:
-        UnsafeError: If one is beyond the soft limits, or RCONF does not name its posture.
+        UnsafeError: If one is beyond the soft limits, or RCONF does not name its configuration.
     """
     q = np.array([move.q for move in program.moves]).reshape(-1, 6)
     scale = PulseScale.of(robot)
@@ -55,12 +55,12 @@ def write_positions(
         return WrittenPositions(texts, (None,) * len(q), scale.to_angles(pulses))
     T_base_frame, T_flange_tool = frame_pose(settings), settings.T_flange_tool
     values = rectan(inverse(T_base_frame) @ forward_kinematics(robot, q) @ T_flange_tool, profile)
-    numbers = [configuration(robot, posture) for posture in q]
+    numbers = [rconf_of(robot, configuration) for configuration in q]
     read_back = [
-        require_read_back(robot, posture, value, number, T_base_frame, T_flange_tool)
-        for posture, value, number in zip(q, values, numbers, strict=True)
+        require_read_back(robot, configuration, value, number, T_base_frame, T_flange_tool)
+        for configuration, value, number in zip(q, values, numbers, strict=True)
     ]
-    unused = (0,) * (profile.configuration_fields - 6)
+    unused = (0,) * (profile.rconf_fields - 6)
     written = (",".join(map(str, (*number, *unused))) for number in numbers)
     return WrittenPositions(tuple(values), tuple(written), np.array(read_back).reshape(-1, 6))
 

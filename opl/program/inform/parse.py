@@ -137,7 +137,7 @@ def _position(number: int, line: str, in_force: dict[str, Header], source: str) 
     if not all(shape.fullmatch(value) for value in values):
         kind = "pulses are whole numbers" if coordinates == "PULSE" else "positions are numbers"
         raise _error(source, number, f"{kind} with commas between, got {_shown(match[2])}")
-    tool, user, configuration = (
+    tool, user, rconf = (
         _integers(in_force[key], source) if key in in_force else ()
         for key in ("TOOL", "USER", "RCONF")
     )
@@ -151,7 +151,7 @@ def _position(number: int, line: str, in_force: dict[str, Header], source: str) 
         frame=in_force["frame"].value if "frame" in in_force else "",
         tool=tool[0] if tool else None,
         user=user[0] if user else None,
-        configuration=configuration,
+        rconf=rconf,
     )
 
 

@@ -12,8 +12,8 @@ from opl.errors import InputError
 from opl.findings import Finding, Level
 from opl.program.inform.job import InformJob
 from opl.program.inform.sequence import Visit, first_job, visits
-from opl.program.inform.times import job_postures
-from opl.program.moves import SAME_POSTURE, START_SPEED
+from opl.program.inform.times import job_configurations
+from opl.program.moves import SAME_CONFIGURATION, START_SPEED
 from opl.program.played import Corner, Corners, Playback, ReadMove, Speed, SpeedUnit
 from opl.program.played import play as play_moves
 from opl.program.pulses import PulseScale
@@ -53,7 +53,7 @@ def play(
         targets[name] = _targets(job, robot, settings)
         waits[name] = _waits(job)
     half_pulse = 0.5 / PulseScale.of(robot).pulses_per_radian
-    resolution = np.where(np.isnan(half_pulse), SAME_POSTURE, half_pulse)
+    resolution = np.where(np.isnan(half_pulse), SAME_CONFIGURATION, half_pulse)
     moves = []
     before = None
     for visit in order:
@@ -123,7 +123,7 @@ def _waits(job: InformJob) -> dict[int, tuple[str, ...]]:
 
 def _targets(job: InformJob, robot: Robot, settings: ProgramSettings) -> Array:
     """Return the configuration of each position, NaN where the file or the job leave it open."""
-    q = job_postures(job, robot, np.eye(4), settings.T_flange_tool)
+    q = job_configurations(job, robot, np.eye(4), settings.T_flange_tool)
     frame = settings.user_frame
     in_frame = None
     for k, position in enumerate(job.positions):
@@ -131,7 +131,7 @@ def _targets(job: InformJob, robot: Robot, settings: ProgramSettings) -> Array:
             continue
         if position.frame == "USER" and frame is not None and position.user == frame.number:
             if in_frame is None:
-                in_frame = job_postures(job, robot, frame.T_base_user, settings.T_flange_tool)
+                in_frame = job_configurations(job, robot, frame.T_base_user, settings.T_flange_tool)
             q[k] = in_frame[k]
         elif position.frame not in ("BASE", "ROBOT"):
             q[k] = np.nan

@@ -50,7 +50,7 @@ def write_jobs(
     Raises:
         InputError: If something the job asks for is not legal on the controller, the template is
             unusable, or a pulse ratio is neither verified nor accepted.
-        UnsafeError: If a posture is beyond the soft limits.
+        UnsafeError: If a configuration is beyond the soft limits.
         OplError: If a pass has more moves than a job can hold, or cannot keep its time.
     """
     if settings.positions is PositionForm.PULSES:
@@ -69,13 +69,13 @@ def write_jobs(
         job = parse(text)
         written_times = move_times(job, robot, T_base_frame, settings.T_flange_tool)
         for move, line, time in zip(part.moves, job.moves, written_times, strict=True):
-            if move.duration is None and move.posture in speeds:
+            if move.duration is None and move.motion_index in speeds:
                 continue  # a part begins where the one before it ended
-            speeds[move.posture] = next(
+            speeds[move.motion_index] = next(
                 f"{tag}={value}" for tag, value in line.tags if tag in ("VJ", "V", "VR")
             )
             if np.isfinite(time):
-                times[move.posture] = float(time)
+                times[move.motion_index] = float(time)
     return Written(files, speeds, times, pass_times(program, times, profile.name))
 
 

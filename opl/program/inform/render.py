@@ -1,7 +1,7 @@
 """Writing INFORM jobs. Every job is read back before it is returned.
 
-Pulse jobs need no option, no user frame and no arm configuration, and leave the controller no
-choice between postures. Cartesian ones need the controller's function for relative jobs.
+Pulse jobs need no option, no user frame and no RCONF, and leave the controller no
+choice between configurations. Cartesian ones need the controller's function for relative jobs.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def render(
     Raises:
         InputError: If the name, a number or a comment is not legal on the controller, or the
             template does not give a job that says what the program says.
-        UnsafeError: If a posture is beyond the soft limits.
+        UnsafeError: If a configuration is beyond the soft limits.
     """
     layout = _layout(part, robot, settings, profile, date)
     _require_legal(layout, settings, profile)
@@ -113,15 +113,15 @@ def _steps(
     speeds = write_speeds(part, positions.q, robot, settings.T_flange_tool, profile)
     actions = ActionWriter(profile)
     steps = []
-    configuration_before = None
+    rconf_before = None
     for number, move in enumerate(part.moves):
-        configuration = positions.configurations[number]
+        rconf = positions.rconfs[number]
         word, speed = speeds[number]
         steps.append(
             Step(
                 label=f"C{number:0{profile.label_digits}d}",
                 values=positions.values[number],
-                configuration=configuration if configuration != configuration_before else None,
+                rconf=rconf if rconf != rconf_before else None,
                 word=word,
                 speed=speed,
                 level=str(STOP_LEVEL if move.exact_stop else settings.levels.of(move.kind)),
@@ -130,7 +130,7 @@ def _steps(
                 actions=actions.lines(move.actions),
             )
         )
-        configuration_before = configuration
+        rconf_before = rconf
     return tuple(steps)
 
 

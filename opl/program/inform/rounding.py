@@ -38,5 +38,7 @@ def rounded(q: Array, robot: Robot, settings: ProgramSettings, profile: Controll
             np.floor(scale.upper * ratio + slack),
         )
         return scale.to_angles(np.clip(scale.to_pulses(q), lowest, highest))
-    moves = tuple(Move(p, 1.0, exact_stop=True, on_wheel=False, posture=k) for k, p in enumerate(q))
+    moves = tuple(
+        Move(p, 1.0, exact_stop=True, on_wheel=False, motion_index=k) for k, p in enumerate(q)
+    )
     return write_positions(Program("ROUNDED", moves=moves), robot, settings, profile).q

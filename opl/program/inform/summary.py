@@ -11,7 +11,7 @@ import numpy as np
 from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import roll_pitch_yaw
 from opl.program.inform.job import POSITION_KINDS, InformJob, Instruction, Position
-from opl.program.inform.times import job_postures
+from opl.program.inform.times import job_configurations
 
 _SIGNAL = re.compile(r"\b(?:IN|OT|IG|OG|AO|AI)#\([^)]*\)")
 _SPEEDS = ("VJ", "V", "VR", "VE")
@@ -69,7 +69,7 @@ def _moves(job: InformJob) -> Iterator[str]:
 
 def _steps(job: InformJob, robot: Robot) -> Iterator[str]:
     places = {(p.kind, p.number): k for k, p in enumerate(job.positions)}
-    q = job_postures(job, robot, np.eye(4), np.eye(4))
+    q = job_configurations(job, robot, np.eye(4), np.eye(4))
     for step in job.instructions:
         yield f"{step.line:5d}  {job.lines[step.line - 1].expandtabs(2).rstrip()}"
         for label in step.positions:

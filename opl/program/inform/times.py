@@ -7,17 +7,19 @@ from numpy.typing import NDArray
 
 from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import inverse, rotation_angle
-from opl.program.inform.cartesian import pose_of, postures
+from opl.program.inform.cartesian import configurations, pose_of
 from opl.program.inform.job import InformJob
 from opl.program.pulses import PulseScale
 
 Array = NDArray[np.float64]
 
 
-def job_postures(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool: Array) -> Array:
+def job_configurations(
+    job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool: Array
+) -> Array:
     """Return the joint positions of the taught positions of a job in [rad], shape (n, 6).
 
-    NaN stands for a position that no posture within the limits, or more than one, belongs to.
+    NaN stands for a position that no configuration within the limits, or more than one, belongs to.
 
     Args:
         job: The job.
@@ -32,9 +34,9 @@ def job_postures(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_too
             continue
         if position.coordinates == "PULSE":
             q[k] = scale.to_angles(np.array(position.values[:6]))
-        elif position.coordinates == "RECTAN" and len(position.configuration) >= 6:
+        elif position.coordinates == "RECTAN" and len(position.rconf) >= 6:
             T_base_flange = T_base_frame @ pose_of(position.values) @ inverse(T_flange_tool)
-            found = postures(robot, T_base_flange, position.configuration)
+            found = configurations(robot, T_base_flange, position.rconf)
             if len(found) == 1:
                 q[k] = found[0]
     return q
@@ -49,7 +51,7 @@ def move_times(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool:
         T_base_frame: The frame of its Cartesian positions.
         T_flange_tool: Its tool.
     """
-    q = job_postures(job, robot, T_base_frame, T_flange_tool)
+    q = job_configurations(job, robot, T_base_frame, T_flange_tool)
     Ts_base_tool = forward_kinematics(robot, q) @ T_flange_tool
     times = np.full(len(q), np.nan)
     for k, move in enumerate(job.moves[1:], start=1):

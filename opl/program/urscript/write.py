@@ -31,7 +31,7 @@ _DIALECT = Dialect(
     line_end="\n",
 )
 _BLEND_SHARE = 0.4  # of the shorter neighbouring move: two blends must not overlap
-_START_ACCELERATION = 0.3  # [rad/s^2] of the move to the first posture
+_START_ACCELERATION = 0.3  # [rad/s^2] of the move to the first configuration
 
 
 def tool_name(settings: ProgramSettings) -> str:
