@@ -53,8 +53,8 @@ def _pieces(moves: tuple[Move, ...], step_limit: int) -> list[tuple[Move, ...]]:
             nearest = min((k for k in cuts if k > start), default=len(moves))
             raise OplError(
                 f"configurations {moves[start].motion_index} to {moves[nearest - 1].motion_index} "
-                f"take {nearest - start} moves between two places off the wheel where a job may be cut; "
-                f"a job holds {step_limit}"
+                f"take {nearest - start} moves between two places off the wheel where a job may be "
+                f"cut; a job holds {step_limit}"
             )
         pieces.append((*entry, *moves[start:end]))
         start = end

@@ -32,9 +32,7 @@ def prepare(surfaced: Surfaced, watch: Watch | None = None) -> Prepared:
     """
     watch = watch or Watch()
     job = surfaced.job
-    with watch.stage(Stage.CLEARANCE):
-        scene = planning_scene(job.cell)
-    problem = problem_in(scene, job, surfaced.points, watch)
+    problem = problem_in(planning_scene(job.cell), job, surfaced.points, watch)
     unreachable = unreachable_points(problem)
     if len(unreachable):
         raise InputError(

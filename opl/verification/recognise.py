@@ -196,7 +196,7 @@ class _Labels:
         return firsts, lasts
 
     def _leading(self, k: int, point: int, t: float, step: int) -> list[int]:
-        """Return the configurations off the wheel along the lead next to number k, nearest first."""
+        """Return the configurations off the wheel along the lead next to k, nearest first."""
         T_cutter = self._points.Ts_workpiece_cutter[point]
         to_contact = inverse(self._wheel.T_contact0_contact(t))
         farthest, found = 0.0, []

@@ -68,7 +68,7 @@ def test_what_was_recognised_is_proven_by_the_same_replay():
 
 
 def about_an_edge():
-    """Return where the part leans on an edge; flat on the flat, neighbours touch the same points."""
+    """Return where the part leans on an edge; flat on it, neighbours touch the same points."""
     motion, wheel = small_motion(), small_problem().cell.wheel
     at_edge = np.abs(motion.contact_position) > wheel.flat_end + 5.0
     grinds = [k for k, s in enumerate(motion.kind) if s is MoveKind.GRIND and at_edge[k]]
