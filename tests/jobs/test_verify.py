@@ -149,7 +149,7 @@ def test_a_run_ends_with_reading_back_what_it_writes():
     result = json.loads((planned() / "out" / "result.json").read_text())
     proof = result["verification"]["file"]
     assert proof["proven"] is True and proof["files"] == ["V_SHAPE.JBI"]
-    assert proof["configurations"] == result["program"]["moves"]
+    assert proof["postures"] == result["program"]["moves"]
     assert proof["largest_difference_mm"] == 0.0 and proof["replayed"] is False
     assert 0.0 < proof["largest_rounding_mm"] < 0.05
 
