@@ -133,7 +133,10 @@ def suffixes_read() -> dict[str, str]:
     """Return a post for each suffix of files that opl can read, its name by the suffix."""
     found: dict[str, str] = {}
     for name in known_posts():
-        reader = find_post(name).reader
+        try:
+            reader = find_post(name).reader
+        except InputError:
+            continue  # a post that cannot be loaded is an error for the job that names it only
         if reader is not None:
             found.setdefault(reader.suffix.upper(), name)
     return found

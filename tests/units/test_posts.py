@@ -1,5 +1,6 @@
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInp
 from opl.program.inform import find_faults, parse
 from opl.program.inform.layout import VARIABLES, JobLayout, Step
 from opl.program.moves import Program, plan_moves
-from opl.program.posts import find_post, known_posts
+from opl.program.posts import find_post, known_posts, reader_for
 from opl.program.profiles import PROFILES
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
 from opl.program.write import StraightLimit, write_program
@@ -315,6 +316,8 @@ def test_broken_post_of_a_site_is_told(tmp_path, monkeypatch, value, message):
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(InputError, match=message):
         find_post("BROKEN")
+    # programs of other controllers are read all the same
+    assert reader_for(Path("A.mod")) is find_post("RAPID").reader
 
 
 def test_program_without_moves_is_written_too():
