@@ -13,7 +13,7 @@ import pytest
 
 from opl import pipeline
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job, load
+from opl.job.load import Job, load_job
 from opl.program.posts import find_post
 from opl.proof.prove import prove
 from tests.support.example_post import install_example_post
@@ -185,7 +185,7 @@ def written(request, tmp_path_factory):
         "process.home_deg": list(language.home),
         "program.controller": request.param,
     }
-    job = load(write_job(home, changes))
+    job = load_job(write_job(home, changes))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pipeline, "draw", lambda outcome, problem: None)
         ended = opl("run", job.path, "--out", home / "out")
