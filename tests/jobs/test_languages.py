@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import pytest
 
-from opl import pipeline
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job, load_job
 from opl.program.posts import find_post
 from opl.proof.prove import prove
+from opl.run.surfacing import cut_surface
 from tests.support.example_post import install_example_post
 from tests.support.jobs import GONE, opl, write_job
 
@@ -187,11 +187,11 @@ def written(request, tmp_path_factory):
     }
     job = load_job(write_job(home, changes))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "draw", lambda outcome, problem: None)
+        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
         ended = opl("run", job.path, "--out", home / "out")
     assert ended.status == 0, ended.err
     file = home / "out" / (job.name + find_post(request.param).reader.suffix)
-    points = pipeline.cutter_points(job)
+    points = cut_surface(job).points
     point = len(points) // 2
     lines = (home / "out" / f"{job.name}.csv").read_text().splitlines()
     labels = [line.split(",")[1] for line in lines[1:]]
@@ -222,7 +222,7 @@ def test_what_is_read_back_is_what_was_proven(written):
     file = result["verification"]["file"]
     assert file["proven"] is True and file["replayed"] is False
     assert file["largest_difference_mm"] == 0.0 and 0.0 < file["largest_rounding_mm"] < 0.05
-    assert file["configurations"] == result["program"]["moves"]
+    assert file["postures"] == result["program"]["moves"]
     ended = opl("verify", written.job.path, written.file, "--json")
     assert ended.status == 0, ended.err
     proof = json.loads(ended.out)
@@ -340,7 +340,7 @@ def test_a_program_without_a_reader_is_written_and_not_read_back(tmp_path, monke
     install_example_post(tmp_path, monkeypatch)
     changes = {**SHORT, "program.controller": "OUR_CELL", "robot": "gp25"}
     job = write_job(tmp_path / "job", changes)
-    monkeypatch.setattr(pipeline, "draw", lambda outcome, problem: None)
+    monkeypatch.setattr("opl.run.stages.draw_charts", lambda planned: {})
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 0, ended.err
     assert "written, not read back" in " ".join(ended.out.split())
