@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.run.preparing import build_problem
 from opl.run.searches import search_path
 from opl.run.surfacing import cut_surface
@@ -110,7 +110,7 @@ def smooth_stage(n_columns: int = 1000, n_rows: int = 140, n_branches: int = 2) 
 
 def search(part: str, rows: int) -> None:
     """Print time, value and bound of one search with its collision checks."""
-    job = load(WORKPIECES / part / "job.yaml")
+    job = load_job(WORKPIECES / part / "job.yaml")
     passes = replace(job.passes, rows=rows)
     job = replace(job, passes=replace(passes, pitch=FINE_PITCH) if rows > 5 else passes)
     points = cut_surface(job).points

@@ -98,11 +98,6 @@ def load_job(
     return _in_si(file, origin, method, surface, part)
 
 
-def load(path: Path, method: str | None = None) -> Job:
-    """Read and validate a job file; see `load_job`."""
-    return load_job(path, method=method)
-
-
 def _in_si(
     file: JobFile,
     source: Source,

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opl.geometry.frames import transform
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.motion.leads import LEAD_SPACING, LEAD_TURN, lead_count, lead_offsets
 from opl.motion.motion import MoveKind
 from tests.support.jobs import opl, write_job
@@ -108,7 +108,7 @@ def planned(tmp_path_factory):
 
 
 def test_a_program_comes_and_goes_on_arcs(planned):
-    wheel = load(planned / "job.yaml").cell.wheel
+    wheel = load_job(planned / "job.yaml").cell.wheel
     with (planned / "out" / "V_SHAPE.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     flange = np.array([[float(row[f"{axis}_mm"]) for axis in "xyz"] for row in rows])
@@ -151,8 +151,8 @@ def test_a_turn_out_of_range_is_refused_by_key(tmp_path, turn):
 
 
 def test_a_job_that_does_not_say_leads_straight(tmp_path):
-    process = load(write_job(tmp_path)).process
+    process = load_job(write_job(tmp_path)).process
     assert process.approach_turn == 0.0
-    said = load(write_job(tmp_path, {"process.approach_turn_deg": 0})).process
+    said = load_job(write_job(tmp_path, {"process.approach_turn_deg": 0})).process
     np.testing.assert_array_equal(said.home, process.home)
     assert replace(said, home=None) == replace(process, home=None)

@@ -10,7 +10,7 @@ from opl.cell.robot import forward_kinematics
 from opl.files.resources import folder
 from opl.geometry.frames import pose
 from opl.geometry.wheel import ContactWheel
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.verification.drum import Drum
 from opl.verification.engine import pybullet, start
 from opl.verification.patches import MOST, Patches
@@ -90,7 +90,7 @@ def whole_mesh(client, cell):
 
 @pytest.mark.parametrize("part", ["v_shape", "turbine_blade"])
 def test_patch_by_patch_is_the_distance_of_the_whole_mesh(part):
-    cell = load(folder("workpieces") / part / "job.yaml").cell
+    cell = load_job(folder("workpieces") / part / "job.yaml").cell
     random = np.random.default_rng(0)
     middle = cell.wheel.T_base_contact0[:3, 3]
     configurations = random_configurations(cell.robot, 6000)

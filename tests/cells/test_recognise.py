@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from opl.files.resources import folder
 from opl.geometry.frames import inverse
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.motion.motion import MoveKind
 from opl.run.surfacing import cut_surface
 from opl.verification.align import align
@@ -116,7 +116,7 @@ def test_contact_positions_are_those_of_the_contact_model(t):
 @cache
 def hollow():
     """Return wheel and cutter points of the S part; its hollow half is ground at an edge."""
-    job = load(folder("workpieces") / "s_shape" / "job.yaml")
+    job = load_job(folder("workpieces") / "s_shape" / "job.yaml")
     return job.cell.wheel, cut_surface(job).points
 
 

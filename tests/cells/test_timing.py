@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from opl.files.resources import folder
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.job.refusals import dwell_refusal
 from opl.motion.feed import HARDLY_MOVES, slow_stretches
 from opl.motion.motion import Motion, MoveKind
@@ -24,7 +24,7 @@ HARD = 1.0 / 20.0
 
 @cache
 def s_problem():
-    return problem_of(with_positions(load(folder("workpieces") / "s_shape" / "job.yaml"), 60))
+    return problem_of(with_positions(load_job(folder("workpieces") / "s_shape" / "job.yaml"), 60))
 
 
 @cache

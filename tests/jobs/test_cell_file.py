@@ -17,7 +17,7 @@ from opl.files.resources import folder
 from opl.geometry.frames import pose, rotation_angle, transform
 from opl.geometry.mesh import TriangleMesh
 from opl.job.cell import load_cell
-from opl.job.load import load
+from opl.job.load import load_job
 from tests.support.jobs import GONE, QUICK, opl, write_job
 from tests.support.schema_check import schema_faults
 
@@ -83,7 +83,7 @@ def refusal(path):
 def test_the_cell_that_comes_with_opl_is_in_the_base_frame():
     cell = load_cell(CELL)
     (wheel,) = cell.wheels
-    direct = load(WORKPIECES / "v_shape" / "job.yaml").cell
+    direct = load_job(WORKPIECES / "v_shape" / "job.yaml").cell
     np.testing.assert_allclose(wheel.wheel.T_base_contact0, direct.wheel.T_base_contact0, atol=1e-9)
     bodies = {body.name: body for body in cell.obstacles}
     assert bodies["floor"].T_parent_body[2, 3] == pytest.approx(-0.505 - 0.011)
@@ -101,8 +101,8 @@ def test_the_cell_that_comes_with_opl_is_in_the_base_frame():
 
 
 def test_a_job_in_a_cell_without_frills_is_the_job_that_says_it_all_itself(tmp_path):
-    own = load(write_job(tmp_path / "own", {"obstacles": PLAIN["obstacles"]}, quick=False)).cell
-    shared = load(write_both(tmp_path / "shared")).cell
+    own = load_job(write_job(tmp_path / "own", {"obstacles": PLAIN["obstacles"]}, quick=False)).cell
+    shared = load_job(write_both(tmp_path / "shared")).cell
     np.testing.assert_array_equal(own.wheel.T_base_contact0, shared.wheel.T_base_contact0)
     assert (own.required_clearance, own.max_belt_penetration) == (
         shared.required_clearance,
@@ -162,7 +162,7 @@ def test_matrix_pendant_and_touched_points_tell_the_same_place(tmp_path):
         job = write_job(
             tmp_path / key, {"wheel": {**wheel, "max_belt_penetration_mm": 0.5}}, quick=False
         )
-        np.testing.assert_array_equal(load(job).cell.wheel.T_base_contact0, there)
+        np.testing.assert_array_equal(load_job(job).cell.wheel.T_base_contact0, there)
 
 
 def test_positions_are_taken_from_where_the_controller_counts(tmp_path):
@@ -218,7 +218,7 @@ def test_a_job_picks_a_wheel_and_keeps_away_from_the_others(tmp_path):
     wheels = [{**WHEEL, "name": "coarse"}, {**WHEEL, "name": "fine", "T_base_contact0_mm": away}]
     two = {"wheels": wheels, "pair_clearances": [{"pair": ["part", "fine"], "clearance_mm": 30}]}
     for picked, other in (("coarse", "fine"), ("fine", "coarse")):
-        job = load(write_both(tmp_path, two, {"wheel_name": picked}))
+        job = load_job(write_both(tmp_path, two, {"wheel_name": picked}))
         assert [body.name for body in job.cell.obstacles] == ["post", other]
         named = other if picked == "coarse" else "wheel"
         assert job.cell.pairs.required == {frozenset(["part", named]): pytest.approx(0.03)}
@@ -233,7 +233,7 @@ def test_a_job_picks_a_wheel_and_keeps_away_from_the_others(tmp_path):
         ({"wheel_name": "rough"}, "no wheel 'rough' in "),
     ):
         with pytest.raises(InputError, match=told):
-            load(write_both(tmp_path, two, changes))
+            load_job(write_both(tmp_path, two, changes))
 
 
 def test_a_pair_of_one_link_goes_before_all_links(tmp_path):
@@ -246,7 +246,7 @@ def test_a_pair_of_one_link_goes_before_all_links(tmp_path):
         "allowed_contacts": [["robot", "jaw"], ["post", "T_link"]],
     }
     held = [{"name": "clamp", "box_mm": [5, 5, 5], "at_mm": [0, 0, 60]}]
-    pairs = load(write_both(tmp_path, said, {"fixture.bodies": held})).cell.pairs
+    pairs = load_job(write_both(tmp_path, said, {"fixture.bodies": held})).cell.pairs
     of_post = {
         name: round(1e3 * distance)
         for both, distance in pairs.required.items()
@@ -420,7 +420,7 @@ def test_a_bad_cell_is_refused_with_file_and_key(tmp_path, changes, told):
 def test_what_job_and_cell_say_must_go_together(tmp_path, of_cell, of_job, told):
     job = write_both(tmp_path, of_cell, of_job)
     with pytest.raises(InputError) as refused:
-        load(job)
+        load_job(job)
     assert told in str(refused.value)
     if "cell file, " in told or "home_deg in " in told:
         assert str(tmp_path / "cell.yaml") in str(refused.value)
@@ -429,9 +429,9 @@ def test_what_job_and_cell_say_must_go_together(tmp_path, of_cell, of_job, told)
 def test_a_job_without_a_cell_says_all_itself(tmp_path):
     for key in ("robot", "wheel", "process.home_deg"):
         with pytest.raises(InputError, match=f"job.yaml: {key}: is missing, and there is no cell"):
-            load(write_job(tmp_path, {key: GONE}))
+            load_job(write_job(tmp_path, {key: GONE}))
     with pytest.raises(InputError, match="wheel_name: goes with a cell file"):
-        load(write_job(tmp_path, {"wheel_name": "wheel"}))
+        load_job(write_job(tmp_path, {"wheel_name": "wheel"}))
 
 
 def test_a_mesh_in_the_wrong_unit_is_refused(tmp_path):

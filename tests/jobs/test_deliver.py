@@ -9,7 +9,7 @@ import pytest
 
 from opl.errors import InputError, NoPathError
 from opl.files import writing
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.run.delivery import deliver
 from opl.run.stages import run_job
 from opl.run.values import Refused
@@ -39,7 +39,7 @@ def leave_earlier_run(folder):
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     changes = {"search.method": "recursive"}
-    return run_job(load(write_job(tmp_path_factory.mktemp("job"), changes)))
+    return run_job(load_job(write_job(tmp_path_factory.mktemp("job"), changes)))
 
 
 def with_files(run, *names):

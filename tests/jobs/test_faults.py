@@ -22,7 +22,7 @@ from opl.files.resources import folder
 from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job, load
+from opl.job.load import Job, load_job
 from opl.program.pulses import PulseScale
 from opl.proof.prove import prove, reader_of
 from opl.run.surfacing import cut_surface
@@ -77,7 +77,7 @@ def written(request, tmp_path_factory):
         patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
         ended = opl("run", home / "job.yaml", "--out", home / "out")
     assert ended.status == 0, ended.err
-    job = load(home / "job.yaml")
+    job = load_job(home / "job.yaml")
     points = cut_surface(job).points
     lines = (home / "out" / f"{job.name}.csv").read_text().splitlines()
     labels = [line.split(",")[1] for line in lines[1:]]

@@ -9,7 +9,7 @@ import trimesh
 from opl.cell.robot import known_robots
 from opl.errors import InputError
 from opl.geometry.frames import inverse
-from opl.job.load import load
+from opl.job.load import load_job
 from tests.support.jobs import (
     GONE,
     V_JOB,
@@ -48,7 +48,7 @@ def one_message(job, *options, status=2):
 
 
 def test_values_are_in_si(tmp_path):
-    job = load(write_job(tmp_path, quick=False))
+    job = load_job(write_job(tmp_path, quick=False))
     wheel = job.cell.wheel
     assert (wheel.width, wheel.radius) == (0.05, 0.15)
     assert wheel.max_roll == pytest.approx(math.pi / 4)
@@ -59,7 +59,7 @@ def test_values_are_in_si(tmp_path):
 
 
 def test_rounded_matrices_are_made_proper(tmp_path):
-    job = load(write_job(tmp_path))
+    job = load_job(write_job(tmp_path))
     for T in (job.cell.wheel.T_base_contact0, job.cell.T_flange_workpiece):
         assert np.abs(inverse(T) @ T - np.eye(4)).max() < 1e-12
         assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0, abs=1e-12)
@@ -69,25 +69,25 @@ def test_rounded_matrices_are_made_proper(tmp_path):
 def test_files_are_found_beside_the_job(tmp_path, monkeypatch):
     write_job(tmp_path / "part")
     monkeypatch.chdir(tmp_path)
-    assert load(tmp_path / "part" / "job.yaml").cell.part.volume > 0.0
+    assert load_job(tmp_path / "part" / "job.yaml").cell.part.volume > 0.0
 
 
 def test_a_robot_of_ones_own_lies_beside_the_job(tmp_path):
     write_robot(tmp_path / "mine", {"S": (-90, 90)})
-    robot = load(write_job(tmp_path, {"robot": "mine"})).cell.robot
+    robot = load_job(write_job(tmp_path, {"robot": "mine"})).cell.robot
     assert np.rad2deg(robot.lower[0]) == pytest.approx(-90)
 
 
 def test_every_job_that_comes_with_opl_is_valid():
     for path in V_SHAPE.parent.glob("*/job.yaml"):
-        assert load(path).path == path
+        assert load_job(path).path == path
     assert V_JOB.is_file()
 
 
 def test_a_job_may_name_its_own_joint_accelerations(tmp_path):
-    assert load(write_job(tmp_path)).cell.robot.acceleration_assumed
+    assert load_job(write_job(tmp_path)).cell.robot.acceleration_assumed
     own = {"process.max_acceleration_deg_s2": [100, 200, 300, 400, 500, 600]}
-    robot = load(write_job(tmp_path, own)).cell.robot
+    robot = load_job(write_job(tmp_path, own)).cell.robot
     assert np.rad2deg(robot.max_acceleration) == pytest.approx([100, 200, 300, 400, 500, 600])
     assert not robot.acceleration_assumed
 
@@ -215,7 +215,7 @@ def test_a_home_in_collision_is_refused_with_the_pairs(tmp_path):
 
 
 def test_a_home_with_the_part_in_the_wheel_is_refused(tmp_path):
-    at_home = load(write_job(tmp_path)).cell  # the wheel is put where the part is at home
+    at_home = load_job(write_job(tmp_path)).cell  # the wheel is put where the part is at home
     from opl.cell.robot import forward_kinematics
 
     T = forward_kinematics(at_home.robot, np.deg2rad(document()["process"]["home_deg"]))
@@ -328,7 +328,7 @@ def test_many_faults_read_as_a_list(tmp_path):
 
 def test_load_raises_one_kind_of_error(tmp_path):
     with pytest.raises(InputError) as caught:
-        load(write_job(tmp_path, {"wheel.width_mm": -1}))
+        load_job(write_job(tmp_path, {"wheel.width_mm": -1}))
     assert caught.value.where == str(tmp_path / "job.yaml")
 
 

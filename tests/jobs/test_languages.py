@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import pytest
 
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job, load
+from opl.job.load import Job, load_job
 from opl.program.posts import find_post
 from opl.proof.prove import prove
 from opl.run.surfacing import cut_surface
@@ -185,7 +185,7 @@ def written(request, tmp_path_factory):
         "process.home_deg": list(language.home),
         "program.controller": request.param,
     }
-    job = load(write_job(home, changes))
+    job = load_job(write_job(home, changes))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
         ended = opl("run", job.path, "--out", home / "out")

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import forward_kinematics, load_robot
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.planning.starts import plan_recursive
 from opl.run.delivery import deliver
 from opl.run.preparing import prepare
@@ -49,7 +49,7 @@ def under_the_hood():
     """Run the job under the hood; return what became of it, the job file and the folder."""
     home = Path(mkdtemp())
     job = write_job(home / "j", {**with_bodies(HOOD), **BACK_UNDER_IT})
-    run = run_job(load(job))
+    run = run_job(load_job(job))
     deliver(run, home / "out")
     return run, job, home / "out"
 
@@ -92,7 +92,7 @@ def test_a_program_with_configurations_on_the_way_is_read_back_and_proven():
 
 def planned(job):
     """Return the configurations of the motion of a job, as bytes; for another process."""
-    loaded = load(Path(job))
+    loaded = load_job(Path(job))
     problem = prepare(cut_surface(loaded)).problem
     return plan_recursive(problem, loaded.search.start).motion.q.tobytes()
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.run.remedies import _fed_the_other_way, _other_side, find_remedies
 from opl.run.surfacing import cut_surface
 from tests.support.jobs import POST, opl, write_job, write_trough
@@ -28,7 +28,7 @@ def test_a_narrower_wheel_opens_a_trough_and_is_told(tmp_path):
 
 def test_a_post_before_the_wheel_is_avoided_on_another_side_of_it(tmp_path):
     path = write_job(tmp_path, {"obstacles": [POST]})
-    job = load(path)
+    job = load_job(path)
     told = find_remedies(job, cut_surface(job).points)
     (remedy,) = [line for line in told if "on another side of the wheel" in line]
     # tried from outside: the frame that the remedy names, written into the job

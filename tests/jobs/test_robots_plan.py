@@ -11,7 +11,7 @@ import pytest
 from opl.cell.robot import load_robot
 from opl.cell.urdf_import import import_urdf
 from opl.errors import InputError, UnsafeError
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.program.moves import Move, Program
 from opl.program.pulses import PulseScale, require_known
 from opl.program.settings import ProgramSettings
@@ -82,17 +82,18 @@ def test_a_program_in_pulses_nobody_knows_is_refused(changes, message, tmp_path)
     if changes["robot"] == "mine":
         import_urdf(load_robot("ur10e").urdf, "mine", tmp_path / "mine")
     with pytest.raises(InputError, match=message):
-        load(write_job(tmp_path, changes))
+        load_job(write_job(tmp_path, changes))
 
 
 def test_a_yaskawa_arm_without_ratios_may_be_told_in_poses_or_given_them(tmp_path):
     home = {"robot": "gp12", "process.home_deg": [15, -45, -50, 0, -50, 0]}
     assert (
-        load(write_job(tmp_path, {**home, **program(positions="base")})).cell.robot.name == "gp12"
+        load_job(write_job(tmp_path, {**home, **program(positions="base")})).cell.robot.name
+        == "gp12"
     )
     ratios = "".join(f"\n  - {{name: {name}, per_degree: 1000}}" for name in "SLURBT")
     (tmp_path / "mine.yaml").write_text(f"robot: gp12\nsource: read at the pendant\naxes:{ratios}")
-    robot = load(write_job(tmp_path, {**home, **program(pulse_ratios="mine.yaml")})).cell.robot
+    robot = load_job(write_job(tmp_path, {**home, **program(pulse_ratios="mine.yaml")})).cell.robot
     assert robot.missing_pulses == robot.unverified_pulses == ()
     np.testing.assert_allclose(np.deg2rad(robot.pulses_per_radian), 1000.0)
 
@@ -111,7 +112,7 @@ def test_unknown_ratios_give_no_pulses():
 def test_a_gp12_in_poses_still_keeps_its_limits(tmp_path):
     beyond = {"robot": "gp12", "process.home_deg": [175, -45, -50, 0, -50, 0]}
     with pytest.raises((InputError, UnsafeError), match=r"joint S must be in -170 to 170, got 175"):
-        load(write_job(tmp_path, {**beyond, **program(positions="base")}))
+        load_job(write_job(tmp_path, {**beyond, **program(positions="base")}))
 
 
 @pytest.mark.parametrize(("maker", "height"), [("krl", 640.0), ("rapid", 640.0)])

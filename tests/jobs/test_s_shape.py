@@ -8,7 +8,7 @@ import numpy as np
 import yaml
 
 from opl.files.resources import folder
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.planning.fixed import keep_contact
 from tests.support.jobs import opl
 from tests.support.planned import problem_of, with_positions
@@ -18,7 +18,7 @@ TABLE_5 = [0.1099, 0.2345, 0.2446, 0.9062, 0.7344, 0.2375]  # of the paper
 
 
 def test_contact_fixed_it_is_refused_at_more_than_half_of_its_points_which_are_named():
-    problem = problem_of(with_positions(load(S_SHAPE / "job.yaml"), 3))
+    problem = problem_of(with_positions(load_job(S_SHAPE / "job.yaml"), 3))
     fixed = keep_contact(problem)
     assert not fixed.feasible
     told = re.fullmatch(

@@ -12,7 +12,7 @@ import pytest
 import trimesh
 
 from opl.files.resources import folder
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.run.surfacing import cut_surface
 from tests.support.jobs import GONE, opl, write_job
 
@@ -141,7 +141,7 @@ def test_points_are_the_same_to_the_byte_every_time(tmp_path):
 
 @pytest.mark.parametrize("part", PARTS)
 def test_cutter_points_of_every_part_lie_on_its_solid_with_normals_outward(part):
-    job = load(job_of(part))
+    job = load_job(job_of(part))
     Ts = cut_surface(job).points.Ts_workpiece_cutter
     solid = trimesh.Trimesh(job.cell.part.vertices, job.cell.part.faces, process=False)
     centres = solid.triangles.mean(axis=1)
@@ -190,8 +190,8 @@ def mesh_job(home, **changes):
 
 def test_a_region_of_a_mesh_can_be_ground(tmp_path):
     path = mesh_job(tmp_path)
-    smooth = cut_surface(load(write_job(tmp_path / "smooth"))).points
-    meshed = cut_surface(load(path)).points
+    smooth = cut_surface(load_job(write_job(tmp_path / "smooth"))).points
+    meshed = cut_surface(load_job(path)).points
     assert meshed.n_passes == smooth.n_passes
     for one in (smooth, meshed):
         np.testing.assert_allclose(

@@ -16,7 +16,7 @@ import yaml
 
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.program.inform.files import load_jobs
 from opl.program.inform.playback import play
 from opl.program.inform.post import write_jobs
@@ -155,7 +155,7 @@ def test_a_run_ends_with_reading_back_what_it_writes():
 
 
 def test_proven_and_written_configurations_are_one():
-    scale = PulseScale.of(load(planned() / "job.yaml").cell.robot)
+    scale = PulseScale.of(load_job(planned() / "job.yaml").cell.robot)
     (job,) = load_jobs(planned() / "out" / "V_SHAPE.JBI")
     written = np.array([position.values for position in job.positions])
     proven = np.array([[float(row[f"{n}_deg"]) for n in "SLURBT"] for row in columns()])
@@ -205,7 +205,7 @@ def test_one_pulse_count_changed_by_200_is_found(tmp_path, joint):
 def test_a_swapped_branch_in_the_middle_is_found(tmp_path):
     number = ground(20)
     text = Text()
-    robot = load(planned() / "job.yaml").cell.robot
+    robot = load_job(planned() / "job.yaml").cell.robot
     scale = PulseScale.of(robot)
     q = scale.to_angles(np.array(text.pulses(number)))
     slots = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)
@@ -306,7 +306,7 @@ def test_a_limit_crossed_between_two_points_is_found(tmp_path):
     text = Text().replace(r"MOVJ (C00001) VJ=\S+", r"MOVL \1 V=50.0")
     program = tmp_path / "V_SHAPE.JBI"
     program.write_bytes(text.text.encode("ascii"))
-    job = load(planned() / "job.yaml")
+    job = load_job(planned() / "job.yaml")
     (read,) = load_jobs(program)
     playback, _ = play({read.name: read}, job.cell.robot, job.program)
     end = int(playback.stations[1])
@@ -324,7 +324,7 @@ def test_a_limit_crossed_between_two_points_is_found(tmp_path):
 
 
 def test_a_collision_only_between_two_points_is_found(tmp_path):
-    cell = load(planned() / "job.yaml").cell
+    cell = load_job(planned() / "job.yaml").cell
     scale = PulseScale.of(cell.robot)
     q = [scale.to_angles(np.array(Text().pulses(k))) for k in (0, 1)]
     middle = forward_kinematics(cell.robot, (q[0] + q[1]) / 2.0) @ cell.T_flange_workpiece
@@ -342,7 +342,7 @@ def test_a_collision_only_between_two_points_is_found(tmp_path):
 def parts():
     """Return the two-row program in parts, as a controller of few steps takes it."""
     home = planned(short=False)
-    job = load(home / "job.yaml")
+    job = load_job(home / "job.yaml")
     run = run_job(job)
     assert run.read_back.proven
     few = replace(DX200, step_limit=len(run.program.moves) * 2 // 3)

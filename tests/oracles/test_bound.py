@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from opl.files.resources import folder
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.planning.bound import StripProof, raise_bound
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.open_matrix import open_matrices
@@ -136,7 +136,7 @@ def test_the_intervals_of_a_strip_hold_what_passes_there(n_cells):
 
 
 def test_no_motion_of_the_s_part_is_below_the_raised_bound():
-    s_job = load(folder("workpieces") / "s_shape" / "job.yaml")
+    s_job = load_job(folder("workpieces") / "s_shape" / "job.yaml")
     problem = problem_of(with_positions(s_job, 70), points_of=slice(0, 14))
     finer = refine(
         RefinedProblem(problem, np.arange(14.0)),

@@ -15,7 +15,7 @@ from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import part_tree, signed_wheel_distance
 from opl.files.resources import folder
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.run.surfacing import cut_surface
 from opl.verification.replay import GAP_ACCURACY
 from opl.verification.world import World
@@ -72,7 +72,7 @@ def configurations_of_interest(job, points, count):
 @cache
 def examined(part, count=COUNT):
     """Ask all libraries about the same configurations."""
-    job = load(folder("workpieces") / part / "job.yaml")
+    job = load_job(folder("workpieces") / part / "job.yaml")
     cell = job.cell
     configurations = configurations_of_interest(job, cut_surface(job).points, count)
     Ts = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, configurations))

@@ -8,7 +8,7 @@ import numpy as np
 from opl.cell.collision import CollisionScene
 from opl.files.resources import folder
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.motion.timing import time_motion
 from opl.planning.scene import planning_scene
 from opl.planning.starts import plan_recursive
@@ -21,7 +21,7 @@ V_JOB = folder("workpieces") / "v_shape" / "job.yaml"
 
 @cache
 def v_job():
-    return load(V_JOB)
+    return load_job(V_JOB)
 
 
 def with_positions(job, count):
