@@ -82,12 +82,6 @@ def hermite_through(points: Array, tangents: Array) -> tuple[CubicHermiteSpline,
     return CubicHermiteSpline(np.append(0.0, np.cumsum(arcs)), points, tangents), turns
 
 
-def between_nodes(nodes: Array, arc_length: Array) -> NDArray[np.bool_]:
-    """Return which arc lengths are none of the increasing ones of the nodes, shape (...)."""
-    after = np.minimum(nodes.searchsorted(arc_length), len(nodes) - 1)
-    return np.asarray(nodes[after] != arc_length)
-
-
 @dataclass(frozen=True, eq=False)
 class Piece:
     """A curve from one arc length to another, both in [m]."""

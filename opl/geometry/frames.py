@@ -22,6 +22,12 @@ def read_only(values: ArrayLike, dtype: type = float) -> NDArray[Any]:
     return copy
 
 
+def in_mm(point: Array) -> str:
+    """Return a point in [m], shape (3,), as messages give it."""
+    x, y, z = 1e3 * point + 0.0  # no negative zero
+    return f"({x:.4g}, {y:.4g}, {z:.4g}) mm"
+
+
 class NotARotationError(ValueError):
     """A matrix given as a pose is too far from one.
 

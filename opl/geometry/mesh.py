@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from opl.errors import InputError
 from opl.geometry.crossings import crossing_triangles
-from opl.geometry.frames import Array, read_only
+from opl.geometry.frames import Array, in_mm, read_only
 
 _METRES = {"mm": 1e-3, "m": 1.0}
 _SUFFIXES = (".stl", ".ply", ".obj")
@@ -185,7 +185,7 @@ def _open_edges(mesh: trimesh.Trimesh, unit: Literal["mm", "m"]) -> str:
     wrong = edges[counts != 2]
     middle = _METRES[unit] * np.asarray(mesh.vertices)[wrong[0]].mean(axis=0)
     return (
-        f"{len(wrong)} edges are not those of two triangles, one of them near {_place(middle)}; a "
+        f"{len(wrong)} edges are not those of two triangles, one of them near {in_mm(middle)}; a "
         "solid without holes is needed"
     )
 
@@ -199,11 +199,6 @@ def _crossing(solid: TriangleMesh, pairs: NDArray[np.int64]) -> str:
     more = f", and {len(pairs) - 1} more pairs" if len(pairs) > 1 else ""
     return (
         f"triangles {pairs[0, 0] + 1} and {pairs[0, 1] + 1} of {len(solid.faces)} near "
-        f"{_place(0.5 * (low + high))}{more}; a solid with an inside is needed, so unite its "
+        f"{in_mm(0.5 * (low + high))}{more}; a solid with an inside is needed, so unite its "
         "bodies before it is exported"
     )
-
-
-def _place(point: Array) -> str:
-    x, y, z = 1e3 * point + 0.0  # no negative zero
-    return f"({x:.4g}, {y:.4g}, {z:.4g}) mm"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PPoly
 
-from opl.geometry.frames import Array, from_axes
+from opl.geometry.frames import Array, from_axes, in_mm
 from opl.geometry.mesh import TriangleMesh
 
 # a vertex nearer to the plane than this fraction of the mesh's size is moved off it
@@ -83,10 +83,9 @@ class MeshCurve:
         points = self.positions(arc_length)
         touching = np.linalg.norm(x, axis=-1) < 1e-6 * np.linalg.norm(z, axis=-1)
         if touching.any():
-            place = 1e3 * points[touching][0]
             raise ValueError(
-                f"the plane touches the mesh at ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}) "
-                "mm and does not cut it there"
+                f"the plane touches the mesh at {in_mm(points[touching][0])} and does not cut it "
+                "there"
             )
         return from_axes(z, x, points)
 

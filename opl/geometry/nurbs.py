@@ -11,7 +11,7 @@ from math import comb
 import numpy as np
 from scipy.interpolate import NdBSpline
 
-from opl.geometry.frames import Array, read_only
+from opl.geometry.frames import Array, in_mm, read_only
 
 # du x dv below this fraction of its average over the surface is taken for zero
 _DEGENERATE_AREA = 1e-9
@@ -26,10 +26,9 @@ class DegenerateNormalError(ValueError):
     """
 
     def __init__(self, uv: Array, point: Array) -> None:
-        x, y, z = 1e3 * point
         super().__init__(
             f"the surface has no normal at (u, v) = ({uv[0]:.6g}, {uv[1]:.6g}), "
-            f"point ({x:.4g}, {y:.4g}, {z:.4g}) mm: du x dv is zero"
+            f"point {in_mm(point)}: du x dv is zero"
         )
         self.uv = uv
         self.point = point

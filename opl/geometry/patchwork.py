@@ -13,7 +13,7 @@ from opl.geometry.curves import MEETING, SurfaceCurve, joined
 from opl.geometry.frames import Array
 from opl.geometry.nurbs import NurbsSurface
 from opl.geometry.section import Section
-from opl.geometry.section_curves import section_curves
+from opl.geometry.section_curves import FaceCurve, section_curves
 from opl.geometry.surface_grid import SurfaceGrid, extent_along, sample_grid
 from opl.geometry.trim import Trim, parts_inside
 
@@ -93,14 +93,15 @@ class Face:
             offset += _BESIDE_POLE * (
                 -1.0 if offset > np.median(self.grid.points @ plane_normal) else 1.0
             )
-        section = Section(self.surface, plane_normal, offset, self.outward)
-        found: list[SurfaceCurve] = []
-        for curve in section_curves(section, self.grid, tolerance):
-            if self.trim is None:
-                found.append(curve)
-            else:
-                found += parts_inside(curve, curve.parameters, self.trim)
+        section = Section(self.surface, self.outward, plane_normal, offset)
+        found = self.trimmed(section_curves(section, self.grid, tolerance))
         return [curve for curve in found if curve.length > _SHORTEST]
+
+    def trimmed(self, curves: Sequence[FaceCurve]) -> Sequence[SurfaceCurve]:
+        """Return what the trim leaves of curves on the face."""
+        if self.trim is None:
+            return curves
+        return [part for curve in curves for part in parts_inside(curve, self.trim)]
 
     def area_samples(self, spacing: float) -> AreaSamples:
         """Return points that stand for the area around them."""

@@ -15,9 +15,9 @@ from contourpy import LineType, contour_generator
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from opl.geometry.curves import between_nodes, curvature_jumps, hermite_through
+from opl.geometry.curves import curvature_jumps, hermite_through
 from opl.geometry.frames import Array
-from opl.geometry.section import CONVERGED, MAX_NEWTON_STEPS, ON_PLANE, Section
+from opl.geometry.section import CONVERGED, MAX_NEWTON_STEPS, ON_PLANE, Section, Trace
 from opl.geometry.surface_grid import SurfaceGrid
 
 # how far beside a knot its two sides are looked at, as a fraction of the distance to the next node
@@ -31,22 +31,25 @@ _LARGEST_TURN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class SectionCurve:
-    """One curve of a section, in the direction of the frames' axis x.
+class FaceCurve:
+    """A curve on a face, in the direction of the frames' axis x.
 
     Attributes:
-        section: What it is a curve of.
+        trace: What it is a curve of.
         uv: Parameters of its nodes, shape (k, 2).
-        arc_length: Arc length at its nodes in [m], from 0, shape (k,).
         positions: The curve as a function of its arc length, (...,) to (..., 3).
         breaks: Inner arc lengths in [m] where the curvature jumps, shape (b,).
     """
 
-    section: Section
+    trace: Trace
     uv: Array
-    arc_length: Array
     positions: CubicHermiteSpline
     breaks: Array
+
+    @property
+    def arc_length(self) -> Array:
+        """Return the arc length at its nodes in [m], from 0, shape (k,)."""
+        return np.asarray(self.positions.x)
 
     @property
     def length(self) -> float:
@@ -55,23 +58,25 @@ class SectionCurve:
 
     def parameters(self, arc_length: Array) -> Array:
         """Return the exact (u, v) at given arc lengths [m], shape (k, 2)."""
-        uv = np.stack([np.interp(arc_length, self.arc_length, p) for p in self.uv.T], axis=1)
+        nodes = self.arc_length
+        uv = np.stack([np.interp(arc_length, nodes, p) for p in self.uv.T], axis=1)
         # a node may not be moved: not across the border, nor off the knot on which a break lies
-        inner = between_nodes(self.arc_length, arc_length)
+        after = np.minimum(nodes.searchsorted(arc_length), len(nodes) - 1)
+        inner = nodes[after] != arc_length
         targets, tangents = self.positions(arc_length), self.positions(arc_length, nu=1)
-        uv[inner] = self.section.closest(uv[inner], targets[inner], tangents[inner])
+        uv[inner] = self.trace.closest(uv[inner], targets[inner], tangents[inner])
         return uv
 
     def frames(self, arc_length: Array) -> Array:
         """Return the exact Ts_workpiece_cutter at given arc lengths [m], shape (k, 4, 4)."""
-        return self.section.frames(self.parameters(arc_length))
+        return self.trace.frames(self.parameters(arc_length))
 
     def bending(self, arc_length: Array) -> Array:
         """Return the curvature of the surface in [1/m] in axes x and y, shape (k, 2, 2)."""
-        return self.section.bending(self.parameters(arc_length))
+        return self.trace.bending(self.parameters(arc_length))
 
 
-def section_curves(section: Section, grid: SurfaceGrid, tolerance: float) -> list[SectionCurve]:
+def section_curves(section: Section, grid: SurfaceGrid, tolerance: float) -> list[FaceCurve]:
     """Return the curves in which a plane cuts a surface.
 
     A curve that crosses the seam of a closed surface is two curves that meet there. They come in
@@ -146,7 +151,7 @@ def _crossings(section: Section, grid: SurfaceGrid, line: Array) -> Array:
     return uv[np.append(chords > ON_PLANE, True)] if len(uv) else uv
 
 
-def _refined(section: Section, uv: Array, tolerance: float) -> SectionCurve:
+def _refined(section: Section, uv: Array, tolerance: float) -> FaceCurve:
     """Direct a curve along axis x and add nodes where its interpolation is not good enough."""
     frames = section.frames(uv)
     chords = np.diff(frames[:, :3, 3], axis=0)
@@ -171,7 +176,7 @@ def _refined(section: Section, uv: Array, tolerance: float) -> SectionCurve:
         bad = ((error > tolerance) | (turns > _LARGEST_TURN)) & (chords > tolerance)
         if not bad.any():
             breaks = arc_length[_breaks(section, uv)]
-            return SectionCurve(section, uv, arc_length, positions, breaks)
+            return FaceCurve(section, uv, positions, breaks)
         # halves must be shorter than the whole, or the refinement would never end
         halves = np.linalg.norm(np.stack([points[:-1], points[1:]]) - exact[:, :3, 3], axis=2)
         astray = bad & (halves.max(axis=0) >= chords)
@@ -187,19 +192,12 @@ def _breaks(section: Section, uv: Array) -> NDArray[np.int64]:
     several rational pieces is smooth.
     """
     surface = section.surface
-    weak = [
-        _weak_knots(knots, degree)
-        for knots, degree in (
-            (surface.knots_u, surface.degree_u),
-            (surface.knots_v, surface.degree_v),
-        )
-    ]
+    both = (surface.knots_u, surface.degree_u), (surface.knots_v, surface.degree_v)
     span = np.ptp(surface.domain, axis=0)
     on_knot = np.zeros(len(uv), dtype=bool)
-    for axis, knots in enumerate(weak):
-        if len(knots):
-            gap = np.abs(uv[:, axis, None] - knots).min(axis=1)
-            on_knot |= gap <= 1e-9 * span[axis]
+    for axis, (knots, degree) in enumerate(both):
+        gaps = np.abs(uv[:, axis, None] - _weak_knots(knots, degree))
+        on_knot |= (gaps <= 1e-9 * span[axis]).any(axis=1)
     nodes = np.flatnonzero(on_knot[1:-1]) + 1
     if not len(nodes):
         return nodes

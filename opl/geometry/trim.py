@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from opl.geometry.curves import SurfaceCurve, clipped
 from opl.geometry.frames import Array, read_only
+from opl.geometry.section_curves import FaceCurve
 
 # loops with less than this fraction of the area of all parameters enclose nothing
 _LEAST_AREA = 1e-12
@@ -85,24 +86,16 @@ def polygon_area(loop: Array) -> float:
     return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
 
 
-def parts_inside(
-    curve: SurfaceCurve, parameters: Callable[[Array], Array], trim: Trim
-) -> Sequence[SurfaceCurve]:
-    """Return the parts of a curve that lie inside a trim, in order.
-
-    Args:
-        curve: The curve.
-        parameters: Its exact (u, v) at arc lengths in [m].
-        trim: What is inside.
-    """
+def parts_inside(curve: FaceCurve, trim: Trim) -> Sequence[SurfaceCurve]:
+    """Return the parts of a curve that lie inside a trim, in order."""
     count = int(np.clip(np.ceil(curve.length / _LOOK), 8, _MAX_LOOKS))
     looks = np.linspace(0.0, curve.length, count + 1)
-    inside = trim.contains(parameters(looks))
+    inside = trim.contains(curve.parameters(looks))
     changes = np.flatnonzero(inside[1:] != inside[:-1])
     left, right, state = looks[changes], looks[changes + 1], inside[changes]
     for _ in range(_HALVINGS if len(changes) else 0):
         middle = 0.5 * (left + right)
-        same = trim.contains(parameters(middle)) == state
+        same = trim.contains(curve.parameters(middle)) == state
         left, right = np.where(same, middle, left), np.where(same, right, middle)
     # the side that is inside
     ends = np.where(state, left, right).tolist()
