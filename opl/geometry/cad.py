@@ -11,6 +11,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve2d, BRepAdaptor_Surface
+from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
+from OCP.BRepGProp import BRepGProp
+from OCP.BRepTools import BRepTools_WireExplorer
+from OCP.Geom import Geom_BSplineSurface
+from OCP.GeomConvert import GeomConvert
+from OCP.GProp import GProp_GProps
+from OCP.IFSelect import IFSelect_ReturnStatus
+from OCP.IGESControl import IGESControl_Reader
+from OCP.Message import Message
+from OCP.STEPControl import STEPControl_Reader
+from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopoDS import TopoDS
 
 from opl.errors import InputError
 from opl.geometry.frames import Array
@@ -31,19 +46,9 @@ _SIDE = 1e-6
 # a face with less area is none [mm^2]
 _LEAST_AREA = 1e-6
 
-_TYPES = (
-    "plane",
-    "cylinder",
-    "cone",
-    "sphere",
-    "torus",
-    "bezier",
-    "b-spline",
-    "revolution",
-    "extrusion",
-    "offset",
-    "other",
-)
+# in the order of GeomAbs_SurfaceType
+_TYPES = ("plane", "cylinder", "cone", "sphere", "torus", "bezier", "b-spline",
+          "revolution", "extrusion", "offset", "other")  # fmt: skip
 
 
 def load_cad_faces(path: Path) -> tuple[Face, ...]:
@@ -52,15 +57,8 @@ def load_cad_faces(path: Path) -> tuple[Face, ...]:
     The outside is where the file has it: of a face that bounds a solid, away from that.
 
     Raises:
-        InputError: If the extra is not installed, or the file cannot be read, has no faces, or has
-            a face without area.
+        InputError: If the file cannot be read, has no faces, or has a face without area.
     """
-    try:
-        from OCP.TopoDS import TopoDS
-    except ImportError as error:
-        raise InputError(
-            str(path), "needs the optional extra for STEP and IGES: pip install 'opl[cad]'"
-        ) from error
     faces = tuple(
         _converted(path, TopoDS.Face_s(raw), number)
         for number, raw in enumerate(_all(_read(path), "FACE"), start=1)
@@ -71,8 +69,6 @@ def load_cad_faces(path: Path) -> tuple[Face, ...]:
 
 
 def _all(shape: Any, kind: str) -> Iterator[Any]:
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
 
     explorer = TopExp_Explorer(shape, getattr(TopAbs_ShapeEnum, f"TopAbs_{kind}"))
     while explorer.More():
@@ -81,10 +77,6 @@ def _all(shape: Any, kind: str) -> Iterator[Any]:
 
 
 def _read(path: Path) -> Any:
-    from OCP.IFSelect import IFSelect_ReturnStatus
-    from OCP.IGESControl import IGESControl_Reader
-    from OCP.Message import Message
-    from OCP.STEPControl import STEPControl_Reader
 
     try:
         content = path.read_bytes().rstrip()
@@ -102,32 +94,18 @@ def _read(path: Path) -> Any:
     if not is_step and content.splitlines()[-1][72:73] != b"T":
         raise InputError(str(path), "is not a whole IGES file")
     try:
-        if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
-            raise InputError(str(path), f"is not a whole {what} file")
-        if reader.TransferRoots() == 0:
-            raise InputError(
-                str(path), f"holds no shape that can be read; is the {what} file whole?"
-            )
-        shape = reader.OneShape()
-    except InputError:
-        raise
+        done = reader.ReadFile(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone
+        shape = reader.OneShape() if done and reader.TransferRoots() else None
     except Exception as error:  # OpenCASCADE raises many kinds, all of them about the file
         raise InputError(str(path), f"is not a {what} file: {error}") from error
-    if shape.IsNull():
+    if not done:
+        raise InputError(str(path), f"is not a whole {what} file")
+    if shape is None or shape.IsNull():
         raise InputError(str(path), f"holds no shape that can be read; is the {what} file whole?")
     return shape
 
 
 def _converted(path: Path, raw: Any, number: int) -> Face:
-    from OCP.BRep import BRep_Tool
-    from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
-    from OCP.BRepGProp import BRepGProp
-    from OCP.Geom import Geom_BSplineSurface
-    from OCP.GeomConvert import GeomConvert
-    from OCP.GProp import GProp_GProps
-    from OCP.TopAbs import TopAbs_Orientation
-    from OCP.TopoDS import TopoDS
 
     outward = -1.0 if raw.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else 1.0
     try:
@@ -153,17 +131,11 @@ def _converted(path: Path, raw: Any, number: int) -> Face:
 
 def _surface(spline: Any, loops: tuple[Array, ...]) -> tuple[NurbsSurface, Trim | None]:
     """Return the part of a B-spline surface that its loops span, and the trim if there is one."""
-    from OCP.Geom import Geom_BSplineSurface
-
     if not loops:
         raise ValueError("has no border that can be read")
     corners = np.concatenate(loops)
     low, high = corners.min(axis=0), corners.max(axis=0)
-    spline = (
-        Geom_BSplineSurface.DownCast_s(spline.Copy())
-        if hasattr(Geom_BSplineSurface, "DownCast_s")
-        else spline.Copy()
-    )
+    spline = spline.Copy()
     bounds = np.array(spline.Bounds()).reshape(2, 2)  # (u0, u1), (v0, v1)
     for axis, periodic in enumerate((spline.IsUPeriodic(), spline.IsVPeriodic())):
         if not periodic:
@@ -195,26 +167,13 @@ def _nurbs(spline: Any) -> NurbsSurface:
             net[i, j] = pole.X(), pole.Y(), pole.Z()
             weights[i, j] = spline.Weight(i + 1, j + 1)
     knots_u, knots_v = (
-        np.concatenate(
-            [
-                np.full(
-                    getattr(spline, f"{axis}Multiplicity")(k), getattr(spline, f"{axis}Knot")(k)
-                )
-                for k in range(1, getattr(spline, f"Nb{axis}Knots")() + 1)
-            ]
-        )
-        for axis in "UV"
+        np.array(list(knots)) for knots in (spline.UKnotSequence(), spline.VKnotSequence())
     )
     return NurbsSurface(spline.UDegree(), spline.VDegree(), knots_u, knots_v, _MM * net, weights)
 
 
 def _loops(face: Any) -> Iterator[Array]:
     """Yield the borders of a face as polygons in its parameters."""
-    from OCP.BRepAdaptor import BRepAdaptor_Curve2d
-    from OCP.BRepTools import BRepTools_WireExplorer
-    from OCP.TopAbs import TopAbs_Orientation
-    from OCP.TopoDS import TopoDS
-
     for wire in _all(face, "WIRE"):
         explorer = BRepTools_WireExplorer(TopoDS.Wire_s(wire), face)
         corners: list[Array] = []

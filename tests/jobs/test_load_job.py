@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from opl.errors import InputError
+from opl.geometry.machined import load_faces
 from opl.geometry.mesh import load_mesh
 from opl.geometry.passes import Kind
 from opl.geometry.patchwork import Patchwork
-from opl.geometry.surface_file import load_faces
 from opl.job import keys
 from opl.job.file import JobFile
 from opl.job.load import load_job

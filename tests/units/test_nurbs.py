@@ -6,8 +6,8 @@ from geomdl.evaluators import SurfaceEvaluatorRational
 
 from opl.errors import InputError
 from opl.files.resources import folder
+from opl.geometry.machined import load_faces
 from opl.geometry.nurbs import DegenerateNormalError, NurbsSurface
-from opl.geometry.surface_file import load_faces
 from tests.support.surfaces import (
     cylinder_patch,
     graph,

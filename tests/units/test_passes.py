@@ -8,12 +8,12 @@ from scipy.spatial import cKDTree
 from opl.files.resources import folder
 from opl.geometry.coverage import uncovered
 from opl.geometry.frames import rotation_angle
+from opl.geometry.machined import load_faces
 from opl.geometry.nurbs import NurbsSurface
 from opl.geometry.order import link_length, shortest_links
 from opl.geometry.passes import Kind, Order, Passes, lay_passes
 from opl.geometry.patchwork import Face, Patchwork
 from opl.geometry.scallop import row_pitch, scallop_pitch
-from opl.geometry.surface_file import load_faces
 from opl.geometry.trim import Trim
 from tests.support.solids import ORIGINS, cylinder, lay, sphere, torus
 from tests.support.surfaces import cylinder_patch, graph, plane_patch
