@@ -25,7 +25,7 @@ from opl.geometry.frames import Array, inverse, transform
 from opl.geometry.mesh import TriangleMesh, winding_number
 from opl.geometry.shapes import Body, Box, Cylinder
 
-Pair = tuple[str, str]
+BodyPair = tuple[str, str]
 
 
 class CollisionScene:
@@ -47,7 +47,7 @@ class CollisionScene:
                 link.geometry = link.geometry.convex
         self._n_links = self._geometry.ngeoms
         self._add_bodies(cell)
-        self._pairs: list[Pair] = []
+        self._pairs: list[BodyPair] = []
         margins = self._choose_pairs(cell)
         self._margins = np.array(margins)
         self._prepare(self._margins, range(0))
@@ -140,7 +140,7 @@ class CollisionScene:
         """
         return np.array([self._compute(configuration, True) for configuration in q], dtype=bool)
 
-    def colliding_pairs(self, q: Array) -> list[Pair]:
+    def colliding_pairs(self, q: Array) -> list[BodyPair]:
         """Return the names of every pair in collision at one configuration, shape (6,)."""
         results = self._geometry_data.collisionResults
         for result in results:
@@ -201,7 +201,7 @@ class CollisionScene:
         return str(geometry.name)
 
 
-def enclosing_bodies(cell: WorkCell, q: Array) -> list[tuple[str, str]]:
+def enclosing_bodies(cell: WorkCell, q: Array) -> list[BodyPair]:
     """Return flange or part with each obstacle they are inside of, at ``q``, shape (6,).
 
     Collisions with a mesh are collisions with its triangles: whoever is wholly inside touches none

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from opl.cell.joint_limits import JointLimit
 from opl.cell.robot import Robot
-from opl.geometry.frames import Array, inverse, pose
+from opl.geometry.frames import Array, inverse, pose, read_only
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Body, Cylinder
 from opl.geometry.wheel import ContactWheel
@@ -20,6 +19,9 @@ PART = "part"
 # differ by 0.08 mm at the rim of the wheel, and it is held to rounding the edges of a link
 SECOND_OPINION = 1e-4
 SECOND_OPINION_OF_A_LINK = 1e-3
+# [rad] configurations are rounded to what a program can express before they are proven; pulses and
+# digits are finer than this, for each joint in the sum
+ROUNDING = np.deg2rad(0.01)
 
 PairOfNames = frozenset[str]
 
@@ -50,6 +52,37 @@ class PairRules:
     def widened(self, by: float) -> PairRules:
         """Return rules that require so much more distance in [m]."""
         return replace(self, required={pair: far + by for pair, far in self.required.items()})
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimit:
+    """A range that a joint, or a weighted sum of joints, must stay in, beside the robot's own.
+
+    The robot keeps its own ranges, because its controller distinguishes full turns by them. The
+    hose along the forearm, though, does not care which of two axes winds it up: R + T together may
+    turn only so far. Such a limit is linear in the joints, so where both ends of a linear joint
+    move keep it, the whole move does. The planner uses these; the replay computes its own sums.
+
+    Attributes:
+        name: What messages call it, such as ``R`` or ``R+T``.
+        coefficients: Weight of each joint, shape (6,).
+        lower: Smallest sum in [rad].
+        upper: Largest sum in [rad].
+    """
+
+    name: str
+    coefficients: Array
+    lower: float
+    upper: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coefficients", read_only(self.coefficients))
+
+    def holds(self, q: Array) -> np.ndarray:
+        """Return which ``q``, shape (..., 6) in [rad], keep it; none with NaN; shape (...)."""
+        total = q @ self.coefficients
+        margin = ROUNDING * np.abs(self.coefficients).sum()
+        return np.asarray((total >= self.lower + margin) & (total <= self.upper - margin))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from opl.findings import Finding, Level
 from opl.geometry.coverage import AreaSamples, lying_on_others, uncovered
 from opl.geometry.frames import rotation_angle
 from opl.geometry.mesh_surface import MeshSurface
-from opl.geometry.passes import LaidPasses, MachinedSurface, Order, Passes, bounding_box
+from opl.geometry.passes import LaidPasses, MachinedSurface, Order, Passes, longest_side
 from opl.geometry.wheel import ContactWheel
 
 # normals that turn by more than this from one cutter point to the next jump [rad]
@@ -67,17 +67,21 @@ def inspect(
         *_jumps(laid),
         *_repeated(laid, passes),
     ]
-    findings = [_warning(kind, _points(chosen), message) for kind, chosen, message in pointed]
+    findings = [
+        Finding(Level.WARNING, kind, _points(chosen), message) for kind, chosen, message in pointed
+    ]
     doubtful = np.zeros(len(laid.points), dtype=bool)
     for _, chosen, _ in pointed:
         doubtful |= chosen
-    samples = surface.area_samples(_spacing(surface, passes))
+    spacing = max(passes.pitch / _LOOKS_PER_PITCH, longest_side(surface) / _MOST_LOOKS)
+    samples = surface.area_samples(spacing)
     points, pass_index = laid.points.Ts_workpiece_cutter[:, :3, 3], laid.points.pass_index
     missed = samples.chosen(uncovered(samples, points, pass_index, passes.pitch))
     fraction = float(missed.areas.sum() / samples.areas.sum())
     if fraction > UNCOVERED:
         findings.append(
-            _warning(
+            Finding(
+                Level.WARNING,
                 "coverage",
                 "the surface",
                 f"{100.0 * fraction:.1f} % of the area is more than half a pitch "
@@ -86,7 +90,8 @@ def inspect(
         )
     if isinstance(surface, MeshSurface) and surface.facet_error > passes.max_bow_height:
         findings.append(
-            _warning(
+            Finding(
+                Level.WARNING,
                 "mesh",
                 "the surface",
                 f"its triangles lie up to about {1e3 * surface.facet_error:.2g} mm off the smooth "
@@ -95,12 +100,6 @@ def inspect(
             )
         )
     return Inspection(tuple(findings), doubtful, missed, fraction)
-
-
-def _spacing(surface: MachinedSurface, passes: Passes) -> float:
-    """Return how far apart in [m] the area is looked at."""
-    longest = float(np.ptp(bounding_box(surface), axis=0).max())
-    return max(passes.pitch / _LOOKS_PER_PITCH, longest / _MOST_LOOKS)
 
 
 def _hollows(laid: LaidPasses, wheel: ContactWheel, penetration: float) -> Iterator[_Doubt]:
@@ -189,10 +188,6 @@ def _repeated(laid: LaidPasses, passes: Passes) -> Iterator[_Doubt]:
             np.isin(pass_index, [again for _, again in pairs]),
             f"{', '.join(listed)}: do faces of the surface lie on each other?",
         )
-
-
-def _warning(kind: str, where: str, message: str) -> Finding:
-    return Finding(Level.WARNING, kind, where, message)
 
 
 def _points(chosen: np.ndarray) -> str:

@@ -35,12 +35,6 @@ def shortest_links(Ts_ends: Array) -> list[tuple[int, int]]:
     return [(end // 2, 1 if end % 2 == 0 else -1) for end in best.tolist()]
 
 
-def link_length(Ts_workpiece_cutter: Array, pass_index: np.ndarray) -> float:
-    """Return the sum of the straight links from each pass to the next in [m]."""
-    steps = np.linalg.norm(np.diff(Ts_workpiece_cutter[:, :3, 3], axis=0), axis=1)
-    return float(steps[np.diff(pass_index) != 0].sum())
-
-
 # a tour holds, for each pass, the end at which it is begun: 2 i forwards, 2 i + 1 backwards
 
 

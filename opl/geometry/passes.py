@@ -49,7 +49,7 @@ class Order(str, Enum):
     SHORTEST = "shortest"  # in whatever order and direction leaves the shortest links
 
 
-class Kind(str, Enum):
+class PassKind(str, Enum):
     """What curves passes run along."""
 
     SECTIONS = "sections"  # where planes cut the surface
@@ -80,6 +80,11 @@ def bounding_box(surface: MachinedSurface) -> Array:
     return np.asarray(np.array([surface.extent_along(axis) for axis in np.eye(3)]).T)
 
 
+def longest_side(surface: MachinedSurface) -> float:
+    """Return the longest side of the bounding box in [m]."""
+    return float(np.ptp(bounding_box(surface), axis=0).max())
+
+
 @dataclass(frozen=True)
 class Passes:
     """How a surface is cut into passes; lengths in [m].
@@ -107,7 +112,7 @@ class Passes:
     margin: float = 0.0
     rows: int | None = None
     order: Order = Order.ONE_WAY
-    kind: Kind = Kind.SECTIONS
+    kind: PassKind = PassKind.SECTIONS
     end_margin: float = 0.0
     repeats: int = 1
     shift: float = 0.0
@@ -180,7 +185,7 @@ CurvesAt = Callable[[float], Sequence[SurfaceCurve]]
 def _rows_of(surface: MachinedSurface, passes: Passes) -> tuple[float, float, CurvesAt]:
     """Return where rows may lie, from and to in [m], and the curves of the row at a place."""
     tolerance = _CURVE_ERROR * passes.max_bow_height
-    if passes.kind is Kind.SECTIONS:
+    if passes.kind is PassKind.SECTIONS:
         length = float(np.linalg.norm(passes.plane_normal))
         if not length > 0.0:
             raise PassesError("plane_normal", "must not be zero")
@@ -191,7 +196,7 @@ def _rows_of(surface: MachinedSurface, passes: Passes) -> tuple[float, float, Cu
     if not isinstance(surface, Patchwork) or len(surface.faces) != 1:
         raise PassesError("kind", f"{passes.kind.value} needs a single NURBS face")
     face = surface.faces[0]
-    axis = 0 if passes.kind is Kind.ALONG_U else 1
+    axis = 0 if passes.kind is PassKind.ALONG_U else 1
     across = (face.grid.v, face.grid.u)[axis]
     # the widest distance between neighbouring lines of the grid counts
     gaps = np.linalg.norm(np.diff(face.grid.points, axis=1 - axis), axis=2).max(axis=axis)

@@ -8,7 +8,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh, winding_number
-from opl.geometry.passes import MachinedSurface, bounding_box
+from opl.geometry.passes import MachinedSurface, bounding_box, longest_side
 
 SMALLEST, LARGEST = 1e-3, 5.0  # [m] size of a part
 _FACTOR = 50.0  # between surface and solid; units differ by 1000 or 25.4
@@ -41,11 +41,8 @@ def check_sizes(surface: MachinedSurface, part: TriangleMesh) -> None:
     """
     own = bounding_box(surface)
     solid = np.array([part.vertices.min(axis=0), part.vertices.max(axis=0)])
-    boxes: tuple[tuple[Literal["part", "surface"], Array], ...] = (
-        ("part", solid),
-        ("surface", own),
-    )
-    for of, box in boxes:
+    boxes: dict[Literal["part", "surface"], Array] = {"part": solid, "surface": own}
+    for of, box in boxes.items():
         size = _size(box)
         if not SMALLEST <= size <= LARGEST:
             raise SizeError(
@@ -75,7 +72,7 @@ def facing_inward(surface: MachinedSurface, part: TriangleMesh) -> float:
     Places where the solid lies on both sides of the surface or on neither do not count: it is
     thinner there than the looks are deep, or stands off the surface.
     """
-    samples = surface.area_samples(_size(bounding_box(surface)) / _SAMPLES)
+    samples = surface.area_samples(longest_side(surface) / _SAMPLES)
     some = np.linspace(0, len(samples.points) - 1, _LOOKS).astype(int)
     points, normals = samples.points[some], samples.normals[some]
     ahead, behind = (

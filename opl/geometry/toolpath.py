@@ -48,6 +48,12 @@ class CutterPoints:
         return len(self.pass_index)
 
     @property
+    def link_length(self) -> float:
+        """Return the sum of the straight links from each pass to the next in [m]."""
+        steps = np.linalg.norm(np.diff(self.Ts_workpiece_cutter[:, :3, 3], axis=0), axis=1)
+        return float(steps[np.diff(self.pass_index) != 0].sum())
+
+    @property
     def n_passes(self) -> int:
         """Return the number of passes."""
         return int(self.pass_index[-1]) + 1 if len(self) else 0

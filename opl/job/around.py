@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.joint_limits import JointLimit
 from opl.cell.robot import Robot
-from opl.cell.workcell import PairRules, WorkCell
+from opl.cell.workcell import JointLimit, PairRules, WorkCell
 from opl.errors import InputError
 from opl.geometry.frames import Array
 from opl.geometry.shapes import Body

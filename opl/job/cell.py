@@ -13,9 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from opl.cell.joint_limits import JointLimit
 from opl.cell.robot import Robot, link_names, load_robot
-from opl.cell.workcell import PART, WHEEL, wheel_solid
+from opl.cell.workcell import PART, WHEEL, JointLimit, wheel_solid
 from opl.errors import InputError
 from opl.files.documents import read
 from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, pose

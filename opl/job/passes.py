@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from opl.errors import InputError
 from opl.files.documents import Document
-from opl.geometry.passes import Kind, MachinedSurface, Order, Passes
+from opl.geometry.passes import MachinedSurface, Order, Passes, PassKind
 from opl.geometry.scallop import row_pitch
 from opl.job.bodies import MM, NotNegative, Positive, Triple
 from opl.job.source import Source
@@ -117,7 +117,7 @@ class PassesSection(Document):
             margin=self.margin_mm * MM,
             rows=self.rows,
             order=Order(self.order),
-            kind=Kind(self.kind),
+            kind=PassKind(self.kind),
             end_margin=self.end_margin_mm * MM,
             repeats=self.repeats,
             shift=self.shift_mm * MM,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from opl.cell.collision import CollisionScene, Pair
+from opl.cell.collision import BodyPair, CollisionScene
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import PartTree, signed_wheel_distance
 from opl.cell.workcell import PART, SECOND_OPINION, WHEEL, WorkCell
@@ -68,7 +68,7 @@ class FreeMoves:
                 return True
         return False
 
-    def pair_at(self, q: Array) -> Pair | None:
+    def pair_at(self, q: Array) -> BodyPair | None:
         """Return the first pair that is too near at a configuration, shape (6,), or None."""
         if self._too_near_wheel(q[None], RESERVES[-1])[0]:
             return PART, WHEEL
@@ -81,7 +81,7 @@ class FreeMoves:
             None,
         )
 
-    def first_pair(self, start: Array, end: Array) -> Pair | None:
+    def first_pair(self, start: Array, end: Array) -> BodyPair | None:
         """Return the first pair that is met on the way between two configurations, or None."""
         dense, _ = densify(np.stack([start, end]), RESOLUTION)
         pairs = (self.pair_at(configuration) for configuration in dense)

@@ -75,20 +75,19 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
     )
 
 
+def by_pass(pass_index: np.ndarray) -> list[np.ndarray]:
+    """Return for each pass the indices of what belongs to it."""
+    return np.split(np.arange(len(pass_index)), np.flatnonzero(np.diff(pass_index)) + 1)
+
+
 def line_by_pass(pass_index: np.ndarray, x: Array, y: Array) -> tuple[Array, Array]:
-    """Return a line that is not drawn where the pass changes.
+    """Return a line, shapes (n,) before, with NaN where the pass changes.
 
-    Args:
-        pass_index: Pass of each configuration, shape (n,).
-        x: Across, shape (n,).
-        y: Up, shape (n,).
-
-    Returns:
-        The line with NaN between passes. A configuration alone in its pass becomes a short stroke.
+    A configuration alone in its pass becomes a short stroke.
     """
     across: list[Array] = []
     up: list[Array] = []
-    for one in np.split(np.arange(len(x)), np.flatnonzero(np.diff(pass_index)) + 1):
+    for one in by_pass(pass_index):
         alone = len(one) == 1
         across += [x[one] + LONE_STROKE if alone else x[one], GAP]
         up += [np.repeat(y[one], 2) if alone else y[one], GAP]

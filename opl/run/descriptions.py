@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from opl.cell.joint_limits import JointLimit
 from opl.cell.robot import Robot
+from opl.cell.workcell import JointLimit
 from opl.geometry.frames import Array, roll_pitch_yaw
 from opl.geometry.shapes import Body, Box, Cylinder
 from opl.job.cell import Cell

@@ -31,7 +31,7 @@ def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
 def draw_charts(planned: Planned) -> Mapping[str, str]:
     """Return the contact chart and the joint angles, by file name."""
     surfaced, prepared, path = planned.surfaced, planned.prepared, planned.plan.path
-    job, pass_index, robot = surfaced.job, surfaced.points.pass_index, surfaced.job.cell.robot
+    job, pass_index = surfaced.job, surfaced.points.pass_index
     contact = contact_chart(
         title=f"{job.name}: where the part touches the wheel",
         contact_positions=prepared.problem.field.contact_positions,
@@ -39,18 +39,12 @@ def draw_charts(planned: Planned) -> Mapping[str, str]:
         state_names=[state.value for state in NodeState],
         pass_index=pass_index,
         flat_end=job.cell.wheel.flat_end,
-        path_cutter_point=path.cutter_point,
-        path_contact_position=path.contact_position,
-        path_pass=path.pass_index,
+        path=path,
     )
     joints = joint_chart(
         title=f"{job.name}: joint angles along the path",
-        joint_names=robot.joint_names,
-        lower=robot.lower,
-        upper=robot.upper,
-        found_cutter_point=path.cutter_point,
-        found_q=path.q,
-        found_pass=path.pass_index,
+        robot=job.cell.robot,
+        path=path,
         fixed_q=prepared.fixed.q,
         pass_index=pass_index,
     )

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import roll_pitch_yaw
-from opl.geometry.order import link_length
 from opl.geometry.passes import LaidPasses
 from opl.report.part_view import part_view
 from opl.run.values import Surfaced
@@ -68,7 +67,7 @@ def report_points(surfaced: Surfaced) -> PointsReport:
         passes=points.n_passes,
         pitch_mm=round(MM * job.passes.pitch, 4),
         path_mm=round(MM * float(points.arc_length[last].sum()), 2),
-        air_mm=round(MM * link_length(points.Ts_workpiece_cutter, points.pass_index), 2),
+        air_mm=round(MM * points.link_length, 2),
         uncovered_percent=round(100.0 * surfaced.inspection.uncovered_fraction, 2),
         warnings=[str(finding) for finding in surfaced.warnings],
     )
@@ -80,17 +79,13 @@ def points_files(surfaced: Surfaced) -> dict[str, str]:
     Args:
         surfaced: The cutter points of a job.
     """
-    job, points, inspection = surfaced.job, surfaced.points, surfaced.inspection
+    job = surfaced.job
     picture = part_view(
         title=f"{job.name}: what will be ground",
         subtitle=str(report_points(surfaced)),
-        vertices=job.cell.part.vertices,
-        faces=job.cell.part.faces,
-        Ts_workpiece_cutter=points.Ts_workpiece_cutter,
-        pass_index=points.pass_index,
-        doubtful=inspection.doubtful,
-        uncovered=inspection.uncovered.points,
-        uncovered_normals=inspection.uncovered.normals,
+        part=job.cell.part,
+        points=surfaced.points,
+        inspection=surfaced.inspection,
     )
     return {
         f"{job.name}_points.csv": points_table(surfaced.laid),

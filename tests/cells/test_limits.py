@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opl.cell.joint_limits import JointLimit
+from opl.cell.workcell import JointLimit
 from opl.motion.air import UnreachableApproachError, whole_motion
 from opl.motion.motion import MoveKind
 from opl.planning.filling import BrokenEdgeError, fill_in

@@ -9,7 +9,7 @@ import pytest
 from opl.errors import InputError
 from opl.geometry.machined import load_faces
 from opl.geometry.mesh import load_mesh
-from opl.geometry.passes import Kind
+from opl.geometry.passes import PassKind
 from opl.geometry.patchwork import Patchwork
 from opl.job import keys
 from opl.job.file import JobFile
@@ -166,6 +166,6 @@ def test_a_refused_kind_of_passes_is_named_by_its_key():
     job = load_job(V_JOB)
     two = Patchwork((*job.surface.faces, *job.surface.faces))
     with pytest.raises(InputError) as caught:
-        cut_surface(replace(job, surface=two, passes=replace(job.passes, kind=Kind.ALONG_U)))
+        cut_surface(replace(job, surface=two, passes=replace(job.passes, kind=PassKind.ALONG_U)))
     assert caught.value.where == f"{V_JOB}: passes.kind"
     assert caught.value.message == "along_u needs a single NURBS face"
