@@ -85,11 +85,7 @@ class CollisionScene:
         return scene
 
     def against_surroundings(self, reserve: float) -> CollisionScene:
-        """Return the scene with more clearance, only for pairs with something that does not move.
-
-        Args:
-            reserve: Distance in [m] to keep beyond the margin of each pair.
-        """
+        """Return the scene with more clearance [m], only for pairs with what does not move."""
         scene = copy(self)
         joints = [geometry.parentJoint for geometry in self._geometry.geometryObjects]
         both_move = (
@@ -101,10 +97,9 @@ class CollisionScene:
         return scene
 
     def levers(self) -> Array:
-        """Return how far from each joint's axis anything it moves can be, in [m], shape (6,).
+        """Return how far from each joint's axis anything it moves can ever be, in [m], shape (6,).
 
-        In any configuration: when joint k turns by d [rad], no point moves farther than d times
-            lever k.
+        When joint k turns by d [rad], no point moves farther than d times lever k.
         """
         model = self._model
         data = model.createData()
@@ -130,14 +125,7 @@ class CollisionScene:
         return levers
 
     def collides(self, q: Array) -> np.ndarray:
-        """Return which configurations collide.
-
-        Args:
-            q: Joint positions in [rad], shape (n, 6).
-
-        Returns:
-            Shape (n,) of bool.
-        """
+        """Return which configurations in [rad], shape (n, 6), collide; shape (n,) of bool."""
         return np.array([self._compute(configuration, True) for configuration in q], dtype=bool)
 
     def colliding_pairs(self, q: Array) -> list[BodyPair]:

@@ -145,15 +145,7 @@ def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
 
 
 def forward_kinematics(robot: Robot, q: Array) -> Array:
-    """Return the flange poses Ts_base_flange of configurations.
-
-    Args:
-        robot: Whose configurations.
-        q: Joint positions in [rad], shape (..., 6).
-
-    Returns:
-        Shape (..., 4, 4).
-    """
+    """Return the flange poses Ts_base_flange, (..., 4, 4), of configurations in [rad], (..., 6)."""
     model = _model(robot.urdf)
     data = model.createData()
     base, flange = model.getFrameId("base"), model.getFrameId("tool0")
@@ -166,10 +158,7 @@ def forward_kinematics(robot: Robot, q: Array) -> Array:
 
 
 def controller_poses(robot: Robot, q: Array) -> Array:
-    """Return the flange poses of configurations as the maker's controller counts them.
-
-    As `forward_kinematics`, from the controller's own base frame instead of opl's.
-    """
+    """Return the poses of `forward_kinematics` from the controller's own base frame."""
     return robot.T_controller_base @ forward_kinematics(robot, q)
 
 

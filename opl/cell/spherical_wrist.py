@@ -133,7 +133,7 @@ def _orientation(
         x: Axes in the base frame, shape (3, n).
         y: As x.
         z: As x.
-        theta4_free: theta4 of the straight wrist in [rad], shape (n,).
+        theta4_free: Of the straight wrist in [rad], shape (n,).
 
     Returns:
         theta4, theta5 >= 0, theta6, and what to add to theta4 and theta6 where theta5 turns

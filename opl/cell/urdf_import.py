@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from textwrap import indent
 
 import numpy as np
 
@@ -159,58 +160,61 @@ def _robot_yaml(
     found: UrdfArm, name: str, maker: str, height: float, controller: Controller, urdf: str
 ) -> str:
     """Return the text of ``robot.yaml``."""
-    origin = [f"source: {urdf}", f"certainty: {FROM_URDF}"]
-    counts = []
+    origin = f"source: {urdf}\n  certainty: {FROM_URDF}"
+    counts = ""
     if controller is not None:
-        counts = [f"controller_height_mm: {_mm(controller[0])}"]
+        counts = f"  controller_height_mm: {_mm(controller[0])}\n"
         if controller[1]:
-            counts.append(f"controller_turn_deg: {_deg(controller[1])}")
-    lines = [
-        f"# {name}, made by opl robots import-urdf from {urdf}.",
-        "# Check limits and speeds against the data sheet, and state it under source and certainty",
-        "# (high, medium, low).",
-        f"name: {name}",
-        f"title: {name}",
-        f"maker: {maker}",
-        f"urdf: {name}.urdf",
-        "",
-        "# The base frame lies on axis 1, so far above the mounting face; jobs are written in it.",
-        "base:",
-        *_indented(2, [f"height_mm: {_mm(height)}", *counts, *origin]),
-        "",
-        "arm:",
-        *_indented(2, [*_arm_lines(found.arm), *origin]),
-        "",
-        "shapes:",
-        *_indented(2, origin),
-        "",
-        "joints:",
-    ]
+            counts += f"  controller_turn_deg: {_deg(controller[1])}\n"
+    text = f"""\
+# {name}, made by opl robots import-urdf from {urdf}.
+# Check limits and speeds against the data sheet, and state it under source and certainty
+# (high, medium, low).
+name: {name}
+title: {name}
+maker: {maker}
+urdf: {name}.urdf
+
+# The base frame lies on axis 1, so far above the mounting face; jobs are written in it.
+base:
+  height_mm: {_mm(height)}
+{counts}  {origin}
+
+arm:
+{_arm_lines(found.arm)}
+  {origin}
+
+shapes:
+  {origin}
+
+joints:
+"""
+    deeper = origin.replace("\n", "\n    ")
     for k, joint in enumerate(found.joint_names):
-        speed, speed_origin = found.max_speed[k], origin
+        speed, speed_origin = found.max_speed[k], deeper
         if speed <= 0.0:
-            speed, speed_origin = SLOW, ["source: none, a slow placeholder", "certainty: low"]
-        limits = [
-            f"lower_deg: {_deg(found.lower[k])}",
-            f"upper_deg: {_deg(found.upper[k])}",
-            *origin,
-        ]
-        lines += [f"  - name: {joint}", "    limits:", *_indented(6, limits)]
-        lines += ["    speed:", *_indented(6, [f"max_deg_s: {_deg(speed)}", *speed_origin])]
-    return "\n".join([*lines, ""])
+            speed, speed_origin = SLOW, "source: none, a slow placeholder\n      certainty: low"
+        text += f"""\
+  - name: {joint}
+    limits:
+      lower_deg: {_deg(found.lower[k])}
+      upper_deg: {_deg(found.upper[k])}
+      {deeper}
+    speed:
+      max_deg_s: {_deg(speed)}
+      {speed_origin}
+"""
+    return text
 
 
-def _arm_lines(arm: Arm) -> list[str]:
+def _arm_lines(arm: Arm) -> str:
     keys = [field.name for field in fields(arm) if isinstance(getattr(arm, field.name), float)]
     lengths = [f"{key}_mm: {_mm(getattr(arm, key))}" for key in keys]
     offsets = ", ".join(_deg(offset) for offset in arm.offsets)
     signs = ", ".join(map(str, arm.signs))
     family = ["family: parallel axes"] if isinstance(arm, ParallelAxesArm) else []
-    return [*family, *lengths, f"offsets_deg: [{offsets}]", f"signs: [{signs}]"]
-
-
-def _indented(columns: int, lines: list[str]) -> list[str]:
-    return [" " * columns + line for line in lines]
+    lines = [*family, *lengths, f"offsets_deg: [{offsets}]", f"signs: [{signs}]"]
+    return indent("\n".join(lines), "  ")
 
 
 def _mm(length: float) -> str:

@@ -39,12 +39,9 @@ class PairRules:
     required: Mapping[PairOfNames, float] = field(default_factory=dict)
 
     def between(self, first: str, second: str, otherwise: float) -> float | None:
-        """Return how far two bodies must stay apart in [m], None if they may touch.
+        """Return how far two named bodies must stay apart in [m], None if they may touch.
 
-        Args:
-            first: Name of one.
-            second: Name of the other.
-            otherwise: The distance if there is no rule for this pair, in [m].
+        Without a rule for this pair it is the distance ``otherwise`` in [m].
         """
         pair = frozenset((first, second))
         return None if pair in self.allowed else self.required.get(pair, otherwise)
@@ -131,11 +128,8 @@ class WorkCell:
 
     def widened(self, by: float) -> WorkCell:
         """Return a cell in which everything must stay so much farther apart, in [m]."""
-        return replace(
-            self,
-            required_clearance=self.required_clearance + by,
-            pairs=self.pairs.widened(by),
-        )
+        clearance = self.required_clearance + by
+        return replace(self, required_clearance=clearance, pairs=self.pairs.widened(by))
 
     def within_limits(self, q: Array) -> np.ndarray:
         """Return which configurations, shape (..., 6) in [rad], keep every limit, shape (...)."""
@@ -153,14 +147,10 @@ class WorkCell:
         return list(dict.fromkeys(names))
 
     def Ts_base_flange(self, t: Array | float, Ts_workpiece_cutter: Array) -> Array:
-        """Return the flange poses that bring cutter points onto contact positions.
+        """Return the flange poses that bring cutter points onto contact positions, shape (...).
 
         Cutter and contact coincide, so the neighbouring names cancel (equations 2 and 3 of the
         paper, in column-vector order).
-
-        Args:
-            t: Contact positions, shape (...).
-            Ts_workpiece_cutter: Cutter frames, shape (..., 4, 4).
         """
         Ts_base_contact = self.wheel.T_base_contact(t)
         return Ts_base_contact @ inverse(Ts_workpiece_cutter) @ inverse(self.T_flange_workpiece)

@@ -109,11 +109,9 @@ def _summary(number: int, name: str, face: MachinedSurface, holes: int | None) -
 
 
 def preview_face(faces: list[FaceSummary], face: FaceSummary) -> tuple[str, list[str]]:
-    """Return where to look from to see a face best, and a picture of it among the others in text.
+    """Return where to look from to see one of the faces best, and a picture of all in text.
 
-    Args:
-        faces: All faces.
-        face: The one, drawn with ``#``; the others are dots.
+    The face is drawn with ``#``, the others with dots.
     """
     view = max(VIEWS, key=lambda name: VIEWS[name][1] * float(face.normal[VIEWS[name][0]]))
     depth, sign = VIEWS[view]

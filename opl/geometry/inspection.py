@@ -75,8 +75,7 @@ def inspect(
         doubtful |= chosen
     spacing = max(passes.pitch / _LOOKS_PER_PITCH, longest_side(surface) / _MOST_LOOKS)
     samples = surface.area_samples(spacing)
-    points, pass_index = laid.points.Ts_workpiece_cutter[:, :3, 3], laid.points.pass_index
-    missed = samples.chosen(uncovered(samples, points, pass_index, passes.pitch))
+    missed = samples.chosen(uncovered(samples, laid.points, passes.pitch))
     fraction = float(missed.areas.sum() / samples.areas.sum())
     if fraction > UNCOVERED:
         findings.append(
@@ -178,14 +177,13 @@ def _repeated(laid: LaidPasses, passes: Passes) -> Iterator[_Doubt]:
     """Yield passes that lie on another one though the job grinds none twice."""
     if passes.order is Order.BOTH or passes.repeats > 1:
         return
-    points, pass_index = laid.points.Ts_workpiece_cutter[:, :3, 3], laid.points.pass_index
-    pairs = lying_on_others(points, pass_index, passes.pitch, passes.max_bow_height)
+    pairs = lying_on_others(laid.points, passes.pitch, passes.max_bow_height)
     if pairs:
         listed = [f"pass {again + 1} lies on pass {first + 1}" for first, again in pairs[:4]]
         listed += [f"{len(pairs) - 4} more"] if len(pairs) > 4 else []
         yield (
             "duplicate",
-            np.isin(pass_index, [again for _, again in pairs]),
+            np.isin(laid.points.pass_index, [again for _, again in pairs]),
             f"{', '.join(listed)}: do faces of the surface lie on each other?",
         )
 

@@ -77,11 +77,7 @@ def winding_number(mesh: TriangleMesh, point: Array) -> float:
     """Return how often a surface winds around a point: 1 in a solid, 0 outside, a part if open.
 
     It is the sum of the solid angles of its triangles (Van Oosterom and Strackee, The Solid Angle
-    of a Plane Triangle, 1983), over that of a whole sphere.
-
-    Args:
-        mesh: The surface.
-        point: In [m], shape (3,).
+    of a Plane Triangle, 1983), over that of a whole sphere. The point is in [m], shape (3,).
     """
     a, b, c = np.moveaxis(mesh.triangles - point, 1, 0)
     la, lb, lc = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))

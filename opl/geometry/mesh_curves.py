@@ -39,13 +39,9 @@ class MeshCurve:
     def through(
         cls, points: Array, normals: Array, tensors: Array, plane_normal: Array
     ) -> MeshCurve | None:
-        """Return the curve through points, directed along axis x; None if it has no length.
+        """Return the curve through points in [m], shape (k, 3), directed along axis x.
 
-        Args:
-            points: In [m], shape (k, 3).
-            normals: Smooth normals, shape (k, 3).
-            tensors: Curvature in [1/m], shape (k, 3, 3).
-            plane_normal: Unit normal of the plane that they lie on, shape (3,).
+        The other arguments are its attributes; None if it has no length.
         """
         steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
         kept = np.append(True, steps > _SAME)

@@ -21,7 +21,7 @@ from opl.geometry.curves import SurfaceCurve
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh, load_triangles
 from opl.geometry.mesh_curves import MeshCurve, plane_polylines
-from opl.geometry.patchwork import in_order
+from opl.geometry.patchwork import across_rows, in_order
 from opl.geometry.regions import face_normals, smooth_regions
 
 
@@ -137,12 +137,8 @@ class MeshSurface:
     def curvature_across(self, spacing: float, direction: Array) -> tuple[Array, Array]:
         """Return curvature in [1/m] and slope across rows; see `Patchwork.curvature_across`."""
         used = np.unique(self.mesh.faces)
-        normals = self.normals[used]
-        x = np.cross(normals, direction)
-        slope = np.linalg.norm(x, axis=1)
-        cut = slope > 0.05
-        y = np.cross(normals[cut], x[cut] / slope[cut, None])
-        return np.einsum("ki,kij,kj->k", y, self.bending[used][cut], y), slope[cut]
+        cut, slope, _, y = across_rows(self.normals[used], direction)
+        return np.einsum("ki,kij,kj->k", y, self.bending[used][cut], y), slope
 
 
 def load_mesh_surface(

@@ -100,11 +100,7 @@ class NurbsSurface:
         return np.array([[u0, v0], [u1, v1]])
 
     def point(self, uv: Array) -> Array:
-        """Return S(u, v) in [m], shape (..., 3); nan outside the domain.
-
-        Args:
-            uv: Parameters, shape (..., 2).
-        """
+        """Return S(u, v) in [m], shape (..., 3), of (..., 2); nan outside the domain."""
         homogeneous = self._homogeneous(uv)
         return np.asarray(homogeneous[..., :3] / homogeneous[..., 3:])
 
@@ -140,10 +136,7 @@ class NurbsSurface:
         return S
 
     def normal(self, uv: Array) -> Array:
-        """Return the unit normals along du x dv, shape (..., 3).
-
-        Args:
-            uv: Parameters, shape (..., 2).
+        """Return the unit normals along du x dv, shape (..., 3), of parameters (..., 2).
 
         Raises:
             DegenerateNormalError: Where du x dv is zero, at a pole or a cusp, and for parameters
@@ -180,11 +173,7 @@ class NurbsSurface:
         return np.asarray(np.swapaxes(mixed, -1, -2) @ second @ mixed)
 
     def unit_normal(self, uv: Array, S: Array) -> Array:
-        """Return the unit normals of known derivatives.
-
-        Args:
-            uv: Parameters, shape (..., 2).
-            S: What `derivatives` returned for them.
+        """Return the unit normals where `derivatives` returned S, shape (..., 3).
 
         Raises:
             DegenerateNormalError: Where du x dv is zero.

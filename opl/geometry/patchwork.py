@@ -179,15 +179,23 @@ class Patchwork:
         curvatures, slopes = [], []
         for face in self.faces:
             samples = face.area_samples(spacing)
-            x = np.cross(samples.normals, direction)
-            slope = np.linalg.norm(x, axis=1)
-            cut = slope > 0.05
-            x = x[cut] / slope[cut, None]
-            y = np.cross(samples.normals[cut], x)
+            cut, slope, x, y = across_rows(samples.normals, direction)
             tensor = face.outward * face.surface.curvature_tensor(samples.uv[cut], x, y)
             curvatures.append(tensor[:, 1, 1])
-            slopes.append(slope[cut])
+            slopes.append(slope)
         return np.concatenate(curvatures), np.concatenate(slopes)
+
+
+def across_rows(normals: Array, direction: Array) -> tuple[np.ndarray, Array, Array, Array]:
+    """Return where planes cut a surface rather than touch it, slope, and tangents along and across.
+
+    Shapes (n,) of bool, and (k,), (k, 3), (k, 3) of what is cut.
+    """
+    x = np.cross(normals, direction)
+    slope = np.linalg.norm(x, axis=1)
+    cut = slope > 0.05
+    x = x[cut] / slope[cut, None]
+    return cut, slope[cut], x, np.cross(normals[cut], x)
 
 
 def in_order(curves: Sequence[SurfaceCurve]) -> list[SurfaceCurve]:

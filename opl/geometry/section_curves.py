@@ -83,7 +83,7 @@ def section_curves(section: Section, grid: SurfaceGrid, tolerance: float) -> lis
     no order.
 
     Args:
-        section: Plane and surface.
+        section: The plane and the surface.
         grid: Grid of the surface; what falls between its lines is not seen.
         tolerance: Largest error in [m] of a curve's ``positions`` between its nodes.
 

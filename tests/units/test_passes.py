@@ -344,7 +344,7 @@ def test_coverage_counts_what_no_pass_comes_by():
     points = lay_passes(whole, plan).points
     samples = whole.area_samples(0.4e-3)
     assert samples.areas.sum() == pytest.approx(0.04**2)
-    missed = uncovered(samples, points.Ts_workpiece_cutter[ORIGINS], points.pass_index, 5e-3)
+    missed = uncovered(samples, points, 5e-3)
     y = samples.points[:, 1]
     np.testing.assert_array_equal(missed, (y < 10e-3) | (y > 30e-3))
 
