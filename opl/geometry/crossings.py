@@ -26,10 +26,7 @@ def crossing_triangles(triangles: Array) -> np.ndarray:
     """Return the pairs of triangles that cross or overlap, the smaller index first, shape (k, 2).
 
     Triangles that share a corner or an edge, or touch otherwise, do not cross; those that lie on
-    each other do. Those without area are passed over.
-
-    Args:
-        triangles: Their corners in [m], shape (n, 3, 3).
+    each other do. Those without area are passed over. Corners are in [m], shape (n, 3, 3).
     """
     size = np.ptp(triangles.reshape(-1, 3), axis=0).max() if len(triangles) else 0.0
     touching = _TOUCHING * float(size)

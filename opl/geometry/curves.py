@@ -67,14 +67,8 @@ def curvature_jumps(before: Array, after: Array) -> NDArray[np.bool_]:
 def hermite_through(points: Array, tangents: Array) -> tuple[CubicHermiteSpline, Array]:
     """Return a curve through nodes as a function of its arc length, and its turns between them.
 
-    Each piece is as long as the circular arc with its chord and its turn.
-
-    Args:
-        points: In [m], shape (k, 3).
-        tangents: Unit tangents, shape (k, 3).
-
-    Returns:
-        Points in [m], (...,) to (..., 3); and angles in [rad], shape (k - 1,).
+    Each piece is as long as the circular arc with its chord and its turn. Points are in [m] and
+    tangents of unit length, shape (k, 3); turns in [rad], shape (k - 1,).
     """
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     turns = np.arccos(np.clip(np.sum(tangents[1:] * tangents[:-1], axis=1), -1.0, 1.0))
@@ -202,11 +196,7 @@ def is_closed(curve: SurfaceCurve) -> bool:
 
 
 def joined(curves: Sequence[SurfaceCurve]) -> list[SurfaceCurve]:
-    """Join curves that continue each other, and leave the others as they are.
-
-    Args:
-        curves: Directed curves, in the order in which closed chains look for their start.
-    """
+    """Join directed curves that continue each other; a closed chain begins with its first one."""
     if len(curves) < 2:
         return list(curves)
     ends = np.stack([curve.frames(np.array([0.0, curve.length])) for curve in curves])

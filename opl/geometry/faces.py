@@ -96,16 +96,8 @@ def _summary(number: int, name: str, face: MachinedSurface, holes: int | None) -
     low, high = bounding_box(face)
     samples = face.area_samples(float((high - low).max()) / _LOOKS)
     area = float(samples.areas.sum())
-    return FaceSummary(
-        number=number,
-        type=name,
-        area=area,
-        low=low,
-        high=high,
-        normal=(samples.areas[:, None] * samples.normals).sum(axis=0) / area,
-        holes=holes,
-        samples=samples,
-    )
+    normal = (samples.areas[:, None] * samples.normals).sum(axis=0) / area
+    return FaceSummary(number, name, area, low, high, normal, holes, samples)
 
 
 def preview_face(faces: list[FaceSummary], face: FaceSummary) -> tuple[str, list[str]]:

@@ -114,12 +114,8 @@ def rotation_angle(T_a_b: Array, T_a_c: Array) -> Array:
 def interpolate(T_a_b: Array, T_a_c: Array, fraction: Array) -> Array:
     """Return the poses between two poses as the intermediate nodes of the paper take them.
 
-    Origin, axis z and axis x are interpolated linearly, then made orthonormal again.
-
-    Args:
-        T_a_b: Pose at fraction 0, shape (..., 4, 4).
-        T_a_c: Pose at fraction 1, shape (..., 4, 4).
-        fraction: Where between the two, shape (...).
+    Origin, axis z and axis x are interpolated linearly, then made orthonormal again. The fraction,
+    shape (...), is 0 at T_a_b and 1 at T_a_c.
     """
     s = np.asarray(fraction)[..., None]
     z, x, p = ((1.0 - s) * T_a_b[..., :3, k] + s * T_a_c[..., :3, k] for k in (2, 0, 3))

@@ -134,11 +134,7 @@ class Patchwork:
     faces: tuple[Face, ...]
 
     def extent_along(self, direction: Array) -> tuple[float, float]:
-        """Return the least and the largest d . S in [m] over all faces.
-
-        Args:
-            direction: Unit direction d, shape (3,).
-        """
+        """Return the least and the largest d . S in [m] over all faces; d is a unit vector."""
         low, high = zip(*(face.extent_along(direction) for face in self.faces), strict=True)
         return min(low), max(high)
 

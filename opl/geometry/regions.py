@@ -32,11 +32,8 @@ def neighbours(mesh: TriangleMesh) -> np.ndarray:
 def smooth_regions(mesh: TriangleMesh, crease: float) -> np.ndarray:
     """Return the region of each triangle, 0, 1, ..., the largest area first, shape (m,).
 
-    Neighbours belong together unless the edge between them is a crease.
-
-    Args:
-        mesh: The mesh; its triangles have areas.
-        crease: Angle in [rad] between two normals that makes an edge a crease.
+    Neighbours belong together unless their normals differ by more than ``crease`` [rad]. All
+    triangles must have areas.
     """
     normals, areas = face_normals(mesh)
     pairs = neighbours(mesh)

@@ -47,12 +47,9 @@ def _lines(knots: Array, degree: int) -> Array:
 
 
 def extent_along(surface: NurbsSurface, grid: SurfaceGrid, direction: Array) -> tuple[float, float]:
-    """Return the least and the largest d . S(u, v) in [m] over a surface.
+    """Return the least and the largest d . S(u, v) in [m] over a surface with its grid.
 
-    Args:
-        surface: The surface.
-        grid: Its grid, where the search starts.
-        direction: Unit direction d, shape (3,).
+    The direction d has unit length, shape (3,).
     """
     lower, upper = surface.domain
 

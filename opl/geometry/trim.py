@@ -43,10 +43,7 @@ class Trim:
         object.__setattr__(self, "loops", tuple(loops))
 
     def check_against(self, domain: Array) -> None:
-        """Refuse loops that leave nothing of a surface.
-
-        Args:
-            domain: Smallest and largest (u, v) of the surface, shape (2, 2).
+        """Refuse loops that leave nothing of a surface with a domain, as in `NurbsSurface.domain`.
 
         Raises:
             ValueError: If no loop has an area, or none reaches into the domain.
