@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.motion.process import ProcessSettings
+from opl.motion.process_settings import ProcessSettings
 from opl.motion.timing import Cause, Timing
 
 # The belt dwells where the ground point is slower than this part of the feed.

@@ -11,7 +11,7 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
-from opl.motion.process import ProcessSettings
+from opl.motion.process_settings import ProcessSettings
 from opl.motion.timing import followed, time_motion
 
 

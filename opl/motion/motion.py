@@ -192,7 +192,7 @@ class Motion:
         if kind.on_wheel:
             return f"pass {index}, cutter point {self.cutter_point[move]:.4g}"
         if kind is MoveKind.HOME:
-            return "way home" if index == 0 and move > 0 else "way from home"
+            return "free move to home" if index == 0 and move > 0 else "free move from home"
         return f"{kind.value} of pass {index}"
 
     @cached_property

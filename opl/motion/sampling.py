@@ -71,7 +71,7 @@ class _Asked(base.MotionValidator):  # type: ignore[misc]
         return free
 
 
-def sample_way(
+def sample_path(
     start: Array,
     goal: Array,
     low: Array,

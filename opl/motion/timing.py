@@ -19,7 +19,7 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.leads import lead_count
 from opl.motion.motion import Motion, Phase, TimedMotion
-from opl.motion.process import ProcessSettings
+from opl.motion.process_settings import ProcessSettings
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, TimeLaw, fastest_law
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
-from opl.motion.air import UnreachableApproachError, lead
-from opl.motion.check import Fault
+from opl.motion.collision_check import CollidingMove
 from opl.motion.motion import Motion, MoveKind
+from opl.motion.whole_motion import UnreachableApproachError, lead
 from opl.planning.filling import BrokenEdgeError
 from opl.planning.open_matrix import FreeMove, OpenMatrix
 from opl.planning.problem import GrindingProblem
-from opl.planning.track_check import Blocked, Collides, NoLink
+from opl.planning.track_check import Blocked, Collides, NoFreeMove
 
 
 def block(problem: GrindingProblem, matrix: OpenMatrix, rows: np.ndarray, blocked: Blocked) -> None:
@@ -34,7 +34,7 @@ def block(problem: GrindingProblem, matrix: OpenMatrix, rows: np.ndarray, blocke
     if isinstance(blocked, Collides):
         for fault in blocked.faults:
             _block_fault(problem, matrix, track, blocked.motion, fault)
-    elif isinstance(blocked, NoLink):
+    elif isinstance(blocked, NoFreeMove):
         _block_link(problem, matrix, track, blocked)
     elif isinstance(blocked.error, BrokenEdgeError):
         _block_edge(matrix, track, blocked.error.column, blocked.error.cause)
@@ -48,7 +48,11 @@ def _block_edge(matrix: OpenMatrix, track: list[int], column: int, cause: str) -
 
 
 def _block_fault(
-    problem: GrindingProblem, matrix: OpenMatrix, track: list[int], motion: Motion, fault: Fault
+    problem: GrindingProblem,
+    matrix: OpenMatrix,
+    track: list[int],
+    motion: Motion,
+    fault: CollidingMove,
 ) -> None:
     """Block the node or the edge that a colliding move belongs to."""
     cause = " and ".join(fault.pair)
@@ -71,7 +75,7 @@ def _block_fault(
 
 
 def _block_link(
-    problem: GrindingProblem, matrix: OpenMatrix, track: list[int], blocked: NoLink
+    problem: GrindingProblem, matrix: OpenMatrix, track: list[int], blocked: NoFreeMove
 ) -> None:
     """Block what a free move that was not found rules out."""
     motion, move, error = blocked.motion, blocked.error.move, blocked.error.error
@@ -119,7 +123,7 @@ def _joined(
             q = _away(problem, matrix, kind, column, other)
             if other == row or q is None or last is None:
                 continue
-            if problem.scene.links.joined(last, q):
+            if problem.scene.free_moves.joined(last, q):
                 found.append(other)
                 last = q
     return found

@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 
 from opl.cell.collision import CollisionScene
-from opl.motion.links import Blocker
+from opl.motion.free_move_search import Blocker
 from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
 from opl.search.box import JointBox
@@ -19,9 +19,9 @@ from opl.search.ladder import Ladder
 class FreeMove(str, Enum):
     """Where a free move leads, in words."""
 
-    FROM_HOME = "way from home"
-    BETWEEN_PASSES = "way between passes"
-    TO_HOME = "way home"
+    FROM_HOME = "free move from home"
+    BETWEEN_PASSES = "free move between passes"
+    TO_HOME = "free move to home"
 
 
 @dataclass(frozen=True)

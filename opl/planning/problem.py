@@ -12,7 +12,7 @@ from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.process import ProcessSettings
+from opl.motion.process_settings import ProcessSettings
 from opl.planning.filling import Interpolation
 from opl.planning.nodes import NodeField, NodeMatrix, build_nodes
 from opl.planning.scene import PlanningScene

@@ -10,7 +10,7 @@ import numpy as np
 from opl.cell.full_turns import full_turns
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.errors import NoFreeMoveError, NoPathError
-from opl.motion.links import Blocker
+from opl.motion.free_move_search import Blocker
 from opl.planning.open_matrix import FreeMove, OpenMatrix
 from opl.planning.problem import GrindingProblem
 from opl.search.impasse import impasses

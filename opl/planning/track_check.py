@@ -6,10 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.motion.air import BlockedLinkError, UnreachableApproachError, linked, whole_motion
-from opl.motion.check import Fault, find_faults
+from opl.motion.collision_check import CollidingMove, colliding_moves
 from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
+from opl.motion.whole_motion import (
+    BlockedMotionError,
+    UnreachableApproachError,
+    linked,
+    whole_motion,
+)
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
@@ -35,18 +40,18 @@ class Collides:
     """Moves of the motion collide; its free moves are straight."""
 
     motion: Motion
-    faults: tuple[Fault, ...]
+    faults: tuple[CollidingMove, ...]
 
 
 @dataclass(frozen=True)
-class NoLink:
+class NoFreeMove:
     """Nothing but a free move that was not found stops the motion; its free moves are straight."""
 
     motion: Motion
-    error: BlockedLinkError
+    error: BlockedMotionError
 
 
-Blocked = NoMotion | Collides | NoLink
+Blocked = NoMotion | Collides | NoFreeMove
 
 
 def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -> Free | Blocked:
@@ -63,7 +68,7 @@ def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -
         motion = whole_motion(scene.cell, points, path, problem.process)
     except (BrokenEdgeError, UnreachableApproachError) as error:
         return NoMotion(error)
-    faults = find_faults(scene.cell, scene.collision, scene.part, motion)
+    faults = colliding_moves(scene.cell, scene.collision, scene.part, motion)
     # what is in the way of a free move is led around, unless it is where an approach begins
     faults = [
         fault
@@ -74,6 +79,6 @@ def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -
     if faults:
         return Collides(motion, tuple(faults))
     try:
-        return Free(path, linked(motion, scene.links))
-    except BlockedLinkError as error:
-        return NoLink(motion, error)
+        return Free(path, linked(motion, scene.free_moves))
+    except BlockedMotionError as error:
+        return NoFreeMove(motion, error)

@@ -21,7 +21,7 @@ from opl.motion.feed import SlowStretch
 from opl.motion.figures import Figures
 from opl.motion.motion import VerifiedMotion
 from opl.motion.timing import Timing
-from opl.planning.fixed import FixedContact
+from opl.planning.fixed_contact import FixedContact
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
 from opl.program.moves import Program

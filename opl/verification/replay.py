@@ -22,7 +22,7 @@ from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion, MoveKind, TimedMotion, VerifiedMotion
-from opl.verification.limits import limit_findings, missing_points
+from opl.verification.kinematic_checks import limit_findings, missing_points
 from opl.verification.world import World
 
 STEP = 1e-3  # [m]

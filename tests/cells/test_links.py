@@ -13,10 +13,10 @@ from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import part_tree
 from opl.geometry.frames import pose, transform
 from opl.geometry.shapes import Body, Box
-from opl.motion.check import RESOLUTION, densify
-from opl.motion.free_moves import FreeMoves
-from opl.motion.links import Links, NoLinkError
-from opl.motion.sampling import fewest, sample_way
+from opl.motion.collision_check import RESOLUTION, densify
+from opl.motion.free_move_search import BlockedMoveError, FreeMoveSearch
+from opl.motion.sampling import fewest, sample_path
+from opl.motion.straight_moves import StraightMoves
 from tests.support.bare_cells import bare_cell, block, with_obstacle
 from tests.support.fcl_scene import margin_along
 
@@ -34,11 +34,11 @@ def open_cell():
 
 
 def moves_in(cell):
-    return FreeMoves(cell, CollisionScene(cell), part_tree(cell.part))
+    return StraightMoves(cell, CollisionScene(cell), part_tree(cell.part))
 
 
 def links_in(cell):
-    return Links(cell, CollisionScene(cell), part_tree(cell.part))
+    return FreeMoveSearch(cell, CollisionScene(cell), part_tree(cell.part))
 
 
 def part_at(cell, q):
@@ -130,7 +130,7 @@ def test_every_way_that_is_found_is_free_in_an_independent_scene(seed):
         cell = with_obstacle(cell, at + rng.normal(0.0, 0.1, 3), rng.uniform(0.03, 0.2, 3), f"{k}")
     try:
         via = links_in(cell).find(HOME, AWAY)
-    except NoLinkError as error:
+    except BlockedMoveError as error:
         # only an end that is too near to something rules out these few boxes
         ends = [margin_along(cell, end[None]) for end in (HOME, AWAY)]
         assert error.end is not None and ends[error.end] < 0.0005
@@ -149,7 +149,7 @@ def test_what_was_sought_elsewhere_before_does_not_change_what_a_search_finds():
 
 def test_an_end_that_is_too_near_is_named():
     cell = with_obstacle(open_cell(), part_at(open_cell(), AWAY), (0.1, 0.1, 0.1), "anvil")
-    with pytest.raises(NoLinkError) as caught:
+    with pytest.raises(BlockedMoveError) as caught:
         links_in(cell).find(HOME, AWAY)
     assert caught.value.end == 1
     assert "anvil" in caught.value.pair
@@ -170,10 +170,10 @@ def caged(cell, q):
 
 
 def test_a_configuration_that_is_shut_in_is_told_with_what_shuts_it_in(monkeypatch):
-    monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
+    monkeypatch.setattr("opl.motion.free_move_search.MOST_CHECKED", 3000)
     links = links_in(caged(open_cell(), HOME))
     for way in ((HOME, AWAY), (AWAY, HOME)):
-        with pytest.raises(NoLinkError) as caught:
+        with pytest.raises(BlockedMoveError) as caught:
             links.find(*way)
         assert caught.value.end is None
         assert caught.value.pair[0] == "part"
@@ -181,17 +181,17 @@ def test_a_configuration_that_is_shut_in_is_told_with_what_shuts_it_in(monkeypat
 
 
 def test_what_is_joined_to_an_end_sought_in_vain_is_not_sought_again(monkeypatch):
-    monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
+    monkeypatch.setattr("opl.motion.free_move_search.MOST_CHECKED", 3000)
     links = links_in(caged(open_cell(), HOME))
-    with pytest.raises(NoLinkError) as first:
+    with pytest.raises(BlockedMoveError) as first:
         links.find(HOME, AWAY)
 
     def searched(*arguments):
         raise AssertionError("searched again")
 
-    monkeypatch.setattr("opl.motion.links.sample_way", searched)
+    monkeypatch.setattr("opl.motion.free_move_search.sample_path", searched)
     near = AWAY + np.deg2rad([2.0, 0.0, 0.0, 0.0, 0.0, 5.0])
-    with pytest.raises(NoLinkError) as second:
+    with pytest.raises(BlockedMoveError) as second:
         links.find(near, HOME)
     assert second.value.pair == first.value.pair
 
@@ -213,10 +213,10 @@ def wall_with_gap(low, high):
 def test_a_gap_in_a_wall_is_found_and_few_places_are_left():
     start, goal = np.array([-1.0, 0.0]), np.array([1.0, 0.0])
     free = wall_with_gap(0.7, 0.9)
-    found = sample_way(start, goal, np.full(2, -2.0), np.full(2, 2.0), free, lambda: False)
-    np.testing.assert_array_equal(found.way[[0, -1]], [start, goal])
-    assert all(free(a, b) for a, b in zip(found.way[:-1], found.way[1:], strict=True))
-    assert 3 <= len(found.way) <= 5
+    found = sample_path(start, goal, np.full(2, -2.0), np.full(2, 2.0), free, lambda: False)
+    np.testing.assert_array_equal(found.path[[0, -1]], [start, goal])
+    assert all(free(a, b) for a, b in zip(found.path[:-1], found.path[1:], strict=True))
+    assert 3 <= len(found.path) <= 5
 
 
 def test_a_search_ends_after_as_many_moves_as_it_may_ask():
@@ -228,8 +228,8 @@ def test_a_search_ends_after_as_many_moves_as_it_may_ask():
 
     start, goal = np.array([-1.0, 0.0]), np.array([1.0, 0.0])
     box = np.full(2, -2.0), np.full(2, 2.0)
-    found = sample_way(start, goal, *box, free, lambda: len(asked) >= 500)
-    assert found.way is None
+    found = sample_path(start, goal, *box, free, lambda: len(asked) >= 500)
+    assert found.path is None
     assert 500 <= len(asked) < 520
 
 
@@ -240,8 +240,8 @@ def test_refused_moves_are_those_of_the_end_that_is_shut_in():
     asked = iter(range(2000))
     start, goal = np.array([-1.0, -1.0]), np.array([1.0, 1.0])
     box = np.full(2, -2.0), np.full(2, 2.0)
-    found = sample_way(start, goal, *box, free, lambda: next(asked, None) is None)
-    assert found.way is None
+    found = sample_path(start, goal, *box, free, lambda: next(asked, None) is None)
+    assert found.path is None
     assert not found.from_start
     assert len(found.refused) > 10
     assert (np.abs(found.refused[:, 0] - 1.0) < 0.1).all()

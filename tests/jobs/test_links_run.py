@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import forward_kinematics, load_robot
 from opl.job.load import load_job
-from opl.planning.starts import plan_recursive
+from opl.planning.multi_start import plan_recursive
 from opl.run.delivery import deliver
 from opl.run.preparing import prepare
 from opl.run.stages import run_job
@@ -144,14 +144,14 @@ def cage():
 
 
 def test_a_home_that_nothing_leads_out_of_is_refused_and_the_pair_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
+    monkeypatch.setattr("opl.motion.free_move_search.MOST_CHECKED", 3000)
     job = write_job(tmp_path / "j", {**with_bodies(*cage()), "process.home_deg": SIDEWAYS})
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 3
     told = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
     message, *ways, advice = told["reasons"]
     assert message.endswith("there is no way through the air")
-    assert ways[0].startswith("way from home: ")
+    assert ways[0].startswith("free move from home: ")
     assert " and cage " in ways[0]
     assert advice.startswith("would help: another home configuration, or cage ")
     assert all(line in ended.err for line in told["reasons"])

@@ -17,7 +17,7 @@ RESOLUTION = np.deg2rad(1.0)  # largest joint change between two configurations 
 
 
 @dataclass(frozen=True)
-class Fault:
+class CollidingMove:
     """A move that collides.
 
     Attributes:
@@ -50,9 +50,9 @@ def densify(q: Array, resolution: float) -> tuple[Array, np.ndarray]:
     return np.concatenate([q[:1], dense]), np.concatenate([[0], move])
 
 
-def find_faults(
+def colliding_moves(
     cell: WorkCell, scene: CollisionScene, part: PartTree, motion: Motion
-) -> list[Fault]:
+) -> list[CollidingMove]:
     """Return every move of a motion that collides, once each, in order.
 
     The part may sink into the belt by its largest penetration while it is on the wheel or on its
@@ -78,5 +78,5 @@ def find_faults(
         on_move = np.flatnonzero(move == index)
         first = on_move[(cuts | hits)[on_move]][0]
         pair = (PART, WHEEL) if cuts[first] else scene.colliding_pairs(q[first])[0]
-        faults.append(Fault(int(index), pair, bool((cuts | hits)[on_move[-1]])))
+        faults.append(CollidingMove(int(index), pair, bool((cuts | hits)[on_move[-1]])))
     return faults

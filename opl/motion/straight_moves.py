@@ -15,7 +15,7 @@ from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import PartTree, signed_wheel_distance
 from opl.cell.workcell import PART, SECOND_OPINION, WHEEL, WorkCell
 from opl.geometry.frames import Array
-from opl.motion.check import RESOLUTION, densify
+from opl.motion.collision_check import RESOLUTION, densify
 
 # [m] a piece may be as long as to move no point farther than this from its middle; what would need
 # a distance beyond the clearance smaller than the last is taken to be too near
@@ -26,7 +26,7 @@ MOST_SPHERES = 32
 MOST_CORNERS = 100
 
 
-class FreeMoves:
+class StraightMoves:
     """Straight joint moves off the wheel, asked whether they are free.
 
     Robot and part against all that stands still, wheel included, is proven along the whole move, at

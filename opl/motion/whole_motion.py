@@ -14,11 +14,11 @@ from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
+from opl.motion.free_move_search import BlockedMoveError, FreeMoveSearch
 from opl.motion.leads import lead_offsets
-from opl.motion.links import Links, NoLinkError
 from opl.motion.motion import Motion, MoveKind
 from opl.motion.path import GrindingPath
-from opl.motion.process import ProcessSettings
+from opl.motion.process_settings import ProcessSettings
 
 
 class UnreachableApproachError(Exception):
@@ -35,7 +35,7 @@ class UnreachableApproachError(Exception):
         self.cause = cause
 
 
-class BlockedLinkError(Exception):
+class BlockedMotionError(Exception):
     """The robot cannot come from one place off the wheel to the next.
 
     Args:
@@ -43,7 +43,7 @@ class BlockedLinkError(Exception):
         error: Why.
     """
 
-    def __init__(self, move: int, error: NoLinkError) -> None:
+    def __init__(self, move: int, error: BlockedMoveError) -> None:
         super().__init__(f"way to configuration {move}: {error}")
         self.move = move
         self.error = error
@@ -99,7 +99,7 @@ def whole_motion(
     return Motion.joined(parts)
 
 
-def linked(motion: Motion, links: Links) -> Motion:
+def linked(motion: Motion, links: FreeMoveSearch) -> Motion:
     """Lead the free moves of a motion around what is in their way.
 
     Args:
@@ -107,15 +107,15 @@ def linked(motion: Motion, links: Links) -> Motion:
         links: Finds the ways.
 
     Raises:
-        BlockedLinkError: If there is none for one of them.
+        BlockedMotionError: If there is none for one of them.
     """
     moves = np.flatnonzero(motion.free[1:]) + 1
     on_the_way = []
     for move in moves.tolist():
         try:
             on_the_way.append(links.find(motion.q[move - 1], motion.q[move]))
-        except NoLinkError as error:
-            raise BlockedLinkError(move, error) from error
+        except BlockedMoveError as error:
+            raise BlockedMotionError(move, error) from error
     before = np.repeat(moves, [len(q) for q in on_the_way])
     return motion.with_inserted(before, np.concatenate(on_the_way)) if len(before) else motion
 

@@ -17,10 +17,10 @@ from opl.cell.collision import CollisionScene
 from opl.cell.wheel_distance import PartTree
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
-from opl.motion.free_moves import FreeMoves
-from opl.motion.sampling import fewest, sample_way
+from opl.motion.sampling import fewest, sample_path
+from opl.motion.straight_moves import StraightMoves
 
-MOST_ASKED = 60_000  # configurations, of one search
+MOST_CHECKED = 60_000  # configurations, of one search
 MOST_IN_VAIN = 4  # searches from one configuration before it is taken to be shut in
 MOST_NAMED = 100  # refused moves that are asked what is in their way
 # [rad] that a way may lead beyond both of its ends; less than half a turn of a wrist axis never was
@@ -30,7 +30,7 @@ BEYOND = np.pi
 Blocker = tuple[str, ...]
 
 
-class NoLinkError(Exception):
+class BlockedMoveError(Exception):
     """No free way between two configurations was found.
 
     Args:
@@ -45,7 +45,7 @@ class NoLinkError(Exception):
         self.end = end
 
 
-class Links:
+class FreeMoveSearch:
     """Ways through the air of one cell, and what is known of those that were not found."""
 
     def __init__(self, cell: WorkCell, scene: CollisionScene, part: PartTree) -> None:
@@ -57,8 +57,8 @@ class Links:
         self._in_vain: list[tuple[Array, Array, Blocker]] = []
 
     @cached_property
-    def _moves(self) -> FreeMoves:
-        return FreeMoves(self.cell, self.scene, self.part)
+    def _moves(self) -> StraightMoves:
+        return StraightMoves(self.cell, self.scene, self.part)
 
     def find(self, start: Array, goal: Array) -> Array:
         """Return the configurations to visit between two, shape (n, 6); none if it is free.
@@ -68,7 +68,7 @@ class Links:
             goal: Another.
 
         Raises:
-            NoLinkError: If no way is found, or an end is too near to something.
+            BlockedMoveError: If no way is found, or an end is too near to something.
         """
         key = start.tobytes(), goal.tobytes()
         if key not in self._found:
@@ -85,12 +85,12 @@ class Links:
         for end, q in enumerate((start, goal)):
             near = self._moves.pair_at(q)
             if near is not None:
-                raise NoLinkError(near, end)
+                raise BlockedMoveError(near, end)
         way = self._like_a_known_one(start, goal)
         if way is None:
             pair = self._shut_in(start) or self._shut_in(goal) or self._hopeless(start, goal)
             if pair is not None:
-                raise NoLinkError(pair)
+                raise BlockedMoveError(pair)
             way = self._sample(start, goal)
             self._ways.append(way)
         return way[1:-1]
@@ -128,8 +128,8 @@ class Links:
         low = np.maximum(robot.lower, np.minimum(start, goal) - BEYOND)
         high = np.minimum(robot.upper, np.maximum(start, goal) + BEYOND)
         scale = moves.levers
-        end = moves.asked + MOST_ASKED
-        found = sample_way(
+        end = moves.asked + MOST_CHECKED
+        found = sample_path(
             start * scale,
             goal * scale,
             low * scale,
@@ -145,4 +145,4 @@ class Links:
         limits = " ".join(self.cell.broken_limits(refused[:, 1]))
         pair: Blocker = met.most_common(1)[0][0] if met else (f"limits of {limits}",)
         self._in_vain.append((start, goal, pair))
-        raise NoLinkError(pair)
+        raise BlockedMoveError(pair)
