@@ -13,7 +13,7 @@ from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.motion.motion import Motion
 
-RESOLUTION = np.deg2rad(1.0)  # largest joint change between two configurations that are asked
+RESOLUTION = np.deg2rad(1.0)  # largest joint change between two configurations that are checked
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class CollidingMove:
     Attributes:
         move: Index of the configuration that the move ends at.
         pair: Names of the two bodies.
-        at_end: Whether the configuration itself collides, not only the way to it.
+        at_end: Whether the configuration itself collides, not only the move to it.
     """
 
     move: int
@@ -55,8 +55,8 @@ def colliding_moves(
 ) -> list[CollidingMove]:
     """Return every move of a motion that collides, once each, in order.
 
-    The part may sink into the belt by its largest penetration while it is on the wheel or on its
-    way to and from it; on free moves it keeps the clearance from the wheel as from all else.
+    The part may sink into the belt by its largest penetration while it is on the wheel, on
+    approaches and on retracts; on free moves it keeps the clearance from the wheel as from all else.
 
     Args:
         cell: The cell.
@@ -69,10 +69,10 @@ def colliding_moves(
     needed = np.where(motion.free[move], cell.part_from_wheel, -cell.planned_penetration)
     Ts_contact0_workpiece = cell.Ts_contact0_workpiece(Ts_base_flange)
     cuts = signed_wheel_distance(part, cell.wheel, Ts_contact0_workpiece, needed) < needed
-    # a move that is refused for the wheel need not be asked about the rest
-    ask = ~np.isin(move, move[cuts])
+    # a move that is refused for the wheel need not be checked further
+    unrefused = ~np.isin(move, move[cuts])
     hits = np.zeros(len(q), dtype=bool)
-    hits[ask] = scene.collides(q[ask])
+    hits[unrefused] = scene.collides(q[unrefused])
     faults = []
     for index in np.unique(move[cuts | hits]):
         on_move = np.flatnonzero(move == index)

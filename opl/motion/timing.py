@@ -1,6 +1,6 @@
 """How long each move of a motion takes: at the set feed, and no faster than the joints can follow.
 
-On the wheel and on the way to and from it the time law of `opl.motion.time_law` is asked what the
+On the wheel, on approaches and on retracts the time law of `opl.motion.time_law` says what the
 joints can follow; a free move turns at its share of top speed. The ramps with which a robot leaves
 and comes to rest are no part of these times, nor are they of the speeds of a program: the
 controller adds them. `opl.program.cycle` counts them.

@@ -1,8 +1,7 @@
 """From the path on the wheel to a whole motion: home, approach, passes, retract, links, home.
 
 The part comes to the wheel and leaves it as `opl.motion.leads` says; between passes, and from and
-to home, all joints move together on a straight line in joint space, or on several around what is in
-the way.
+to home, all joints move together on a straight line in joint space, or on several around obstacles.
 """
 
 from __future__ import annotations
@@ -36,15 +35,15 @@ class UnreachableApproachError(Exception):
 
 
 class BlockedMotionError(Exception):
-    """The robot cannot come from one place off the wheel to the next.
+    """A free move of a motion is blocked.
 
     Args:
-        move: Index in the motion of the configuration that it cannot come to.
+        move: Index in the motion of the configuration that the move should end at.
         error: Why.
     """
 
     def __init__(self, move: int, error: BlockedMoveError) -> None:
-        super().__init__(f"way to configuration {move}: {error}")
+        super().__init__(f"free move to configuration {move}: {error}")
         self.move = move
         self.error = error
 
@@ -52,7 +51,7 @@ class BlockedMotionError(Exception):
 def whole_motion(
     cell: WorkCell, points: CutterPoints, path: GrindingPath, process: ProcessSettings
 ) -> Motion:
-    """Join the passes of a path into one motion from home to home.
+    """Join the passes of a path into one motion from home to home, its free moves straight.
 
     Args:
         cell: The cell.
@@ -63,10 +62,10 @@ def whole_motion(
     Raises:
         UnreachableApproachError: If an approach or retract leaves reach or limits.
     """
-    parts = [Motion.off_wheel(process.home[None], MoveKind.HOME, -1)]
-    for index in range(int(points.pass_index[-1]) + 1):
+    home = Motion.off_wheel(process.home[None], MoveKind.HOME, -1)
+    parts = [home]
+    for index in range(points.n_passes):
         on_pass = np.flatnonzero(path.pass_index == index)
-        first, last = int(on_pass[0]), int(on_pass[-1])
         lead_in, lead_out = (
             lead(
                 cell,
@@ -78,7 +77,7 @@ def whole_motion(
                 path.contact_position[k],
                 path.q[k],
             )
-            for k, kind in ((first, MoveKind.APPROACH), (last, MoveKind.RETRACT))
+            for k, kind in ((on_pass[0], MoveKind.APPROACH), (on_pass[-1], MoveKind.RETRACT))
         )
         free = MoveKind.HOME if index == 0 else MoveKind.LINK
         place = path.cutter_point[on_pass]
@@ -95,29 +94,28 @@ def whole_motion(
             ),
             Motion.off_wheel(lead_out, MoveKind.RETRACT, index),
         ]
-    parts.append(Motion.off_wheel(process.home[None], MoveKind.HOME, -1))
-    return Motion.joined(parts)
+    return Motion.joined([*parts, home])
 
 
-def linked(motion: Motion, links: FreeMoveSearch) -> Motion:
-    """Lead the free moves of a motion around what is in their way.
+def linked(motion: Motion, search: FreeMoveSearch) -> Motion:
+    """Lead the free moves of a motion around obstacles.
 
     Args:
         motion: The motion, every free move of it a single straight one.
-        links: Finds the ways.
+        search: Finds the free moves.
 
     Raises:
-        BlockedMotionError: If there is none for one of them.
+        BlockedMotionError: If one of them cannot be found.
     """
     moves = np.flatnonzero(motion.free[1:]) + 1
-    on_the_way = []
+    inserted = []
     for move in moves.tolist():
         try:
-            on_the_way.append(links.find(motion.q[move - 1], motion.q[move]))
+            inserted.append(search.find(motion.q[move - 1], motion.q[move]))
         except BlockedMoveError as error:
             raise BlockedMotionError(move, error) from error
-    before = np.repeat(moves, [len(q) for q in on_the_way])
-    return motion.with_inserted(before, np.concatenate(on_the_way)) if len(before) else motion
+    before = np.repeat(moves, [len(q) for q in inserted])
+    return motion.with_inserted(before, np.concatenate(inserted)) if len(before) else motion
 
 
 def lead(

@@ -1,9 +1,9 @@
-"""What is learnt from a track that is not free: the nodes and edges that no other track need try.
+"""What a track that is not free rules out: the nodes and edges that no other track need try.
 
-A free move that was not found rules out all nodes that are no better off than those it joins. Two
-configurations off the wheel that a free straight move joins can be left and come to in the same
-ways. So where a search from one of them was in vain, the other need not be tried; and mostly all
-contact positions of a matrix are joined in this manner.
+A free move that was not found rules out all nodes that are no better off than those it joins. From
+two configurations off the wheel that a free straight move joins, the same others can be reached. So
+where a search from one of them was in vain, the other need not be tried; and mostly all contact
+positions of a matrix are joined like this.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The track that costs least over the whole field: least travel, or least time."""
+"""The track with the least cost over the whole field: least travel, or least time."""
 
 from __future__ import annotations
 

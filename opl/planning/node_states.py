@@ -1,4 +1,4 @@
-"""What each node of a branch of the inverse kinematics is: free, or what rules it out."""
+"""What each node of an IK branch is: free, or what rules it out."""
 
 from __future__ import annotations
 

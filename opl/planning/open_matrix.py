@@ -17,7 +17,7 @@ from opl.search.ladder import Ladder
 
 
 class FreeMove(str, Enum):
-    """Where a free move leads, in words."""
+    """Where a free move leads; the value is how messages name it."""
 
     FROM_HOME = "free move from home"
     BETWEEN_PASSES = "free move between passes"
@@ -108,8 +108,7 @@ class OpenMatrix:
 
     def allows(self, rows: np.ndarray) -> bool:
         """Return whether nothing on a track is blocked."""
-        columns = np.arange(len(rows))
-        n_rows = self.free.shape[1]
+        columns, n_rows = np.arange(len(rows)), self.free.shape[1]
         keys = (columns[:-1] * n_rows + rows[:-1]) * n_rows + rows[1:]
         return bool(self.free[columns, rows].all()) and self.blocked.isdisjoint(keys.tolist())
 

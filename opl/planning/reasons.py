@@ -1,4 +1,4 @@
-"""Why nothing is free: the cutter points that stop a path, and what stops them, in words."""
+"""Why nothing is free: the cutter points that stop a path, and what stops them."""
 
 from __future__ import annotations
 
@@ -33,10 +33,11 @@ def no_path(problem: GrindingProblem, matrices: list[OpenMatrix]) -> NoPathError
     """Return the error with how far the searches came and what stopped them."""
     cut_off = sum((matrix.cut_off for matrix in matrices), Counter())
     if cut_off:
-        return NoFreeMoveError(
-            "no path: the passes can be ground, but there is no way through the air",
-            explain_free_moves(problem.cell, cut_off),
+        where = (
+            "no path: the passes can be ground, but no collision-free move to, from or between "
+            "them was found"
         )
+        return NoFreeMoveError(where, explain_free_moves(problem.cell, cut_off))
     n, reached = len(problem.points), max((matrix.reached for matrix in matrices), default=0)
     if reached == 0:
         where = f"no path: no free configuration at cutter point 0 (0 of {n} reached)"
@@ -48,7 +49,7 @@ def no_path(problem: GrindingProblem, matrices: list[OpenMatrix]) -> NoPathError
 
 
 def explain(problem: GrindingProblem, matrices: list[OpenMatrix]) -> list[str]:
-    """Say at which cutter points nothing is free, and why.
+    """Return lines on the cutter points where nothing is free, and why.
 
     Args:
         problem: What was to be planned.
@@ -70,7 +71,7 @@ def explain(problem: GrindingProblem, matrices: list[OpenMatrix]) -> list[str]:
 
 
 def explain_free_moves(cell: WorkCell, cut_off: Counter[tuple[FreeMove, Blocker]]) -> list[str]:
-    """Say which free moves are blocked, by what, and what would help.
+    """Return lines on the free moves that are blocked, by what, and what would help.
 
     Args:
         cell: The cell.
@@ -129,7 +130,7 @@ def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
         if not len(q):
             counts["out of reach"] += 1
         elif not within.any():
-            # the configuration that breaks the fewest shows best what is in the way
+            # the configuration that breaks the fewest shows best what is wrong
             names = min(map(cell.broken_limits, turned.reshape(-1, 6)), key=len)
             counts[f"beyond the limits of {' '.join(names)}"] += 1
         elif cuts[position]:
@@ -146,7 +147,7 @@ def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
 
 
 def _where_it_ended(n_points: int, matrices: list[OpenMatrix]) -> list[str]:
-    """Every cutter point has a free configuration: say what stopped the edges between them."""
+    """Return what stopped the edges where every cutter point has a free configuration."""
     farthest = max(matrices, key=lambda matrix: matrix.reached)
     reached, causes = farthest.reached, sum((matrix.causes for matrix in matrices), Counter())
     lines = []
@@ -155,8 +156,8 @@ def _where_it_ended(n_points: int, matrices: list[OpenMatrix]) -> list[str]:
     if shut:
         first, last = min(shut, key=lambda run: run[1] - run[0])
         lines.append(
-            f"{_run(first, last)}: the shortest run that cannot be passed, on the branch that came "
-            "farthest"
+            f"{_run(first, last)}: the shortest run that cannot be passed, on the IK branch that "
+            "came farthest"
         )
         near = range(first, last + 1)
     if reached == n_points:  # it came through: what counts is what it met most often
@@ -170,10 +171,10 @@ def _where_it_ended(n_points: int, matrices: list[OpenMatrix]) -> list[str]:
         met.sort(key=lambda item: (-item[1], item[0]))
         if met:
             refused = ", ".join(f"{cause} ({count} times)" for cause, count in met[:4])
-            lines.append(f"cutter point {column}: steps refused: {refused}")
+            lines.append(f"cutter point {column}: edges refused: {refused}")
     if len(lines) == n_before:
         lines.append(
-            "no continuous step leads on: the arm would have to change its branch or jump; "
+            "no continuous edge leads on: the arm would have to change its IK branch or jump; "
             "a wider range of contact positions or a turned fixture may help"
         )
     return lines

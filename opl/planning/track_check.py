@@ -1,4 +1,4 @@
-"""Is the whole motion of a track free of collision, and if not, what is in the way?"""
+"""Is the whole motion of a track free of collision, and if not, what blocks it?"""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -
     except (BrokenEdgeError, UnreachableApproachError) as error:
         return NoMotion(error)
     faults = colliding_moves(scene.cell, scene.collision, scene.part, motion)
-    # what is in the way of a free move is led around, unless it is where an approach begins
+    # free moves are led around what blocks them, unless it is where an approach begins
     faults = [
         fault
         for fault in faults

@@ -76,7 +76,7 @@ def find_touches(
         tolerance: Largest distance from where the contact model has the point, in [m].
     """
     Ts_workpiece_cutter = points.Ts_workpiece_cutter
-    found: list[tuple[Array, ...]] = []
+    found: list[tuple[Array, ...]] = [(np.empty(0),) * 4]
     for configuration, T_contact0_workpiece in enumerate(Ts_contact0_workpiece):
         p_contact0 = transform(T_contact0_workpiece, Ts_workpiece_cutter[:, :3, 3])
         near = np.flatnonzero(np.abs(wheel.signed_distance(p_contact0)) <= tolerance)
@@ -87,7 +87,5 @@ def find_touches(
         fits &= np.abs(t) <= wheel.last_position + ROLL_SLACK
         point = near[fits]
         found.append((np.full(len(point), configuration), point, t[fits], distance[fits]))
-    configuration_, point_, t_, distance_ = (
-        np.concatenate(column) if found else np.empty(0) for column in zip(*found, strict=True)
-    )
-    return Touches(configuration_.astype(np.intp), point_.astype(np.intp), t_, distance_)
+    columns = [np.concatenate(column) for column in zip(*found, strict=True)]
+    return Touches(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])

@@ -14,7 +14,7 @@ class Drum:
     """A cylinder about z of its own frame.
 
     Attributes:
-        T_base_drum: Its pose, the origin half-way along, shape (4, 4).
+        T_base_drum: Its pose, the origin in the middle, shape (4, 4).
         radius: In [m].
         width: In [m].
     """
@@ -38,7 +38,7 @@ class Drum:
         radial = from_middle - along[:, None] * axis
         away = np.linalg.norm(radial, axis=1)
         beside, beyond = np.abs(along) - self.width / 2.0, away - self.radius
-        # how much of the way out leads along the axis, and how much away from it
+        # parts of the shortest motion out: along the axis, and away from it
         sideways, outward = np.maximum(beside, 0.0), np.maximum(beyond, 0.0)
         inside = (beside <= 0.0) & (beyond <= 0.0)
         sideways = np.where(inside, beside > beyond, sideways)

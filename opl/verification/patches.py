@@ -36,11 +36,11 @@ class Patches:
         return cls(patches, (low + high) / 2.0, (high - low) / 2.0)
 
     def least_distances(self, drum: Drum, T_base_workpiece: Array) -> Array:
-        """Return what each patch is at least from the wheel in [m], shape (p,).
+        """Return a lower bound of the distance of each patch from the wheel in [m], shape (p,).
 
         The signed distance to a cylinder is convex: nothing of a patch is nearer than the plane
-        that touches it in the middle says. That bounds a depth as Bullet tells it, the shortest
-        way out, as well: along the normal of that plane there is one.
+        that touches it in the middle says. That bounds Bullet's penetration depth as well, the
+        shortest motion out of the wheel: one is along the normal of that plane.
         """
         distance, outward = drum.distances(transform(T_base_workpiece, self.middle))
         reach = (np.abs(outward @ T_base_workpiece[:3, :3]) * self.half).sum(axis=1)

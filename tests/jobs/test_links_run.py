@@ -150,7 +150,7 @@ def test_a_home_that_nothing_leads_out_of_is_refused_and_the_pair_named(tmp_path
     assert ended.status == 3
     told = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
     message, *ways, advice = told["reasons"]
-    assert message.endswith("there is no way through the air")
+    assert message.endswith("no collision-free move to, from or between them was found")
     assert ways[0].startswith("free move from home: ")
     assert " and cage " in ways[0]
     assert advice.startswith("would help: another home configuration, or cage ")
