@@ -34,9 +34,8 @@ class CollidingMove:
 def densify(q: Array, resolution: float) -> tuple[Array, np.ndarray]:
     """Put configurations on the joint lines between configurations.
 
-    Args:
-        q: Joint positions in [rad], shape (n, 6).
-        resolution: Largest change of any joint between two of the result in [rad].
+    `q` is in [rad], shape (n, 6); no joint changes by more than `resolution` in [rad] between two
+    of the result.
 
     Returns:
         Configurations, shape (m, 6), ending with the last; and for each the index of the move that
@@ -56,13 +55,7 @@ def colliding_moves(
     """Return every move of a motion that collides, once each, in order.
 
     The part may sink into the belt by its largest penetration while it is on the wheel, on
-    approaches and on retracts; on free moves it keeps the clearance from the wheel as from all else.
-
-    Args:
-        cell: The cell.
-        scene: Its geometry.
-        part: The triangles of the part.
-        motion: The motion.
+    approaches and on retracts; on free moves it keeps its clearance from the wheel.
     """
     q, move = densify(motion.q, RESOLUTION)
     Ts_base_flange = forward_kinematics(cell.robot, q)

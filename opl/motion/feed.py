@@ -64,10 +64,6 @@ def slow_stretches(timing: Timing, process: ProcessSettings) -> tuple[SlowStretc
     """Return the parts of the passes that are slower than the feed by a hundredth or more.
 
     The ramps at both ends of a pass are not among them: the robot has to rest there.
-
-    Args:
-        timing: A motion with its times.
-        process: The requested speeds.
     """
     slow = np.array([cause is not Cause.NONE for cause in timing.cause])
     index = timing.timed.motion.pass_index

@@ -42,12 +42,7 @@ def figures_of_path(
 ) -> Figures:
     """Return the figures of a found path.
 
-    Args:
-        path: The path.
-        motion: The whole motion that it is part of.
-        points: Its cutter points.
-        process: The speeds.
-        robot: Whose path.
+    `motion` is the whole motion that the path is part of.
     """
     timing = time_motion(motion, points, process, robot)
     seconds = timing.timed.duration[motion.grinding].sum()

@@ -63,9 +63,7 @@ class FreeMoveSearch:
     def find(self, start: Array, goal: Array) -> Array:
         """Return the configurations to visit between two, shape (n, 6); none if it is free.
 
-        Args:
-            start: A configuration in [rad], shape (6,).
-            goal: Another.
+        `start` and `goal` are in [rad], shape (6,).
 
         Raises:
             BlockedMoveError: If no free move is found, or an end is too near to something.

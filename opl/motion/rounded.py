@@ -67,9 +67,8 @@ class RoundedLine:
 def rounded_line(q: Array, times: Array) -> RoundedLine:
     """Round the corners between configurations.
 
-    Args:
-        q: Joint positions in [rad], shape (n, 6), n >= 2.
-        times: Wanted time of each move in [s], all positive, shape (n - 1,).
+    `q` is in [rad], shape (n, 6), n >= 2; `times`, the wanted times of the moves in [s], are
+    positive, shape (n - 1,).
     """
     nodes = np.concatenate([[0.0], np.cumsum(times)])
     speed = np.diff(q, axis=0) / times[:, None]

@@ -95,11 +95,8 @@ class TimeLaw:
 def fastest_law(line: RoundedLine, limits: JointLimits, at_rest: bool) -> TimeLaw:
     """Return the fastest law along a line.
 
-    Args:
-        line: The line.
-        limits: What the joints can do.
-        at_rest: Whether the robot rests at both ends. If not, it comes and goes on straight on, as
-            fast as the line lets it.
+    If the robot is not `at_rest` at both ends, it comes and goes on straight on, as fast as the
+    line lets it.
 
     Raises:
         UnsafeError: If no law is found, or what is found does not keep the limits.
@@ -194,13 +191,8 @@ def _fastest_path_speed(
 ) -> Array | None:
     """Return the highest path speed over some pieces, None if toppra finds none.
 
-    Args:
-        place: Where the pieces end, shape (g,).
-        slope: There, shape (g, 6).
-        bend: Of each piece, shape (g - 1, 6).
-        limits: What the joints can do.
-        enters: Whether it comes at full path speed, not from rest.
-        leaves: Whether it goes on at full path speed, not at rest.
+    Where it does not enter or leave at full path speed, it is at rest. `place` and `slope` have
+    shapes (g,) and (g, 6), `bend`, of the pieces, (g - 1, 6).
     """
     constraint = _Limits(place, slope, bend, limits)
     search = TOPPRA([constraint], _Place(place), gridpoints=place, solver_wrapper="seidel")

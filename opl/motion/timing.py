@@ -65,12 +65,6 @@ def time_motion(
     takes longest runs at its share of its largest speed. Where a joint cannot follow, moves take as
     long as it needs.
 
-    Args:
-        motion: The motion.
-        points: Its cutter points.
-        process: The speeds.
-        robot: The robot that makes it.
-
     Raises:
         UnsafeError: If the time law does not keep the limits it was given.
     """
@@ -112,10 +106,7 @@ def time_motion(
 def followed(q: Array, times: Array, robot: Robot) -> Array:
     """Return the times of moves that run on without a rest, longer where the joints need it.
 
-    Args:
-        q: Joint positions in [rad], shape (n, 6).
-        times: Wanted times of the moves in [s], shape (n - 1,).
-        robot: Whose moves.
+    `q` is in [rad], shape (n, 6); `times` are the wanted times of the moves in [s], shape (n - 1,).
     """
     kept = np.flatnonzero(times > SHORTEST)
     found: Array = times.copy()

@@ -53,12 +53,6 @@ def whole_motion(
 ) -> Motion:
     """Join the passes of a path into one motion from home to home, its free moves straight.
 
-    Args:
-        cell: The cell.
-        points: The cutter points of the path.
-        path: The path on the wheel.
-        process: Speeds, approach and home.
-
     Raises:
         UnreachableApproachError: If an approach or retract leaves reach or limits.
     """
@@ -100,10 +94,6 @@ def whole_motion(
 def linked(motion: Motion, search: FreeMoveSearch) -> Motion:
     """Lead the free moves of a motion around obstacles.
 
-    Args:
-        motion: The motion, every free move of it a single straight one.
-        search: Finds the free moves.
-
     Raises:
         BlockedMotionError: If one of them cannot be found.
     """
@@ -130,15 +120,7 @@ def lead(
 ) -> Array:
     """Return configurations from just off the wheel to the far end of a lead, shape (k, 6).
 
-    Args:
-        cell: The cell.
-        points: The cutter points.
-        process: How long it is, and how far it turns.
-        kind: Whether it is the approach or the retract.
-        ik_branch: Slot of the inverse kinematics.
-        column: The cutter point that is ground.
-        contact_position: Where on the wheel.
-        q_contact: The configuration that grinds it in [rad], shape (6,).
+    `q_contact` in [rad], shape (6,), grinds the cutter point of the column at the contact position.
 
     Raises:
         UnreachableApproachError: If it leaves reach or limits.

@@ -24,11 +24,7 @@ from opl.planning.track_check import Blocked, Collides, NoFreeMove
 def block(problem: GrindingProblem, matrix: OpenMatrix, rows: np.ndarray, blocked: Blocked) -> None:
     """Take out of a matrix what is known not to be free.
 
-    Args:
-        problem: What is to be planned.
-        matrix: The matrix of the track.
-        rows: The row in each column, shape (N,).
-        blocked: What was found on the track.
+    `rows` are those of the track that was checked, shape (N,).
     """
     track = rows.tolist()
     if isinstance(blocked, Collides):

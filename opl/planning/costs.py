@@ -70,11 +70,7 @@ def track_cost(
 ) -> TrackCost:
     """Return the cost of every edge and node of a matrix.
 
-    Args:
-        problem: For limits, speeds and the scene.
-        nodes: The matrix.
-        weights: The prices.
-        inside: The nodes that matter, shape (n_columns, n_rows); the others cost nothing.
+    Only the nodes `inside` matter, shape (n_columns, n_rows); the others cost nothing.
     """
     robot = problem.cell.robot
     node_cost = np.zeros(inside.shape)

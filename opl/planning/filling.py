@@ -58,12 +58,7 @@ def fill_in(
     Contact position, origin, axis z and axis x of the cutter frame are interpolated linearly, and
     the inverse kinematics is solved on the same IK branch, nearest to the joint interpolation.
 
-    Args:
-        cell: The cell.
-        points: N cutter points, the columns.
-        nodes: The node matrix.
-        rows: The row chosen in each column, shape (N,).
-        rule: How dense.
+    `rows` are those of the track in each column, one for each cutter point, shape (N,).
 
     Raises:
         BrokenEdgeError: If an edge leaves reach, limits or IK branch between its ends.

@@ -26,10 +26,6 @@ class Start(str, Enum):
 def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
     """Find a collision-free motion by the recursive search of the paper.
 
-    Args:
-        problem: What is to be planned.
-        start: Which start nodes to try.
-
     Raises:
         NoPathError: If there is none, as in `first_free`.
     """

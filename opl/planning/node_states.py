@@ -21,12 +21,7 @@ class NodeState(str, Enum):
 
 
 def node_states(problem: GrindingProblem, ik_branch: int) -> np.ndarray:
-    """Return the code of every cutter point and contact position, shape (N, M) of uint8.
-
-    Args:
-        problem: The nodes and what they are checked against.
-        ik_branch: Slot of the inverse kinematics.
-    """
+    """Return the code of every cutter point and contact position, shape (N, M) of uint8."""
     code = {state: number for number, state in enumerate(NodeState)}
     states = np.full(problem.cuts.shape, code[NodeState.LIMITS], dtype=np.uint8)
     for nodes in problem.field.matrices:

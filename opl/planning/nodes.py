@@ -78,13 +78,7 @@ MOST_SHEETS = 9
 
 
 def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) -> NodeField:
-    """Solve the inverse kinematics of every cutter point at every contact position.
-
-    Args:
-        cell: The cell.
-        points: N cutter points.
-        contact_positions: M values of t.
-    """
+    """Solve the inverse kinematics of every cutter point at every contact position."""
     robot = cell.robot
     frames = points.Ts_workpiece_cutter[:, None]
     q = inverse_solutions(cell, frames, contact_positions)  # (N, M, 8, 6)
@@ -112,10 +106,7 @@ def inverse_solutions(
 ) -> Array:
     """Return every inverse solution in [rad], NaN where there is none, shape (..., 8, 6).
 
-    Args:
-        cell: The cell.
-        Ts_workpiece_cutter: The cutter frames, shape (..., 4, 4).
-        contact_positions: Where on the wheel each is ground, shape (...).
+    Cutter frames have shape (..., 4, 4), the contact position at which each is ground (...).
     """
     return inverse_kinematics(
         cell.robot.arm, cell.Ts_base_flange(contact_positions, Ts_workpiece_cutter)
@@ -125,10 +116,8 @@ def inverse_solutions(
 def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
     """Unroll the angles of one IK branch where they leave a gap.
 
-    Args:
-        q: Principal angles in [rad], NaN where there are none, shape (N, M, 6).
-        lower: Lower joint limits in [rad], shape (6,).
-        upper: Upper joint limits in [rad], shape (6,).
+    `q` are principal angles in [rad], NaN where there are none, shape (N, M, 6); limits are in
+    [rad], shape (6,).
 
     Returns:
         Angles that are continuous over the whole field wherever there is a gap, shape (N, M, 6);

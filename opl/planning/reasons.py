@@ -51,10 +51,6 @@ def no_path(problem: GrindingProblem, matrices: list[OpenMatrix]) -> NoPathError
 def explain(problem: GrindingProblem, matrices: list[OpenMatrix]) -> list[str]:
     """Return lines on the cutter points where nothing is free, and why.
 
-    Args:
-        problem: What was to be planned.
-        matrices: What was searched, with all that was found to be blocked.
-
     Returns:
         One line for each run of cutter points where no configuration is free; if there is none,
         lines on the cutter points where the search ended.
@@ -71,12 +67,7 @@ def explain(problem: GrindingProblem, matrices: list[OpenMatrix]) -> list[str]:
 
 
 def explain_free_moves(cell: WorkCell, cut_off: Counter[tuple[FreeMove, Blocker]]) -> list[str]:
-    """Return lines on the free moves that are blocked, by what, and what would help.
-
-    Args:
-        cell: The cell.
-        cut_off: How many tracks were refused for each free move and pair of bodies; not empty.
-    """
+    """Return lines on the free moves that are blocked, by what, and what would help."""
     met = sorted(cut_off.items(), key=lambda item: (-item[1], item[0]))[:MOST_FREE_MOVES]
     lines = [f"{move.value}: {' and '.join(pair)} ({count} times)" for (move, pair), count in met]
     from_or_to_home = any(move is not FreeMove.BETWEEN_PASSES for (move, _), _ in met)

@@ -57,10 +57,7 @@ Blocked = NoMotion | Collides | NoFreeMove
 def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -> Free | Blocked:
     """Return the motion of a track if it is free, else what blocks it.
 
-    Args:
-        problem: What is to be planned.
-        nodes: The matrix of the track.
-        rows: The row in each column, shape (N,).
+    `rows` are those of the track in each column, shape (N,).
     """
     scene, points = problem.scene, problem.points
     try:

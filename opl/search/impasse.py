@@ -14,9 +14,7 @@ def impasses(ladder: Ladder, blocked: np.ndarray) -> list[tuple[int, int]]:
     Through every part of such a run a track leads; first and last are the same where a column has
     no free node at all.
 
-    Args:
-        ladder: The nodes.
-        blocked: Sorted keys of the edges that are not free, int64.
+    `blocked` are the sorted keys of the edges that are not free, int64.
     """
     free = ladder.free
 

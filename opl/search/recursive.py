@@ -69,10 +69,7 @@ def add_dead_ends(ladder: Ladder, blocked: np.ndarray, dead: np.ndarray) -> None
     A search finds dead ends as it meets them; one that is to stop at a bound must know them before,
     or it stops on a track that it would have come back from.
 
-    Args:
-        ladder: The nodes.
-        blocked: As for `descend`.
-        dead: Nodes known to be dead ends, shape (n_columns, n_rows); the others are added.
+    New ones are added to `dead`, shape (n_columns, n_rows).
     """
     _add_dead_ends(
         ladder.q_by_joint,

@@ -80,11 +80,8 @@ def smoothest(
 
     Among equal ones the lowest rows are taken, so the answer is always the same.
 
-    Args:
-        ladder: The nodes and what steps are small enough.
-        blocked: Sorted keys of steps that are not free, int64.
-        inside: Which of the free nodes may be used, shape (n_columns, n_rows).
-        cost: The costs.
+    `blocked` are the sorted keys of the edges that are not free, int64; `inside` says which of the
+    free nodes may be used, shape (n_columns, n_rows).
     """
     rows = np.empty(len(ladder.q), dtype=np.int64)
     total = _cheapest(
@@ -120,12 +117,7 @@ def smoothest_within(
     Movement of t is made dearer until the cheapest track keeps to both; where none of the prices
     tried leads to such a track, the prices given decide. None if there is no connected track.
 
-    Args:
-        ladder: As in `smoothest`.
-        blocked: As in `smoothest`.
-        inside: As in `smoothest`.
-        cost: The costs.
-        most: How far joints and contact should move at the most.
+    Joints and contact should move no further than `most`; all else is as in `smoothest`.
     """
     cheapest = smoothest(ladder, blocked, inside, cost)
     if cheapest is None or travel_of(ladder, cheapest.rows).within(most):

@@ -96,9 +96,8 @@ class ContactSegments:
     def settled(self, ground: NDArray[np.intp], allowed: float) -> NDArray[np.intp]:
         """Return chosen touches, other ones of the same cutter points where those fit better.
 
-        Args:
-            ground: Indices of the chosen touches, in order.
-            allowed: Farthest in [m] that a configuration between should be from the contact model.
+        `ground` are indices in order; a configuration between should be at most `allowed` in [m]
+        off the contact model.
         """
         chosen: NDArray[np.intp] = ground.copy()
         for m in range(1, len(chosen)):

@@ -26,8 +26,7 @@ class Drum:
     def distances(self, p_base: Array) -> tuple[Array, Array]:
         """Return signed distances of points in [m] and the directions in which they grow.
 
-        Args:
-            p_base: Points in the base frame in [m], shape (n, 3).
+        The points are in the base frame in [m], shape (n, 3).
 
         Returns:
             Distances, negative inside, shape (n,); unit vectors, shape (n, 3).

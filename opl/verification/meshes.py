@@ -38,9 +38,7 @@ def triangle_body(client: BulletClient, mesh: TriangleMesh) -> int:
 def is_inside(triangles: Array, p: Array) -> bool:
     """Return whether a ray from a point crosses a closed surface an odd number of times.
 
-    Args:
-        triangles: Corners in [m], shape (n, 3, 3).
-        p: The point in [m], shape (3,).
+    The corners of its triangles are in [m], shape (n, 3, 3), and so is the point, shape (3,).
     """
     a, b, c = (triangles[:, k] - p for k in range(3))
     sides = [np.sign(np.cross(one, other) @ RAY) for one, other in ((a, b), (b, c), (c, a))]

@@ -214,9 +214,8 @@ class _Labels:
     def _along_lead(self, p_contact: Array, side: int) -> tuple[float, float]:
         """Return how far along approach or retract a point is and how far beside it, in [m].
 
-        Args:
-            p_contact: The ground point in the contact frame, whose z points into the wheel, (3,).
-            side: -1 for the approach, which comes from -y, 1 for the retract.
+        `p_contact` is the ground point in the contact frame, whose z points into the wheel, shape
+        (3,); `side` is -1 for the approach, which comes from -y, 1 for the retract.
         """
         x, y, z = (float(v) for v in p_contact)
         if self._rule.approach_turn == 0.0:

@@ -216,10 +216,7 @@ class _Run:
     def _check_contact(self, move: int, fraction: float, T_base_workpiece: Array) -> None:
         """Check that the point to be ground lies on the wheel's surface.
 
-        Args:
-            move: The move.
-            fraction: How much of the move is done.
-            T_base_workpiece: Where the part is, shape (4, 4).
+        `fraction` of the move is done; T_base_workpiece has shape (4, 4).
         """
         motion = self._motion
         if motion.kind[move] not in ON_WHEEL:

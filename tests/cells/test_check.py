@@ -111,10 +111,10 @@ def shifted_along_normal(motion, index, depth):
 
 
 @pytest.mark.parametrize(("depth", "found"), [(0.0003, False), (0.0007, True), (0.002, True)])
-def test_the_part_may_sink_into_the_belt_by_the_allowance(depth, found):
+def test_the_part_may_sink_into_the_belt_by_the_penetration(depth, found):
     problem, motion = small_problem(), small_motion()
     # on the flat: an edge of the wheel can sink in between two samples of the part
-    grind = np.array([stretch is MoveKind.GRIND for stretch in motion.kind])
+    grind = np.array([kind is MoveKind.GRIND for kind in motion.kind])
     index = int(np.argmin(np.where(grind, np.abs(motion.contact_position), np.inf)))
     assert abs(motion.contact_position[index]) < 20.0
     moved = shifted_along_normal(motion, index, depth)
@@ -128,7 +128,7 @@ def test_the_part_may_sink_into_the_belt_by_the_allowance(depth, found):
 def test_a_free_move_keeps_the_clearance_from_the_wheel():
     problem, motion = small_problem(), small_motion()
     on_wheel = next(k for k, s in enumerate(motion.kind) if s is MoveKind.GRIND)
-    hold = free_move(motion.q[[on_wheel, on_wheel]])
+    hold = free_move(motion.q[[on_wheel, on_wheel]]).motion
     faults = colliding_moves(problem.cell, problem.scene.collision, problem.scene.part, hold)
     assert [fault.pair for fault in faults] == [("part", "wheel")] * 2
 
