@@ -111,7 +111,7 @@ class Motion:
     def with_inserted(self, before: Sequence[int] | NDArray[np.intp], q: Array) -> Motion:
         """Return the motion with more configurations inserted, each of its move's kind.
 
-        Each row of `q` in [rad], shape (k, 6), comes before the configuration at its index in `before`.
+        Each of `q` in [rad], shape (k, 6), comes before the configuration at its index in `before`.
         """
         source = np.insert(np.arange(len(self)), before, before)
         return replace(self.take(source), q=np.insert(self.q, before, q, axis=0))

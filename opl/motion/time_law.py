@@ -33,12 +33,7 @@ SHORT = 1e-3  # [s]: a straight piece not longer than this is halved only
 
 @dataclass(frozen=True, eq=False)
 class JointLimits:
-    """What the joints can do.
-
-    Attributes:
-        speed: Largest speeds in [rad/s], shape (6,).
-        acceleration: Largest accelerations in [rad/s^2], shape (6,).
-    """
+    """Largest speeds in [rad/s] and accelerations in [rad/s^2] of the joints, shape (6,) each."""
 
     speed: Array
     acceleration: Array

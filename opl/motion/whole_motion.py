@@ -56,23 +56,17 @@ def whole_motion(
     Raises:
         UnreachableApproachError: If an approach or retract leaves reach or limits.
     """
+
+    def lead_at(k: int, kind: MoveKind) -> Array:
+        column, t = int(path.cutter_point[k]), path.contact_position[k]
+        return lead(cell, points, process, kind, path.ik_branch, column, t, path.q[k])
+
     home = Motion.off_wheel(process.home[None], MoveKind.HOME, -1)
     parts = [home]
     for index in range(points.n_passes):
         on_pass = np.flatnonzero(path.pass_index == index)
-        lead_in, lead_out = (
-            lead(
-                cell,
-                points,
-                process,
-                kind,
-                path.ik_branch,
-                int(path.cutter_point[k]),
-                path.contact_position[k],
-                path.q[k],
-            )
-            for k, kind in ((on_pass[0], MoveKind.APPROACH), (on_pass[-1], MoveKind.RETRACT))
-        )
+        lead_in = lead_at(on_pass[0], MoveKind.APPROACH)
+        lead_out = lead_at(on_pass[-1], MoveKind.RETRACT)
         free = MoveKind.HOME if index == 0 else MoveKind.LINK
         place = path.cutter_point[on_pass]
         parts += [

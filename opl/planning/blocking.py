@@ -129,17 +129,10 @@ def _away(
     problem: GrindingProblem, matrix: OpenMatrix, kind: MoveKind, column: int, row: int
 ) -> Array | None:
     """Return where approach or retract of a node is farthest off, None if it cannot be made."""
+    cell, points, process, nodes = problem.cell, problem.points, problem.process, matrix.nodes
+    t, q = nodes.contact_position[row], nodes.q[column, row]
     try:
-        q: Array = lead(
-            problem.cell,
-            problem.points,
-            problem.process,
-            kind,
-            matrix.nodes.ik_branch,
-            column,
-            matrix.nodes.contact_position[row],
-            matrix.nodes.q[column, row],
-        )
+        away = lead(cell, points, process, kind, nodes.ik_branch, column, t, q)
     except UnreachableApproachError:
         return None
-    return np.asarray(q[-1])
+    return np.asarray(away[-1])

@@ -9,7 +9,7 @@ import numpy as np
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import singularity_margins
 from opl.geometry.frames import Array
-from opl.motion.figures import Figures
+from opl.motion.path import Figures
 from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
 from opl.search.smooth import TrackCost
@@ -44,13 +44,7 @@ class CostWeights:
 
 @dataclass(frozen=True)
 class ObjectiveWeights:
-    """What a path is charged for as a whole.
-
-    Attributes:
-        joint_range: For each radian of the joint range sum.
-        travel: For each radian that a joint turns on the wheel.
-        time: For each second on the wheel.
-    """
+    """Prices of a radian of joint range sum, a radian of joint travel, a second on the wheel."""
 
     joint_range: float
     travel: float

@@ -26,12 +26,7 @@ class FreeMove(str, Enum):
 
 @dataclass(frozen=True)
 class Track:
-    """One node per column.
-
-    Attributes:
-        matrix: Index of the matrix in the list that is searched.
-        rows: The row in each column, shape (n_columns,).
-    """
+    """One node per column: its row in each, shape (n_columns,), in a matrix given by its index."""
 
     matrix: int
     rows: np.ndarray

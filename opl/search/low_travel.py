@@ -22,12 +22,7 @@ ROUND_OFF = 1e-7  # [rad]
 
 
 def low_travel_box(
-    ladder: Ladder,
-    blocked: np.ndarray,
-    cost: TrackCost,
-    box: JointBox,
-    size: float,
-    most: Travel,
+    ladder: Ladder, blocked: np.ndarray, cost: TrackCost, box: JointBox, size: float, most: Travel
 ) -> JointBox | None:
     """Widen a box as little as needed for a track that moves no further than wanted.
 

@@ -51,14 +51,7 @@ def descend(
     """
     rows = np.full(len(ladder.q), -1, dtype=np.int64)
     outcome, total, reached = _descend(
-        ladder.q_by_joint,
-        ladder.free,
-        *ladder.step_rule,
-        blocked,
-        dead,
-        start,
-        bound,
-        rows,
+        ladder.q_by_joint, ladder.free, *ladder.step_rule, blocked, dead, start, bound, rows
     )
     return Descent(rows if outcome == _COMPLETE else None, total, reached)
 
@@ -71,13 +64,7 @@ def add_dead_ends(ladder: Ladder, blocked: np.ndarray, dead: np.ndarray) -> None
 
     New ones are added to `dead`, shape (n_columns, n_rows).
     """
-    _add_dead_ends(
-        ladder.q_by_joint,
-        ladder.free,
-        *ladder.step_rule,
-        blocked,
-        dead,
-    )
+    _add_dead_ends(ladder.q_by_joint, ladder.free, *ladder.step_rule, blocked, dead)
 
 
 _COMPLETE, _FAILED, _GIVEN_UP = 1, 0, 2
@@ -112,10 +99,7 @@ def _add_dead_ends(  # type: ignore[no-untyped-def]
             dead[column, here] = not leads_on
 
 
-@njit(
-    f"Tuple((int64,float64,int64))({_FIELD},boolean[:,::1],int64,float64,int64[::1])",
-    cache=True,
-)
+@njit(f"Tuple((int64,float64,int64))({_FIELD},boolean[:,::1],int64,float64,int64[::1])", cache=True)
 def _descend(  # type: ignore[no-untyped-def]
     q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, dead, start, bound, rows
 ):

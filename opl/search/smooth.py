@@ -62,12 +62,7 @@ class Travel:
 
 @dataclass(frozen=True)
 class SmoothTrack:
-    """The cheapest track.
-
-    Attributes:
-        rows: The row in each column, shape (n_columns,).
-        cost: Its cost.
-    """
+    """The cheapest track: its row in each column, shape (n_columns,), and its cost."""
 
     rows: np.ndarray
     cost: float

@@ -108,7 +108,8 @@ class _Labels:
         self._t = np.full(n, np.nan)
         self._place = np.full(n, np.nan)
         self._pass = np.full(n, -1)
-        self._also: dict[int, list[tuple[int, float]]] = {}  # more cutter points at a configuration
+        # more cutter points at a configuration: its index, the point and t
+        self._also: list[tuple[int, int, float]] = []
         self._astray: list[tuple[int, float]] = []
 
     def grind(self, ground: NDArray[np.intp]) -> None:
@@ -119,7 +120,7 @@ class _Labels:
         pass_index = self._segments.points.pass_index[point]
         for k, i, position, index in zip(configuration, point, t, pass_index, strict=True):
             if self._kind[k] is MoveKind.GRIND:
-                self._also.setdefault(int(k), []).append((int(i), float(position)))
+                self._also.append((int(k), int(i), float(position)))
                 continue
             self._mark(k, MoveKind.GRIND, index, position, i)
         for m in np.flatnonzero(np.diff(pass_index) == 0):
@@ -129,20 +130,14 @@ class _Labels:
 
     def recognition(self, q: Array, duration: Array) -> Recognition:
         """Return the labelled motion."""
-        rows = [(k, 0) for k in range(len(q))]
-        rows += [(k, 1 + m) for k, more in self._also.items() for m in range(len(more))]
-        rows.sort()
-        source = np.array([k for k, _ in rows])
-        t, place, time = self._t[source], self._place[source], duration[source]
-        for row, (k, again) in enumerate(rows):
-            if again:
-                place[row], t[row] = self._also[k][again - 1]
-                time[row] = 0.0
+        also = np.array(self._also).reshape(-1, 3)
+        at = also[:, 0].astype(np.intp)
+        source = np.insert(np.arange(len(q)), at + 1, at)
         motion = Motion(
             q=q[source],
             kind=tuple(self._kind[k] for k in source),
-            contact_position=t,
-            cutter_point=place,
+            contact_position=np.insert(self._t, at + 1, also[:, 2]),
+            cutter_point=np.insert(self._place, at + 1, also[:, 1]),
             pass_index=self._pass[source],
         )
         findings = tuple(
@@ -155,7 +150,8 @@ class _Labels:
             )
             for k, amount in self._astray
         )
-        return Recognition(TimedMotion(motion, time), source, findings)
+        timed = TimedMotion(motion, np.insert(duration, at + 1, 0.0))
+        return Recognition(timed, source, findings)
 
     def _mark(self, k: int, kind: MoveKind, pass_index: int, t: float, place: float) -> None:
         self._kind[k], self._pass[k] = kind, pass_index

@@ -18,10 +18,9 @@ from opl.cell.workcell import PART, WorkCell
 from opl.geometry.frames import Array, pose, transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Body, Box, Cylinder
-from opl.verification.drum import Drum
 from opl.verification.engine import pybullet, start
 from opl.verification.meshes import is_inside, triangle_body
-from opl.verification.patches import Patches
+from opl.verification.patches import Drum, Patches
 
 BASE_LINK = -1  # Bullet's number of the link that does not move
 # Bullet rounds the edges of a link's boxes by about this much, so that they seem farther away than

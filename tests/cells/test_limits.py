@@ -13,9 +13,8 @@ from opl.motion.motion import MoveKind
 from opl.motion.whole_motion import UnreachableApproachError, whole_motion
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.multi_start import plan_recursive
-from opl.planning.node_states import NodeState, node_states
 from opl.planning.nodes import build_nodes
-from opl.planning.reasons import explain
+from opl.planning.reasons import NodeState, explain, node_states
 from tests.support.planned import (
     replay_tiny,
     small_problem,

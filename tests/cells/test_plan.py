@@ -15,9 +15,8 @@ from opl.motion.whole_motion import UnreachableApproachError, whole_motion
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.fixed_contact import keep_contact, runs_of
 from opl.planning.multi_start import Start, plan_recursive, try_recursive
-from opl.planning.node_states import NodeState, node_states
 from opl.planning.plan import Exhausted, Found, OutOfBudget
-from opl.planning.reasons import explain, unreachable_points
+from opl.planning.reasons import NodeState, explain, node_states, unreachable_points
 from tests.support.bare_cells import Ghosts, with_obstacle
 from tests.support.brute_force import printed_recursion
 from tests.support.fcl_scene import FclScene
