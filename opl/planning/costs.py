@@ -82,7 +82,7 @@ def track_cost(
         joint_weights=weights.joint_weights,
         contact_weight=weights.contact_weight,
         time_weight=weights.time_weight,
-        step_seconds=np.where(problem.off_wheel, 0.0, arc_step / problem.process.feed),
+        edge_seconds=np.where(problem.off_wheel, 0.0, arc_step / problem.process.feed),
         max_speed=robot.max_speed,
         contact_speed=problem.process.contact_speed,
         node_cost=node_cost,

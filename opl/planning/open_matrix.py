@@ -78,7 +78,7 @@ class OpenMatrix:
     ) -> None:
         """Block every edge from some rows of a column to some of the next."""
         self.blocked.update(
-            self.ladder.step_key(column, row, after) for row in from_rows for after in to_rows
+            self.ladder.edge_key(column, row, after) for row in from_rows for after in to_rows
         )
         self.causes[column, cause] += len(from_rows) * len(to_rows)
 

@@ -19,7 +19,7 @@ def impasses(ladder: Ladder, blocked: np.ndarray) -> list[tuple[int, int]]:
     free = ladder.free
 
     def edges(column: int) -> np.ndarray:
-        rule = _edges(ladder.q_by_joint, *ladder.step_rule, blocked, column)
+        rule = _edges(ladder.q_by_joint, *ladder.edge_rule, blocked, column)
         return np.asarray(rule & free[column][:, None] & free[column + 1])
 
     found = []

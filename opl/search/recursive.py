@@ -44,14 +44,14 @@ def descend(
     Args:
         ladder: The nodes.
         start: Row of the start node in column 0; must be free.
-        blocked: Keys of steps that are not free, sorted, shape (n_blocked,) of int64.
+        blocked: Keys of edges that are not free, sorted, shape (n_blocked,) of int64.
         dead: Nodes known to be dead ends, shape (n_columns, n_rows); new ones are added.
         bound: Give up as soon as the joint range sum reaches this value, in [rad]. Only if no dead
             end is missing in ``dead`` is it certain that the track would not have been shorter.
     """
     rows = np.full(len(ladder.q), -1, dtype=np.int64)
     outcome, total, reached = _descend(
-        ladder.q_by_joint, ladder.free, *ladder.step_rule, blocked, dead, start, bound, rows
+        ladder.q_by_joint, ladder.free, *ladder.edge_rule, blocked, dead, start, bound, rows
     )
     return Descent(rows if outcome == _COMPLETE else None, total, reached)
 
@@ -64,7 +64,7 @@ def add_dead_ends(ladder: Ladder, blocked: np.ndarray, dead: np.ndarray) -> None
 
     New ones are added to `dead`, shape (n_columns, n_rows).
     """
-    _add_dead_ends(ladder.q_by_joint, ladder.free, *ladder.step_rule, blocked, dead)
+    _add_dead_ends(ladder.q_by_joint, ladder.free, *ladder.edge_rule, blocked, dead)
 
 
 _COMPLETE, _FAILED, _GIVEN_UP = 1, 0, 2
