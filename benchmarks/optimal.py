@@ -23,7 +23,7 @@ from opl.run.searches import search_path
 from opl.run.surfacing import cut_surface
 from opl.run.watch import Stage, Watch
 from opl.search.ladder import Ladder
-from opl.search.smooth import Roughness, smoothest
+from opl.search.smooth import TrackCost, smoothest
 
 WORKPIECES = Path(__file__).resolve().parent.parent / "workpieces"
 FINE_PITCH = 1.25e-3  # [m] 17 rows fit on the V part
@@ -89,11 +89,11 @@ def smooth_stage(n_columns: int = 1000, n_rows: int = 140, n_branches: int = 2) 
             max_joint_step=np.deg2rad(15.0),
             max_contact_change=100.0,
         )
-        costs = Roughness(
+        costs = TrackCost(
             joint_weights=np.ones(6),
             contact_weight=0.01,
             time_weight=0.0,
-            step_seconds=feed,
+            edge_seconds=feed,
             max_speed=np.full(6, 3.0),
             contact_speed=40.0,
             node_cost=np.zeros((n_columns, n_rows)),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.geometry.frames import Array, read_only
+from opl.geometry.frames import Array, interpolate, read_only
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,3 +57,10 @@ class CutterPoints:
     def n_passes(self) -> int:
         """Return the number of passes."""
         return int(self.pass_index[-1]) + 1 if len(self) else 0
+
+    def frames_at(self, place: Array) -> Array:
+        """Return cutter frames at fractional cutter points, shape (..., 4, 4)."""
+        before = np.clip(place.astype(int), 0, len(self) - 1)
+        after = np.minimum(before + 1, len(self) - 1)
+        Ts = self.Ts_workpiece_cutter
+        return interpolate(Ts[before], Ts[after], place - before)

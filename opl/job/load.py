@@ -23,7 +23,7 @@ from opl.job.file import JobFile
 from opl.job.search import Method, Search
 from opl.job.source import Source
 from opl.job.workpiece import GIVEN
-from opl.motion.process import ProcessSettings
+from opl.motion.process_settings import ProcessSettings
 from opl.program.settings import ProgramSettings
 
 

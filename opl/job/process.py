@@ -12,7 +12,7 @@ from opl.cell.robot import Robot
 from opl.files.documents import Document
 from opl.geometry.frames import Array
 from opl.job.bodies import MM, Positive, Six
-from opl.motion.process import ProcessSettings
+from opl.motion.process_settings import ProcessSettings
 
 SixPositive = Annotated[list[Positive], Field(min_length=6, max_length=6)]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from opl.errors import NoPathError
 from opl.job import keys
 from opl.motion.feed import SlowStretch
-from opl.motion.process import ProcessSettings
+from opl.motion.process_settings import ProcessSettings
 
 
 def dwell_refusal(

@@ -14,7 +14,7 @@ from opl.job.bodies import MM, NotNegative, Positive
 from opl.planning.box_search import OptimalSettings
 from opl.planning.costs import CostWeights, ObjectiveWeights
 from opl.planning.filling import Interpolation
-from opl.planning.starts import Start
+from opl.planning.multi_start import Start
 
 # contact positions are in mm on the wheel's flat and in degrees of roll about its edges
 _BeltUnits = Annotated[float, Field(gt=0.0, json_schema_extra={"unit": "mm or deg"})]

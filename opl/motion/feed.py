@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.motion.process import ProcessSettings
+from opl.motion.process_settings import ProcessSettings
 from opl.motion.timing import Cause, Timing
 
 # The belt dwells where the ground point is slower than this part of the feed.
@@ -16,7 +16,7 @@ HARDLY_MOVES = 0.5
 
 @dataclass(frozen=True)
 class Share:
-    """What one cause costs in a slow stretch.
+    """What one cause costs on a slow part of a pass.
 
     Attributes:
         cause: The cause.
@@ -31,7 +31,7 @@ class Share:
 
 @dataclass(frozen=True)
 class SlowStretch:
-    """A stretch of a pass on which the ground point is slower than the feed.
+    """A part of a pass on which the ground point is slower than the feed.
 
     Attributes:
         pass_index: The pass, counted from 0.
@@ -61,13 +61,9 @@ class SlowStretch:
 
 
 def slow_stretches(timing: Timing, process: ProcessSettings) -> tuple[SlowStretch, ...]:
-    """Return the stretches of the passes that are slower than the feed by a hundredth or more.
+    """Return the parts of the passes that are slower than the feed by a hundredth or more.
 
     The ramps at both ends of a pass are not among them: the robot has to rest there.
-
-    Args:
-        timing: A motion with its times.
-        process: What is asked for.
     """
     slow = np.array([cause is not Cause.NONE for cause in timing.cause])
     index = timing.timed.motion.pass_index
@@ -90,10 +86,9 @@ def _stretch(timing: Timing, process: ProcessSettings, moves: np.ndarray) -> Slo
         key = (timing.cause[move], int(timing.joint[move]))
         shares[key] = shares.get(key, 0.0) + float(longer[move])
     slowest = int(moves[speed[moves].argmin()])
-    hardly = np.zeros(len(motion), dtype=bool)
-    hardly[moves] = speed[moves] < HARDLY_MOVES * process.feed
-    dwells = list(_runs(hardly, motion.pass_index))
-    longest = max(dwells, key=lambda run: longer[run].sum(), default=None)
+    hardly = np.isin(np.arange(len(motion)), moves) & (speed < HARDLY_MOVES * process.feed)
+    dwells = _runs(hardly, motion.pass_index)
+    dwell = max(dwells, key=lambda run: longer[run].sum(), default=moves[:0])
     return SlowStretch(
         pass_index=int(motion.pass_index[slowest]),
         start=float(motion.cutter_point[moves[0] - 1]),
@@ -104,10 +99,8 @@ def _stretch(timing: Timing, process: ProcessSettings, moves: np.ndarray) -> Slo
             Share(cause, joint if joint >= 0 else None, time)
             for (cause, joint), time in sorted(shares.items(), key=lambda item: -item[1])
         ),
-        dwell=0.0 if longest is None else float(longer[longest].sum()),
+        dwell=float(longer[dwell].sum()),
         dwell_at=(
-            float("nan")
-            if longest is None
-            else float(motion.cutter_point[longest[speed[longest].argmin()]])
+            float(motion.cutter_point[dwell[speed[dwell].argmin()]]) if len(dwell) else np.nan
         ),
     )

@@ -20,9 +20,8 @@ LEAD_TURN = np.deg2rad(5.0)  # between configurations of an arc: chords stay wit
 def lead_count(length: float, turn: float) -> int:
     """Return into how many moves an approach or retract is cut.
 
-    Args:
-        length: Of it in [m].
-        turn: What its direction turns by in [rad], 0 if it is straight.
+    `length` is in [m]; `turn` is the angle in [rad] by which its direction turns, 0 if it is
+    straight.
     """
     # a whole number of steps is not to become one more by rounding
     turns = int(np.ceil(turn / LEAD_TURN - 1e-9))

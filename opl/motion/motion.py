@@ -1,8 +1,8 @@
 """A motion of the robot as a value: its configurations, and what every move is for.
 
-What kind of move something is, whether it touches the wheel and which moves belong together is said
-here only. How far a motion is, its type says: a `Motion` is planned, a `TimedMotion` also knows how
-long its moves take, and a `VerifiedMotion` how near it comes to anything.
+What kind a move is, whether it touches the wheel and which moves belong together is defined here
+only. The type says how far a motion is: a `Motion` is planned, a `TimedMotion` also knows how long
+its moves take, and a `VerifiedMotion` how near it comes to anything.
 """
 
 from __future__ import annotations
@@ -109,11 +109,9 @@ class Motion:
         )
 
     def with_inserted(self, before: Sequence[int] | NDArray[np.intp], q: Array) -> Motion:
-        """Return the motion with more configurations on the way, each of its move's kind.
+        """Return the motion with more configurations inserted, each of its move's kind.
 
-        Args:
-            before: Index of the configuration that each new one comes before, shape (k,).
-            q: The new configurations in [rad], shape (k, 6).
+        Each of `q` in [rad], shape (k, 6), comes before the configuration at its index in `before`.
         """
         source = np.insert(np.arange(len(self)), before, before)
         return replace(self.take(source), q=np.insert(self.q, before, q, axis=0))
@@ -121,7 +119,7 @@ class Motion:
     def renumbered(self, cutter_point: Array) -> Motion:
         """Return the motion with other numbers of its cutter points, shape (n,); NaN off the wheel.
 
-        What ended at a cutter point may so end between two, and the other way round.
+        What ended at a cutter point may so end between two, and vice versa.
         """
         kind = tuple(
             MoveKind.at_cutter_point(point) if kind.on_wheel else kind
@@ -150,13 +148,10 @@ class Motion:
         goes_on = np.diff(self.pass_index, prepend=self.pass_index[:1]) == 0
         stays = on_wheel & np.roll(on_wheel, 1) & goes_on
         stays[:1] = False
-        by_kind = {
-            MoveKind.HOME: Phase.FREE,
-            MoveKind.LINK: Phase.FREE,
-            MoveKind.RETRACT: Phase.RETRACTING,
-        }
+        others = {kind: Phase.FREE for kind in MoveKind if kind.is_free}
+        others[MoveKind.RETRACT] = Phase.RETRACTING
         return tuple(
-            Phase.GRINDING if stay else by_kind.get(kind, Phase.APPROACHING)
+            Phase.GRINDING if stay else others.get(kind, Phase.APPROACHING)
             for kind, stay in zip(self.kind, stays, strict=True)
         )
 
@@ -192,7 +187,7 @@ class Motion:
         if kind.on_wheel:
             return f"pass {index}, cutter point {self.cutter_point[move]:.4g}"
         if kind is MoveKind.HOME:
-            return "way home" if index == 0 and move > 0 else "way from home"
+            return "free move to home" if index == 0 and move > 0 else "free move from home"
         return f"{kind.value} of pass {index}"
 
     @cached_property

@@ -1,4 +1,4 @@
-"""The fastest way along a line of configurations that its wanted times and the joints allow.
+"""The fastest law of time along a line of configurations that wanted times and joints allow.
 
 The law is TOPP-RA's (Pham and Pham, 2018, by toppra): the path speed is as high as its own limit
 (the wanted times) and the speed and acceleration of each joint permit. Between two places of its
@@ -33,12 +33,7 @@ SHORT = 1e-3  # [s]: a straight piece not longer than this is halved only
 
 @dataclass(frozen=True, eq=False)
 class JointLimits:
-    """What the joints can do.
-
-    Attributes:
-        speed: Largest speeds in [rad/s], shape (6,).
-        acceleration: Largest accelerations in [rad/s^2], shape (6,).
-    """
+    """Largest speeds in [rad/s] and accelerations in [rad/s^2] of the joints, shape (6,) each."""
 
     speed: Array
     acceleration: Array
@@ -95,37 +90,27 @@ class TimeLaw:
 def fastest_law(line: RoundedLine, limits: JointLimits, at_rest: bool) -> TimeLaw:
     """Return the fastest law along a line.
 
-    Args:
-        line: The line.
-        limits: What the joints can do.
-        at_rest: Whether the robot rests at both ends. If not, it comes and goes on straight on, as
-            fast as the line lets it.
+    If the robot is not `at_rest` at both ends, it comes and goes on straight on, as fast as the
+    line lets it.
 
     Raises:
         UnsafeError: If no law is found, or what is found does not keep the limits.
     """
-    if at_rest:
-        whole = line
-    else:
-        whole = line.extended(*(_run_up(slope, limits) for slope in line.slope[[0, -1]]))
+    # wanted times in which full path speed is reached from rest, straight on, in [s]
+    run_up = 0.51 * np.max(np.abs(line.slope[[0, -1]]) / limits.acceleration, axis=1) + 1e-3
+    whole = line if at_rest else line.extended(*run_up.tolist())
     place = _grid(whole, limits)
     slope = whole.slopes(place)
     bend = np.diff(slope, axis=0) / np.diff(place)[:, None]
     path_speed = _path_speed(place, slope, bend, limits, at_rest)
-    inside = slice(
-        int(np.searchsorted(place, line.knots[0] - 1e-12)),
-        int(np.searchsorted(place, line.knots[-1] - 1e-12)) + 1,
+    first, last = np.searchsorted(place, line.knots[[0, -1]] - 1e-12).tolist()
+    inside = slice(first, last + 1)
+    speed, acceleration = (
+        load[first:last] for load in _loads(slope, bend, place, path_speed, limits)
     )
-    loads = _loads(slope, bend, place, path_speed, limits)
-    pieces = slice(inside.start, inside.stop - 1)
-    law = TimeLaw(line, place[inside], path_speed[inside], loads[0][pieces], loads[1][pieces])
+    law = TimeLaw(line, place[inside], path_speed[inside], speed, acceleration)
     require_limits(law, limits)
     return law
-
-
-def _run_up(slope: Array, limits: JointLimits) -> float:
-    """Return the wanted time in which full path speed is reached from rest, straight on, in [s]."""
-    return float(0.51 * np.max(np.abs(slope) / limits.acceleration)) + 1e-3
 
 
 def _grid(line: RoundedLine, limits: JointLimits) -> Array:
@@ -201,13 +186,8 @@ def _fastest_path_speed(
 ) -> Array | None:
     """Return the highest path speed over some pieces, None if toppra finds none.
 
-    Args:
-        place: Where the pieces end, shape (g,).
-        slope: There, shape (g, 6).
-        bend: Of each piece, shape (g - 1, 6).
-        limits: What the joints can do.
-        enters: Whether it comes at full path speed, not from rest.
-        leaves: Whether it goes on at full path speed, not at rest.
+    Where it does not enter or leave at full path speed, it is at rest. `place` and `slope` have
+    shapes (g,) and (g, 6), `bend`, of the pieces, (g - 1, 6).
     """
     constraint = _Limits(place, slope, bend, limits)
     search = TOPPRA([constraint], _Place(place), gridpoints=place, solver_wrapper="seidel")
@@ -228,21 +208,18 @@ def require_limits(law: TimeLaw, limits: JointLimits) -> None:
     q = law.configurations(np.arange(0.0, duration, step))
     # what is left of round-off in positions of some radians
     slack = 1e-14 / step ** np.arange(1, 3)
-    for order, limit, what in (
-        (1, limits.speed, "speed"),
-        (2, limits.acceleration, "acceleration"),
-    ):
+    for order, what in ((1, "speed"), (2, "acceleration")):
         found = np.abs(np.diff(q, order, axis=0)).max(axis=0) / step**order
-        over = (found - slack[order - 1]) / limit
+        over = (found - slack[order - 1]) / getattr(limits, what)
         if over.max() > 1.0 + TOLERANCE:
             raise UnsafeError(
-                f"the time law asks for {100.0 * over.max():.2f} % of the {what} of joint "
+                f"the time law uses {100.0 * over.max():.2f} % of the {what} of joint "
                 f"{int(over.argmax()) + 1}"
             )
 
 
 class _Place(AbstractGeometricPath):  # type: ignore[misc]
-    """All that toppra asks of a path whose constraint brings its own derivatives."""
+    """All that toppra needs of a path whose constraint brings its own derivatives."""
 
     def __init__(self, place: Array) -> None:
         self._ends = place[[0, -1]]

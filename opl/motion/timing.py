@@ -1,6 +1,6 @@
 """How long each move of a motion takes: at the set feed, and no faster than the joints can follow.
 
-On the wheel and on the way to and from it the time law of `opl.motion.time_law` is asked what the
+On the wheel, on approaches and on retracts the time law of `opl.motion.time_law` says what the
 joints can follow; a free move turns at its share of top speed. The ramps with which a robot leaves
 and comes to rest are no part of these times, nor are they of the speeds of a program: the
 controller adds them. `opl.program.cycle` counts them.
@@ -19,7 +19,7 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.leads import lead_count
 from opl.motion.motion import Motion, Phase, TimedMotion
-from opl.motion.process import ProcessSettings
+from opl.motion.process_settings import ProcessSettings
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, TimeLaw, fastest_law
 
@@ -65,12 +65,6 @@ def time_motion(
     takes longest runs at its share of its largest speed. Where a joint cannot follow, moves take as
     long as it needs.
 
-    Args:
-        motion: The motion.
-        points: Its cutter points.
-        process: The speeds.
-        robot: The robot that makes it.
-
     Raises:
         UnsafeError: If the time law does not keep the limits it was given.
     """
@@ -112,10 +106,7 @@ def time_motion(
 def followed(q: Array, times: Array, robot: Robot) -> Array:
     """Return the times of moves that run on without a rest, longer where the joints need it.
 
-    Args:
-        q: Joint positions in [rad], shape (n, 6).
-        times: Wanted times of the moves in [s], shape (n - 1,).
-        robot: Whose moves.
+    `q` is in [rad], shape (n, 6); `times` are the wanted times of the moves in [s], shape (n - 1,).
     """
     kept = np.flatnonzero(times > SHORTEST)
     found: Array = times.copy()

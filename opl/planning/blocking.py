@@ -1,9 +1,9 @@
-"""What is learnt from a track that is not free: the nodes and edges that no other track need try.
+"""What a track that is not free rules out: the nodes and edges that no other track need try.
 
-A free move that was not found rules out all nodes that are no better off than those it joins. Two
-configurations off the wheel that a free straight move joins can be left and come to in the same
-ways. So where a search from one of them was in vain, the other need not be tried; and mostly all
-contact positions of a matrix are joined in this manner.
+A free move that was not found rules out all nodes that are no better off than those it joins. From
+two configurations off the wheel that a free straight move joins, the same others can be reached. So
+where a search from one of them was in vain, the other need not be tried; and mostly all contact
+positions of a matrix are joined like this.
 """
 
 from __future__ import annotations
@@ -12,29 +12,25 @@ import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
-from opl.motion.air import UnreachableApproachError, lead
-from opl.motion.check import Fault
+from opl.motion.collision_check import CollidingMove
 from opl.motion.motion import Motion, MoveKind
+from opl.motion.whole_motion import UnreachableApproachError, lead
 from opl.planning.filling import BrokenEdgeError
 from opl.planning.open_matrix import FreeMove, OpenMatrix
 from opl.planning.problem import GrindingProblem
-from opl.planning.track_check import Blocked, Collides, NoLink
+from opl.planning.track_check import Blocked, Collides, NoFreeMove
 
 
 def block(problem: GrindingProblem, matrix: OpenMatrix, rows: np.ndarray, blocked: Blocked) -> None:
     """Take out of a matrix what is known not to be free.
 
-    Args:
-        problem: What is to be planned.
-        matrix: The matrix of the track.
-        rows: The row in each column, shape (N,).
-        blocked: What was found on the track.
+    `rows` are those of the track that was checked, shape (N,).
     """
     track = rows.tolist()
     if isinstance(blocked, Collides):
         for fault in blocked.faults:
             _block_fault(problem, matrix, track, blocked.motion, fault)
-    elif isinstance(blocked, NoLink):
+    elif isinstance(blocked, NoFreeMove):
         _block_link(problem, matrix, track, blocked)
     elif isinstance(blocked.error, BrokenEdgeError):
         _block_edge(matrix, track, blocked.error.column, blocked.error.cause)
@@ -48,7 +44,11 @@ def _block_edge(matrix: OpenMatrix, track: list[int], column: int, cause: str) -
 
 
 def _block_fault(
-    problem: GrindingProblem, matrix: OpenMatrix, track: list[int], motion: Motion, fault: Fault
+    problem: GrindingProblem,
+    matrix: OpenMatrix,
+    track: list[int],
+    motion: Motion,
+    fault: CollidingMove,
 ) -> None:
     """Block the node or the edge that a colliding move belongs to."""
     cause = " and ".join(fault.pair)
@@ -71,7 +71,7 @@ def _block_fault(
 
 
 def _block_link(
-    problem: GrindingProblem, matrix: OpenMatrix, track: list[int], blocked: NoLink
+    problem: GrindingProblem, matrix: OpenMatrix, track: list[int], blocked: NoFreeMove
 ) -> None:
     """Block what a free move that was not found rules out."""
     motion, move, error = blocked.motion, blocked.error.move, blocked.error.error
@@ -119,7 +119,7 @@ def _joined(
             q = _away(problem, matrix, kind, column, other)
             if other == row or q is None or last is None:
                 continue
-            if problem.scene.links.joined(last, q):
+            if problem.scene.free_moves.joined(last, q):
                 found.append(other)
                 last = q
     return found
@@ -129,17 +129,10 @@ def _away(
     problem: GrindingProblem, matrix: OpenMatrix, kind: MoveKind, column: int, row: int
 ) -> Array | None:
     """Return where approach or retract of a node is farthest off, None if it cannot be made."""
+    cell, points, process, nodes = problem.cell, problem.points, problem.process, matrix.nodes
+    t, q = nodes.contact_position[row], nodes.q[column, row]
     try:
-        q: Array = lead(
-            problem.cell,
-            problem.points,
-            problem.process,
-            kind,
-            matrix.nodes.ik_branch,
-            column,
-            matrix.nodes.contact_position[row],
-            matrix.nodes.q[column, row],
-        )
+        away = lead(cell, points, process, kind, nodes.ik_branch, column, t, q)
     except UnreachableApproachError:
         return None
-    return np.asarray(q[-1])
+    return np.asarray(away[-1])

@@ -12,7 +12,7 @@ from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.process import ProcessSettings
+from opl.motion.process_settings import ProcessSettings
 from opl.planning.filling import Interpolation
 from opl.planning.nodes import NodeField, NodeMatrix, build_nodes
 from opl.planning.scene import PlanningScene
@@ -81,13 +81,7 @@ def build_problem(
 ) -> GrindingProblem:
     """Build the node matrices, and the distances of part and wheel at every node.
 
-    Args:
-        scene: The cell and its geometry.
-        points: N cutter points.
-        contact_positions: M values of t.
-        interpolation: How the path between nodes is filled in.
-        process: Speeds, approach and home.
-        clock: Measures the stages ``nodes`` and ``clearance``.
+    `clock` measures the stages ``nodes`` and ``clearance``.
     """
     with clock("nodes"):
         field = build_nodes(scene.cell, points, contact_positions)
@@ -106,11 +100,7 @@ def wheel_distances(
 
     As in `signed_wheel_distance`: exact where it is less than the belt penetration permits.
 
-    Args:
-        scene: The cell and its geometry.
-        points: N cutter points.
-        contact_positions: M values of t.
-        at: Which nodes, shape (N, M), all if not given; the others are minus infinity, not free.
+    If `at` is given, shape (N, M), all other nodes are minus infinity, not free.
     """
     cell = scene.cell
     if at is None:

@@ -15,7 +15,6 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
-from opl.planning.filling import cutter_frames
 from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
 from opl.planning.open_matrix import OpenMatrix, open_matrices
 from opl.planning.problem import GrindingProblem, wheel_distances
@@ -58,7 +57,7 @@ def refine(refined: RefinedProblem, places: Array) -> RefinedProblem:
     before = columns.astype(int)
     points = problem.points
     added = CutterPoints(
-        cutter_frames(points, columns),
+        points.frames_at(columns),
         np.zeros(len(new), dtype=np.int64),
         np.interp(columns, np.arange(len(points)), points.arc_length),
     )
@@ -104,7 +103,7 @@ def configurations_between(problem: GrindingProblem, nodes: NodeMatrix, places: 
     Returns:
         Joint positions in [rad], shape (k, n_rows, 6).
     """
-    frames = cutter_frames(problem.points, places)[:, None]
+    frames = problem.points.frames_at(places)[:, None]
     q = inverse_solutions(problem.cell, frames, problem.field.contact_positions)
     return _taken(problem, nodes, q, places.astype(int))
 

@@ -56,11 +56,6 @@ def twins(matrices: list[OpenMatrix], track: Track, robot: Robot) -> list[Track]
 
     The other flip of the wrist, or a full turn of a wrist axis, makes the same motion at another
     distance from the joint limits. ``track`` itself is among them.
-
-    Args:
-        matrices: All matrices.
-        track: The track.
-        robot: For its joint limits.
     """
     nodes = matrices[track.matrix].nodes
     positions = nodes.position_index[track.rows]

@@ -1,4 +1,4 @@
-"""Is the whole motion of a track free of collision, and if not, what is in the way?"""
+"""Is the whole motion of a track free of collision, and if not, what blocks it?"""
 
 from __future__ import annotations
 
@@ -6,10 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.motion.air import BlockedLinkError, UnreachableApproachError, linked, whole_motion
-from opl.motion.check import Fault, find_faults
+from opl.motion.collision_check import CollidingMove, colliding_moves
 from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
+from opl.motion.whole_motion import (
+    BlockedMotionError,
+    UnreachableApproachError,
+    linked,
+    whole_motion,
+)
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
@@ -35,27 +40,24 @@ class Collides:
     """Moves of the motion collide; its free moves are straight."""
 
     motion: Motion
-    faults: tuple[Fault, ...]
+    faults: tuple[CollidingMove, ...]
 
 
 @dataclass(frozen=True)
-class NoLink:
+class NoFreeMove:
     """Nothing but a free move that was not found stops the motion; its free moves are straight."""
 
     motion: Motion
-    error: BlockedLinkError
+    error: BlockedMotionError
 
 
-Blocked = NoMotion | Collides | NoLink
+Blocked = NoMotion | Collides | NoFreeMove
 
 
 def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -> Free | Blocked:
     """Return the motion of a track if it is free, else what blocks it.
 
-    Args:
-        problem: What is to be planned.
-        nodes: The matrix of the track.
-        rows: The row in each column, shape (N,).
+    `rows` are those of the track in each column, shape (N,).
     """
     scene, points = problem.scene, problem.points
     try:
@@ -63,8 +65,8 @@ def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -
         motion = whole_motion(scene.cell, points, path, problem.process)
     except (BrokenEdgeError, UnreachableApproachError) as error:
         return NoMotion(error)
-    faults = find_faults(scene.cell, scene.collision, scene.part, motion)
-    # what is in the way of a free move is led around, unless it is where an approach begins
+    faults = colliding_moves(scene.cell, scene.collision, scene.part, motion)
+    # free moves are led around what blocks them, unless it is where an approach begins
     faults = [
         fault
         for fault in faults
@@ -74,6 +76,6 @@ def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -
     if faults:
         return Collides(motion, tuple(faults))
     try:
-        return Free(path, linked(motion, scene.links))
-    except BlockedLinkError as error:
-        return NoLink(motion, error)
+        return Free(path, linked(motion, scene.free_moves))
+    except BlockedMotionError as error:
+        return NoFreeMove(motion, error)

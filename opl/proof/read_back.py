@@ -25,7 +25,7 @@ from opl.program.played import Playback
 from opl.program.posts import find_post
 from opl.proof.prove import prove
 from opl.proof.written import written_findings
-from opl.verification.limits import limit_findings
+from opl.verification.kinematic_checks import limit_findings
 
 EXACT = 1e-9  # [rad] of round-off between a configuration and itself, read back
 

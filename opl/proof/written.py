@@ -110,7 +110,10 @@ def _waits_on_wheel(motion: Motion, playback: Playback) -> Iterator[Finding]:
 
 def _ends_away_from_home(job: Job, motion: Motion) -> Iterator[Finding]:
     names = job.cell.robot.joint_names
-    for configuration, place in ((0, "way from home"), (len(motion) - 1, "way home")):
+    for configuration, place in (
+        (0, "free move from home"),
+        (len(motion) - 1, "free move to home"),
+    ):
         away: Array = np.abs(motion.q[configuration] - job.process.home)
         if away.max() > HOME_SLACK:
             joint = int(away.argmax())

@@ -95,7 +95,7 @@ class BoxProof:
         self.subproblems = 0
         self._ladder = ladder
         self._q = ladder.q_by_joint
-        self._steps = (*ladder.step_rule, np.asarray(blocked, dtype=np.int64))
+        self._steps = (*ladder.edge_rule, np.asarray(blocked, dtype=np.int64))
         self._gap = gap
         n_columns, n_rows = ladder.free.shape
         self._strips = no_strips(n_columns, n_rows)

@@ -22,25 +22,15 @@ ROUND_OFF = 1e-7  # [rad]
 
 
 def low_travel_box(
-    ladder: Ladder,
-    blocked: np.ndarray,
-    cost: TrackCost,
-    box: JointBox,
-    size: float,
-    most: Travel,
+    ladder: Ladder, blocked: np.ndarray, cost: TrackCost, box: JointBox, size: float, most: Travel
 ) -> JointBox | None:
     """Widen a box as little as needed for a track that moves no further than wanted.
 
     All faces are moved out by the same amount, as little as there is such a track, and then brought
     back, one after the other, as far as there still is one.
 
-    Args:
-        ladder: The nodes and what steps are small enough.
-        blocked: Sorted keys of steps that are not free, int64.
-        cost: What joints cost.
-        box: The box.
-        size: The result must not be larger, in [rad].
-        most: How far joints and contact may move.
+    The result is not larger than `size` in [rad]; `blocked` are the sorted keys of the edges that
+    are not free, int64.
 
     Returns:
         The box, or None if there is no track in one that small.

@@ -19,8 +19,8 @@ def align(
 ) -> NDArray[np.intp]:
     """Choose touches that grind as many cutter points as can be, once and in order.
 
-    Of several ways the one is taken that lies nearest to the contact model and moves least over the
-    wheel: a flat part of a surface touches the flat of the wheel in many places at once.
+    Of several choices the one is taken that lies nearest to the contact model and moves least over
+    the wheel: a flat part of a surface touches the flat of the wheel in many places at once.
 
     Args:
         touches: Candidates.
@@ -44,14 +44,14 @@ def align(
         skipped = point[m] - point[before] - 1
         same_pass = pass_index[point[m]] == pass_index[point[before]]
         change = np.where(same_pass, np.abs(t[m] - t[before]), 0.0)
-        way = best[before] + own[m] + MISSED * skipped + PER_POSITION * change
-        way = way + np.where(apart == 0, TWICE, 0.0)
+        cost = best[before] + own[m] + MISSED * skipped + PER_POSITION * change
+        cost = cost + np.where(apart == 0, TWICE, 0.0)
         # on the flat one configuration may grind two cutter points at different t
         too_far = (apart > 0) & (change > max_contact_step * apart + STEP_SLACK)
-        way[(skipped < 0) | too_far | ((apart == 0) & ~same_pass)] = np.inf
-        cheapest = int(way.argmin())
-        if way[cheapest] < best[m]:
-            best[m], came_from[m] = way[cheapest], before.start + cheapest
+        cost[(skipped < 0) | too_far | ((apart == 0) & ~same_pass)] = np.inf
+        cheapest = int(cost.argmin())
+        if cost[cheapest] < best[m]:
+            best[m], came_from[m] = cost[cheapest], before.start + cheapest
     last = int((best + MISSED * (len(pass_index) - 1 - point)).argmin())
     chosen = [last]
     while came_from[chosen[-1]] >= 0:

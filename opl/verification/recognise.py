@@ -1,10 +1,9 @@
-"""What a robot grinds, recognised from its configurations alone: nobody tells where the passes are.
+"""What a robot grinds, recognised from its configurations alone, without knowing its passes.
 
 Configurations and cutter points are aligned like two texts: both keep their order, a configuration
-    may lie
-between two cutter points or off the wheel, and a cutter point that no configuration brings to the
-wheel is left out, which is dear. Between two cutter points the frame changes evenly; configurations
-there get places that never go back and lie nearest to the contact model.
+may lie between two cutter points or off the wheel, and a cutter point that no configuration brings
+to the wheel is left out, which costs much. Between two cutter points the frame changes evenly;
+configurations there get places that never go back and lie nearest to the contact model.
 """
 
 from __future__ import annotations
@@ -20,12 +19,12 @@ from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion, MoveKind, TimedMotion
 from opl.verification.align import align
-from opl.verification.contact import ALIGNED, Touches, find_touches
-from opl.verification.ways import Way, Ways
+from opl.verification.contact import ALIGNED, find_touches
+from opl.verification.contact_segments import ContactSegment, ContactSegments
 from opl.verification.world import World
 
 # [m] that a configuration may be off the contact model at the cutter point it grinds: what the
-# digits of a position leave. Farther off it passes by; that is for the way between cutter points.
+# digits of a position leave. Farther off it is between cutter points.
 AT_POINT = 5e-5
 ASIDE = 2e-4  # [m] that a configuration of an approach may be beside the contact normal or the arc
 FARTHER = 1e-3  # [m] than the approach is long that still is approach
@@ -58,7 +57,7 @@ class Recognition:
         timed: The configurations, labelled; one that grinds several cutter points at once is
             repeated, the move to itself taking no time.
         source: Index of each of them in the configurations that were given, shape (n,).
-        findings: Configurations that leave the way between two cutter points.
+        findings: Configurations between two cutter points that are off the contact model.
     """
 
     timed: TimedMotion
@@ -91,62 +90,54 @@ def recognise(
     touches = find_touches(cell.wheel, points, Ts_contact0_workpiece[stations], tolerance)
     ground = align(touches, points.pass_index, tolerance, rule.max_contact_step)
     touches = replace(touches, configuration=stations[touches.configuration])
-    ways = Ways(cell.wheel, points, Ts_contact0_workpiece, duration, touches)
-    ground = ways.settled(ground, rule.max_contact_error)
-    labels = _Labels(cell, points, Ts_contact0_workpiece, rule)
-    labels.grind(touches, ground, ways)
+    segments = ContactSegments(cell.wheel, points, Ts_contact0_workpiece, duration, touches)
+    ground = segments.settled(ground, rule.max_contact_error)
+    labels = _Labels(segments, rule)
+    labels.grind(ground)
     return labels.recognition(q, duration)
 
 
 class _Labels:
     """What each configuration is, being found out."""
 
-    def __init__(
-        self, cell: WorkCell, points: CutterPoints, Ts_contact0_workpiece: Array, rule: Rule
-    ) -> None:
-        n = len(Ts_contact0_workpiece)
-        self._wheel = cell.wheel
-        self._points = points
-        self._Ts = Ts_contact0_workpiece
+    def __init__(self, segments: ContactSegments, rule: Rule) -> None:
+        n = len(segments.duration)
+        self._segments = segments
         self._rule = rule
         self._kind = [MoveKind.HOME] * n
         self._t = np.full(n, np.nan)
         self._place = np.full(n, np.nan)
         self._pass = np.full(n, -1)
-        self._also: dict[int, list[tuple[int, float]]] = {}  # more cutter points at a configuration
+        # more cutter points at a configuration: its index, the point and t
+        self._also: list[tuple[int, int, float]] = []
         self._astray: list[tuple[int, float]] = []
 
-    def grind(self, touches: Touches, ground: NDArray[np.intp], ways: Ways) -> None:
+    def grind(self, ground: NDArray[np.intp]) -> None:
         """Label everything, given which touches are the ground cutter points."""
+        touches = self._segments.touches
         configuration, point = touches.configuration[ground], touches.point[ground]
         t = touches.contact_position[ground]
-        pass_index = self._points.pass_index[point]
-        for k, i, position in zip(configuration, point, t, strict=True):
+        pass_index = self._segments.points.pass_index[point]
+        for k, i, position, index in zip(configuration, point, t, pass_index, strict=True):
             if self._kind[k] is MoveKind.GRIND:
-                self._also.setdefault(int(k), []).append((int(i), float(position)))
+                self._also.append((int(k), int(i), float(position)))
                 continue
-            self._mark(k, MoveKind.GRIND, self._points.pass_index[i], position, i)
+            self._mark(k, MoveKind.GRIND, index, position, i)
         for m in np.flatnonzero(np.diff(pass_index) == 0):
-            self._fill_in(ways.between(int(ground[m]), int(ground[m + 1])), int(pass_index[m]))
-        first, last = self._lead_ins(configuration, point, t, pass_index)
-        self._name_the_air(first, last)
+            segment = self._segments.between(int(ground[m]), int(ground[m + 1]))
+            self._fill_in(segment, int(pass_index[m]))
+        self._label_free_moves(*self._label_leads(configuration, point, t, pass_index))
 
     def recognition(self, q: Array, duration: Array) -> Recognition:
         """Return the labelled motion."""
-        rows = [(k, 0) for k in range(len(q))]
-        rows += [(k, 1 + m) for k, more in self._also.items() for m in range(len(more))]
-        rows.sort()
-        source = np.array([k for k, _ in rows])
-        t, place, time = self._t[source], self._place[source], duration[source]
-        for row, (k, again) in enumerate(rows):
-            if again:
-                place[row], t[row] = self._also[k][again - 1]
-                time[row] = 0.0
+        also = np.array(self._also).reshape(-1, 3)
+        at = also[:, 0].astype(np.intp)
+        source = np.insert(np.arange(len(q)), at + 1, at)
         motion = Motion(
             q=q[source],
             kind=tuple(self._kind[k] for k in source),
-            contact_position=t,
-            cutter_point=place,
+            contact_position=np.insert(self._t, at + 1, also[:, 2]),
+            cutter_point=np.insert(self._place, at + 1, also[:, 1]),
             pass_index=self._pass[source],
         )
         findings = tuple(
@@ -154,26 +145,27 @@ class _Labels:
                 Level.ERROR,
                 "contact",
                 motion.place(int(np.searchsorted(source, k))),
-                f"{1e3 * amount:.3f} mm off the way to the next cutter point, "
+                f"{1e3 * amount:.3f} mm off the contact model before the next cutter point, "
                 f"{1e3 * self._rule.max_contact_error:g} mm allowed",
             )
             for k, amount in self._astray
         )
-        return Recognition(TimedMotion(motion, time), source, findings)
+        timed = TimedMotion(motion, np.insert(duration, at + 1, 0.0))
+        return Recognition(timed, source, findings)
 
     def _mark(self, k: int, kind: MoveKind, pass_index: int, t: float, place: float) -> None:
         self._kind[k], self._pass[k] = kind, pass_index
         self._t[k], self._place[k] = t, place
 
-    def _fill_in(self, way: Way, pass_index: int) -> None:
+    def _fill_in(self, segment: ContactSegment, pass_index: int) -> None:
         """Label the configurations between two that grind cutter points."""
-        columns = (way.configurations, way.place, way.contact_position, way.apart)
-        for k, place, t, apart in zip(*columns, strict=True):
+        placed = (segment.configurations, segment.place, segment.contact_position, segment.apart)
+        for k, place, t, apart in zip(*placed, strict=True):
             self._mark(int(k), MoveKind.BETWEEN, pass_index, t, place)
             if apart > self._rule.max_contact_error:
                 self._astray.append((int(k), float(apart)))
 
-    def _lead_ins(
+    def _label_leads(
         self,
         configuration: NDArray[np.intp],
         point: NDArray[np.intp],
@@ -185,25 +177,26 @@ class _Labels:
         for index in np.unique(pass_index):
             on_pass = np.flatnonzero(pass_index == index)
             begin, end = on_pass[0], on_pass[-1]
-            reach = self._leading(configuration[begin], point[begin], t[begin], -1)
-            for k in reach[:-1]:  # the move to the farthest of them is free
+            before = self._lead(configuration[begin], point[begin], t[begin], -1)
+            for k in before[:-1]:  # the move to the farthest of them is free
                 self._mark(k, MoveKind.APPROACH, index, np.nan, np.nan)
-            firsts.append(min(reach, default=int(configuration[begin])))
-            away = self._leading(configuration[end], point[end], t[end], 1)
-            for k in away:
+            firsts.append(min(before, default=int(configuration[begin])))
+            after = self._lead(configuration[end], point[end], t[end], 1)
+            for k in after:
                 self._mark(k, MoveKind.RETRACT, index, np.nan, np.nan)
-            lasts.append(max(away, default=int(configuration[end])))
+            lasts.append(max(after, default=int(configuration[end])))
         return firsts, lasts
 
-    def _leading(self, k: int, point: int, t: float, step: int) -> list[int]:
+    def _lead(self, k: int, point: int, t: float, side: int) -> list[int]:
         """Return the configurations off the wheel along the lead next to k, nearest first."""
-        T_cutter = self._points.Ts_workpiece_cutter[point]
-        to_contact = inverse(self._wheel.T_contact0_contact(t))
+        T_workpiece_cutter = self._segments.points.Ts_workpiece_cutter[point]
+        T_contact_contact0 = inverse(self._segments.wheel.T_contact0_contact(t))
         farthest, found = 0.0, []
-        j = int(k) + step
-        while 0 <= j < len(self._Ts) and self._kind[j] is MoveKind.HOME:
-            T_contact_cutter = to_contact @ self._Ts[j] @ T_cutter
-            along, aside = self._along_lead(T_contact_cutter[:3, 3], step)
+        j = int(k) + side
+        while 0 <= j < len(self._kind) and self._kind[j] is MoveKind.HOME:
+            T_contact0_workpiece = self._segments.Ts_contact0_workpiece[j]
+            T_contact_cutter = T_contact_contact0 @ T_contact0_workpiece @ T_workpiece_cutter
+            along, aside = self._along_lead(T_contact_cutter[:3, 3], side)
             turned = np.linalg.norm(T_contact_cutter[:3, :3] - np.eye(3)) / np.sqrt(2.0)
             if aside > ASIDE or turned > ALIGNED or not along > farthest:
                 break
@@ -211,15 +204,14 @@ class _Labels:
                 break
             farthest = along
             found.append(j)
-            j += step
+            j += side
         return found
 
     def _along_lead(self, p_contact: Array, side: int) -> tuple[float, float]:
         """Return how far along approach or retract a point is and how far beside it, in [m].
 
-        Args:
-            p_contact: The ground point in the contact frame, whose z points into the wheel, (3,).
-            side: -1 for the approach, which comes from -y, 1 for the retract.
+        `p_contact` is the ground point in the contact frame, whose z points into the wheel, shape
+        (3,); `side` is -1 for the approach, which comes from -y, 1 for the retract.
         """
         x, y, z = (float(v) for v in p_contact)
         if self._rule.approach_turn == 0.0:
@@ -228,14 +220,12 @@ class _Labels:
         y, z = side * y, z + radius  # seen from the centre of the arc
         return radius * float(np.arctan2(y, z)), float(np.hypot(x, np.hypot(y, z) - radius))
 
-    def _name_the_air(self, firsts: list[int], lasts: list[int]) -> None:
-        """Tell the ways from and to home from the links between passes."""
-        for k in range(len(self._kind)):
-            if self._kind[k] is not MoveKind.HOME or not firsts:
-                continue
+    def _label_free_moves(self, firsts: list[int], lasts: list[int]) -> None:
+        """Tell the free moves from and to home from the links between passes."""
+        for k in range(1, len(self._kind)):
             following = next((m for m, first in enumerate(firsts) if k <= first), None)
-            if following is None or k == 0:
-                continue  # on the way home, or at home
+            if self._kind[k] is not MoveKind.HOME or following is None:
+                continue
             self._pass[k] = self._pass[lasts[following]]
             if following > 0:
                 self._kind[k] = MoveKind.LINK

@@ -12,7 +12,7 @@ from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import part_tree
-from opl.motion.check import RESOLUTION, densify, find_faults
+from opl.motion.collision_check import RESOLUTION, colliding_moves, densify
 from opl.motion.motion import MoveKind
 from tests.support.bare_cells import bare_cell, block, free_move, with_obstacle
 from tests.support.fcl_scene import FclScene
@@ -45,12 +45,12 @@ def test_a_configuration_held_is_one_configuration():
 
 
 def faults_of(cell, timed):
-    return find_faults(cell, CollisionScene(cell), part_tree(cell.part), timed.motion)
+    return colliding_moves(cell, CollisionScene(cell), part_tree(cell.part), timed.motion)
 
 
 def test_a_planned_motion_has_no_faults():
     scene = small_problem().scene
-    assert find_faults(scene.cell, scene.collision, scene.part, small_motion()) == []
+    assert colliding_moves(scene.cell, scene.collision, scene.part, small_motion()) == []
 
 
 def test_an_obstacle_between_two_free_configurations_is_found():
@@ -111,14 +111,14 @@ def shifted_along_normal(motion, index, depth):
 
 
 @pytest.mark.parametrize(("depth", "found"), [(0.0003, False), (0.0007, True), (0.002, True)])
-def test_the_part_may_sink_into_the_belt_by_the_allowance(depth, found):
+def test_the_part_may_sink_into_the_belt_by_the_penetration(depth, found):
     problem, motion = small_problem(), small_motion()
     # on the flat: an edge of the wheel can sink in between two samples of the part
-    grind = np.array([stretch is MoveKind.GRIND for stretch in motion.kind])
+    grind = np.array([kind is MoveKind.GRIND for kind in motion.kind])
     index = int(np.argmin(np.where(grind, np.abs(motion.contact_position), np.inf)))
     assert abs(motion.contact_position[index]) < 20.0
     moved = shifted_along_normal(motion, index, depth)
-    faults = find_faults(problem.cell, problem.scene.collision, problem.scene.part, moved)
+    faults = colliding_moves(problem.cell, problem.scene.collision, problem.scene.part, moved)
     assert bool(faults) == found
     if found:
         assert faults[0].pair == ("part", "wheel")
@@ -128,8 +128,8 @@ def test_the_part_may_sink_into_the_belt_by_the_allowance(depth, found):
 def test_a_free_move_keeps_the_clearance_from_the_wheel():
     problem, motion = small_problem(), small_motion()
     on_wheel = next(k for k, s in enumerate(motion.kind) if s is MoveKind.GRIND)
-    hold = free_move(motion.q[[on_wheel, on_wheel]])
-    faults = find_faults(problem.cell, problem.scene.collision, problem.scene.part, hold)
+    hold = free_move(motion.q[[on_wheel, on_wheel]]).motion
+    faults = colliding_moves(problem.cell, problem.scene.collision, problem.scene.part, hold)
     assert [fault.pair for fault in faults] == [("part", "wheel")] * 2
 
 

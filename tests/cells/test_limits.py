@@ -9,13 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opl.cell.workcell import JointLimit
-from opl.motion.air import UnreachableApproachError, whole_motion
 from opl.motion.motion import MoveKind
+from opl.motion.whole_motion import UnreachableApproachError, whole_motion
 from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.multi_start import plan_recursive
 from opl.planning.nodes import build_nodes
-from opl.planning.reasons import explain
-from opl.planning.starts import plan_recursive
-from opl.planning.states import NodeState, node_states
+from opl.planning.reasons import NodeState, explain, node_states
 from tests.support.planned import (
     replay_tiny,
     small_problem,

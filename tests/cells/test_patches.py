@@ -11,9 +11,8 @@ from opl.files.resources import folder
 from opl.geometry.frames import pose
 from opl.geometry.wheel import ContactWheel
 from opl.job.load import load_job
-from opl.verification.drum import Drum
 from opl.verification.engine import pybullet, start
-from opl.verification.patches import MOST, Patches
+from opl.verification.patches import MOST, Drum, Patches
 from opl.verification.world import MARGIN, World
 from tests.support.bare_cells import random_configurations
 

@@ -8,16 +8,15 @@ import pytest
 
 from opl.cell.robot import forward_kinematics
 from opl.errors import NoPathError
-from opl.motion.air import UnreachableApproachError, whole_motion
-from opl.motion.check import RESOLUTION, densify, find_faults
+from opl.motion.collision_check import RESOLUTION, colliding_moves, densify
 from opl.motion.motion import MoveKind
 from opl.motion.timing import time_motion
+from opl.motion.whole_motion import UnreachableApproachError, whole_motion
 from opl.planning.filling import BrokenEdgeError, fill_in
-from opl.planning.fixed import keep_contact, runs_of
+from opl.planning.fixed_contact import keep_contact, runs_of
+from opl.planning.multi_start import Start, plan_recursive, try_recursive
 from opl.planning.plan import Exhausted, Found, OutOfBudget
-from opl.planning.reasons import explain, unreachable_points
-from opl.planning.starts import Start, plan_recursive, try_recursive
-from opl.planning.states import NodeState, node_states
+from opl.planning.reasons import NodeState, explain, node_states, unreachable_points
 from tests.support.bare_cells import Ghosts, with_obstacle
 from tests.support.brute_force import printed_recursion
 from tests.support.fcl_scene import FclScene
@@ -198,9 +197,9 @@ def test_a_search_ends_with_a_plan_or_without_proposals_or_with_its_budget_spent
 def test_another_scene_finds_free_moves_of_its_own():
     scene = small_problem().scene
     other = replace(scene, collision=Ghosts(np.zeros(6), radius=0.1))
-    assert scene.links is scene.links
-    assert other.links is not scene.links
-    assert other.links.scene is other.collision
+    assert scene.free_moves is scene.free_moves
+    assert other.free_moves is not scene.free_moves
+    assert other.free_moves.scene is other.collision
 
 
 def test_a_wall_at_the_wheel_is_named_with_the_points_it_shuts():
@@ -235,7 +234,7 @@ def test_what_is_in_the_way_of_a_free_move_is_led_around():
     moves = [1, *links, n - 1]
     middles = np.array([(plan.motion.q[k - 1] + plan.motion.q[k]) / 2.0 for k in moves])
     ghosts = Ghosts(middles, radius=0.015)
-    faults = find_faults(problem.cell, ghosts, problem.scene.part, plan.motion)
+    faults = colliding_moves(problem.cell, ghosts, problem.scene.part, plan.motion)
     assert [fault.move for fault in faults] == moves
     other = plan_recursive(with_scene(problem, collision=ghosts))
     assert other.checks == 1

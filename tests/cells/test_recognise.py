@@ -14,11 +14,10 @@ from opl.job.load import load_job
 from opl.motion.motion import MoveKind
 from opl.run.surfacing import cut_surface
 from opl.verification.align import align
-from opl.verification.between import frames_at, place_between
 from opl.verification.contact import Touches, contact_positions, find_touches, misfit
+from opl.verification.contact_segments import ContactSegments, place_between
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import replay
-from opl.verification.ways import Ways
 from tests.support.planned import (
     small_job,
     small_motion,
@@ -83,7 +82,7 @@ def test_a_configuration_off_the_wheel_costs_its_cutter_point_alone():
     others = [p for p in range(len(problem.points)) if p != motion.cutter_point[k]]
     assert found.timed.motion.ground_points.tolist() == others
     assert found.timed.motion.kind[k] is MoveKind.BETWEEN
-    assert any("off the way" in one.message for one in found.findings)
+    assert any("off the contact model" in one.message for one in found.findings)
 
 
 def test_nothing_is_recognised_where_nothing_is_ground():
@@ -122,7 +121,7 @@ def hollow():
 
 def parts_at(wheel, points, place, t):
     """Return where the part is when places are ground at contact positions, seen from contact0."""
-    return wheel.T_contact0_contact(np.asarray(t)) @ inverse(frames_at(points, np.asarray(place)))
+    return wheel.T_contact0_contact(np.asarray(t)) @ inverse(points.frames_at(np.asarray(place)))
 
 
 def test_a_place_between_two_cutter_points_is_found():
@@ -145,7 +144,7 @@ def test_a_pivot_through_the_hollow_is_followed(forwards):
         t = t[::-1]
     Ts = parts_at(wheel, points, place, t)
     # alone, a configuration may as well be a millimetre farther on
-    again = Ts[:, None] @ frames_at(points, place[:, None] + np.linspace(0.1, 0.3, 401))
+    again = Ts[:, None] @ points.frames_at(place[:, None] + np.linspace(0.1, 0.3, 401))
     distance, _ = misfit(wheel, again, contact_positions(wheel, again))
     assert distance.min() < 1e-5
     found, position, apart = place_between(
@@ -185,7 +184,7 @@ def test_what_goes_back_is_not_explained():
     assert apart[1:3].sum() > 0.25 * step  # it went back by 0.3 of the step
 
 
-def test_of_several_touches_of_a_flat_the_one_is_taken_that_the_ways_around_bear():
+def test_of_several_touches_of_a_flat_the_one_is_taken_that_the_segments_around_it_fit():
     problem = small_problem()
     wheel, points = problem.cell.wheel, problem.points
     # a flat slides off the wheel's flat onto its edge: it touches point 26 three times
@@ -195,9 +194,9 @@ def test_of_several_touches_of_a_flat_the_one_is_taken_that_the_ways_around_bear
     at = [int(k) for k in np.flatnonzero(found.point == 26)]
     assert found.configuration[at].tolist() == [1, 3, 4]
     ends = [int(np.flatnonzero(found.point == n)[0]) for n in (25, 27)]
-    ways = Ways(wheel, points, parts_at(wheel, points, place, t), np.ones(7), found)
-    assert ways.between(at[0], ends[1]).farthest > 1e-4
-    settled = ways.settled(np.array([ends[0], at[0], ends[1]]), 1e-4)
+    segments = ContactSegments(wheel, points, parts_at(wheel, points, place, t), np.ones(7), found)
+    assert segments.between(at[0], ends[1]).farthest > 1e-4
+    settled = segments.settled(np.array([ends[0], at[0], ends[1]]), 1e-4)
     assert found.configuration[settled].tolist() == [0, 4, 6]
 
 

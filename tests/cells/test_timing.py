@@ -15,7 +15,7 @@ from opl.motion.motion import Motion, MoveKind
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, fastest_law
 from opl.motion.timing import Cause, time_motion
-from opl.planning.starts import plan_recursive
+from opl.planning.multi_start import plan_recursive
 from tests.support.jobs import opl, write_job
 from tests.support.planned import problem_of, v_plan, v_problem, with_positions
 

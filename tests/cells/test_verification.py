@@ -291,7 +291,7 @@ def test_an_obstacle_on_a_free_move_is_caught(kind):
     cell = with_obstacle(problem.cell, p, (0.01, 0.01, 0.01))
     verification = replay_tiny(cell=cell)
     assert refuses(verification, "collision", "post")
-    place = "way from home" if kind is MoveKind.HOME else "link of pass 2"
+    place = "free move from home" if kind is MoveKind.HOME else "link of pass 2"
     assert any(finding.where == place for finding in verification.findings)
 
 

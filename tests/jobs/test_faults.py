@@ -301,7 +301,7 @@ def test_a_limit_crossed_between_two_configurations_is_found(written):
     assert (q > lower).all() and (q < upper).all()
     proof = proof_of(written, text, narrow)
     name = robot.joint_names[joint]
-    assert refuses(proof, "limit at way from home", f"joint {name}", "beyond its limit")
+    assert refuses(proof, "limit at free move from home", f"joint {name}", "beyond its limit")
 
 
 def test_a_collision_only_between_two_configurations_is_found(written):
@@ -318,5 +318,8 @@ def test_a_collision_only_between_two_configurations_is_found(written):
     narrow = with_obstacle(cell, half_way[distance.argmax()], (2e-3, 2e-3, 2e-3), "pin")
     assert not CollisionScene(narrow).collides(q).any()
     proof = proof_of(written, job=replace(written.job, cell=narrow))
-    assert refuses(proof, "collision at way from home", "part and pin", "into each other")
-    assert {finding.where for finding in proof.findings} <= {"way from home", "way home"}
+    assert refuses(proof, "collision at free move from home", "part and pin", "into each other")
+    assert {finding.where for finding in proof.findings} <= {
+        "free move from home",
+        "free move to home",
+    }

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import forward_kinematics, load_robot
 from opl.job.load import load_job
-from opl.planning.starts import plan_recursive
+from opl.planning.multi_start import plan_recursive
 from opl.run.delivery import deliver
 from opl.run.preparing import prepare
 from opl.run.stages import run_job
@@ -21,7 +21,7 @@ from opl.run.surfacing import cut_surface
 from tests.support.fcl_scene import margin_along
 from tests.support.jobs import document, opl, write_job
 
-# a plate of the machine's frame above the wheel, across the straight way from home
+# a plate of the machine's frame above the wheel, across the straight move from home
 HOOD = {"name": "hood", "box_mm": [456, 245, 30], "at_mm": [827, 277, 734]}
 # two passes the same way, so that the robot comes back under the plate between them
 BACK_UNDER_IT = {
@@ -100,14 +100,14 @@ def planned(job):
 def test_another_process_finds_the_same_ways():
     run, job, _ = under_the_hood()
     script = f"from tests.jobs import test_links_run as t;print(t.planned({str(job)!r}).hex())"
-    told = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-c", script],
         capture_output=True,
         text=True,
         check=True,
         cwd=Path(__file__).parents[2],
     ).stdout
-    assert bytes.fromhex(told) == run.proven.planned.plan.motion.q.tobytes()
+    assert bytes.fromhex(result) == run.proven.planned.plan.motion.q.tobytes()
 
 
 def cage():
@@ -144,16 +144,16 @@ def cage():
 
 
 def test_a_home_that_nothing_leads_out_of_is_refused_and_the_pair_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
+    monkeypatch.setattr("opl.motion.free_move_search.MOST_CHECKED", 3000)
     job = write_job(tmp_path / "j", {**with_bodies(*cage()), "process.home_deg": SIDEWAYS})
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 3
-    told = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
-    message, *ways, advice = told["reasons"]
-    assert message.endswith("there is no way through the air")
-    assert ways[0].startswith("way from home: ")
-    assert " and cage " in ways[0]
+    result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    message, *moves, advice = result["reasons"]
+    assert message.endswith("no collision-free move to, from or between them was found")
+    assert moves[0].startswith("free move from home: ")
+    assert " and cage " in moves[0]
     assert advice.startswith("would help: another home configuration, or cage ")
-    assert all(line in ended.err for line in told["reasons"])
+    assert all(line in ended.err for line in result["reasons"])
     # nothing at the wheel is to blame, so nothing there was tried
-    assert told["remedies"] == []
+    assert result["remedies"] == []

@@ -9,7 +9,7 @@ import yaml
 
 from opl.files.resources import folder
 from opl.job.load import load_job
-from opl.planning.fixed import keep_contact
+from opl.planning.fixed_contact import keep_contact
 from tests.support.jobs import opl
 from tests.support.planned import problem_of, with_positions
 

@@ -253,14 +253,14 @@ def test_a_fast_first_move_and_rounded_corners_are_found(tmp_path):
     text.replace(r"(C00001 VJ=\S+) PL=0", r"\1 PL=8")
     ended = verify(tmp_path, text)
     assert refuses(ended, "speed at V_SHAPE line", "VJ=50")
-    assert refuses(ended, "level at way from home", "PL=0 at most", "got PL=8")
+    assert refuses(ended, "level at free move from home", "PL=0 at most", "got PL=8")
 
 
 def test_a_program_that_goes_elsewhere_than_home_is_found(tmp_path):
     text = Text()
     pulses = text.pulses(0)
     pulses[0] += 2000
-    assert refuses(verify(tmp_path, text.put(0, pulses)), "home at way from home", "joint S")
+    assert refuses(verify(tmp_path, text.put(0, pulses)), "home at free move from home", "joint S")
 
 
 @pytest.mark.parametrize(
@@ -320,7 +320,7 @@ def test_a_limit_crossed_between_two_points_is_found(tmp_path):
     lower = float(np.rad2deg(job.cell.robot.lower[joint]))
     write_robot(tmp_path / "job" / "arm", {name: (lower, float(limit))})
     ended = verify(tmp_path, text, {"robot": "arm"})
-    assert refuses(ended, "limit at way from home", f"joint {name}", "beyond its limit")
+    assert refuses(ended, "limit at free move from home", f"joint {name}", "beyond its limit")
 
 
 def test_a_collision_only_between_two_points_is_found(tmp_path):
@@ -331,8 +331,8 @@ def test_a_collision_only_between_two_points_is_found(tmp_path):
     at = (middle[:3, :3] @ cell.part.vertices.mean(axis=0) + middle[:3, 3]) * 1e3
     plate = {"name": "plate", "box_mm": [2, 60, 2], "at_mm": at.round(1).tolist()}
     ended = verify(tmp_path, Text(), {"obstacles": [plate]})
-    assert refuses(ended, "collision at way from home", "part and plate")
-    assert "pass 1" not in ended.err and "way home" not in ended.err
+    assert refuses(ended, "collision at free move from home", "part and plate")
+    assert "pass 1" not in ended.err and "free move to home" not in ended.err
 
 
 # programs in parts, and other ways to write

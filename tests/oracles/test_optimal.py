@@ -10,14 +10,14 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from opl.cell.robot import forward_kinematics
-from opl.motion.check import RESOLUTION, densify
-from opl.motion.figures import figures_of_path
+from opl.motion.collision_check import RESOLUTION, densify
+from opl.motion.path import figures_of_path
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import ObjectiveWeights, track_cost
 from opl.planning.finer_bound import finer_bound
+from opl.planning.multi_start import plan_recursive
 from opl.planning.optimal import plan_optimal
 from opl.planning.refine import RefinedProblem
-from opl.planning.starts import plan_recursive
 from opl.planning.tube import REACH, halved, tube
 from opl.planning.weighted import plan_weighted
 from opl.search.certificate import least_box

@@ -10,8 +10,8 @@ from opl.files.resources import folder
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import load_job
 from opl.motion.timing import time_motion
+from opl.planning.multi_start import plan_recursive
 from opl.planning.scene import planning_scene
-from opl.planning.starts import plan_recursive
 from opl.run.preparing import problem_in
 from opl.run.surfacing import cut_surface
 from opl.verification.replay import replay

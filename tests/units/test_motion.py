@@ -131,13 +131,13 @@ def test_places_are_named_as_people_look_for_them():
     motion = verified_motion().motion
     named = [motion.place(k) for k in range(len(motion))]
     assert named[:5] == [
-        "way from home",
-        "way from home",
+        "free move from home",
+        "free move from home",
         "approach of pass 1",
         "approach of pass 1",
         "pass 1, cutter point 0",
     ]
-    assert named[-1] == "way home"
+    assert named[-1] == "free move to home"
     assert {"link of pass 2", "retract of pass 2", "pass 1, cutter point 0.5"} <= set(named)
 
 

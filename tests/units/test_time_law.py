@@ -190,5 +190,5 @@ def test_a_law_beyond_a_limit_is_refused_with_the_joint():
     hurried = TimeLaw(
         law.line, law.place, 1.1 * law.path_speed, law.speed_load, law.acceleration_load
     )
-    with pytest.raises(UnsafeError, match=r"asks for 1\d\d\.\d\d % of the acceleration of joint"):
+    with pytest.raises(UnsafeError, match=r"uses 1\d\d\.\d\d % of the acceleration of joint"):
         require_limits(hurried, LIMITS)

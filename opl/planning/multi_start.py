@@ -26,10 +26,6 @@ class Start(str, Enum):
 def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
     """Find a collision-free motion by the recursive search of the paper.
 
-    Args:
-        problem: What is to be planned.
-        start: Which start nodes to try.
-
     Raises:
         NoPathError: If there is none, as in `first_free`.
     """
@@ -38,13 +34,7 @@ def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
 
 
 def try_recursive(problem: GrindingProblem, start: Start, most_checks: int) -> SearchOutcome:
-    """Return what the recursive search finds within a number of checked motions.
-
-    Args:
-        problem: What is to be planned.
-        start: Which start nodes to try.
-        most_checks: How many motions to check at the most.
-    """
+    """Return what the recursive search finds within a number of checked motions."""
     matrices = open_matrices(problem)
     tracks = _tracks(problem, matrices, start)
     return propose_and_check(problem, matrices, tracks, most_checks=most_checks)
@@ -62,9 +52,8 @@ def _tracks(problem: GrindingProblem, matrices: list[OpenMatrix], start: Start) 
 def tracks_from_best_start(matrices: list[OpenMatrix]) -> Iterator[Track]:
     """Yield tracks by increasing joint range sum over all start nodes of all matrices.
 
-    A start node is given up as soon as its sum reaches the best known. What is found to be blocked
-    on a track is noted in its matrix before the next is wanted: only then a start node can yield
-    again.
+    A start node is given up as soon as its sum reaches the best known. What a check of a track
+    blocks is noted in its matrix before the next is taken: only then a start node can yield again.
     """
     searches = [_Search(matrix) for matrix in matrices]
     # (joint range sum, matrix, start row, rows); where a start was given up, its sum then and None

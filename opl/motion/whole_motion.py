@@ -1,8 +1,7 @@
 """From the path on the wheel to a whole motion: home, approach, passes, retract, links, home.
 
 The part comes to the wheel and leaves it as `opl.motion.leads` says; between passes, and from and
-to home, all joints move together on a straight line in joint space, or on several around what is in
-the way.
+to home, all joints move together on a straight line in joint space, or on several around obstacles.
 """
 
 from __future__ import annotations
@@ -14,11 +13,11 @@ from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
+from opl.motion.free_move_search import BlockedMoveError, FreeMoveSearch
 from opl.motion.leads import lead_offsets
-from opl.motion.links import Links, NoLinkError
 from opl.motion.motion import Motion, MoveKind
 from opl.motion.path import GrindingPath
-from opl.motion.process import ProcessSettings
+from opl.motion.process_settings import ProcessSettings
 
 
 class UnreachableApproachError(Exception):
@@ -35,16 +34,16 @@ class UnreachableApproachError(Exception):
         self.cause = cause
 
 
-class BlockedLinkError(Exception):
-    """The robot cannot come from one place off the wheel to the next.
+class BlockedMotionError(Exception):
+    """A free move of a motion is blocked.
 
     Args:
-        move: Index in the motion of the configuration that it cannot come to.
+        move: Index in the motion of the configuration that the move should end at.
         error: Why.
     """
 
-    def __init__(self, move: int, error: NoLinkError) -> None:
-        super().__init__(f"way to configuration {move}: {error}")
+    def __init__(self, move: int, error: BlockedMoveError) -> None:
+        super().__init__(f"free move to configuration {move}: {error}")
         self.move = move
         self.error = error
 
@@ -52,34 +51,22 @@ class BlockedLinkError(Exception):
 def whole_motion(
     cell: WorkCell, points: CutterPoints, path: GrindingPath, process: ProcessSettings
 ) -> Motion:
-    """Join the passes of a path into one motion from home to home.
-
-    Args:
-        cell: The cell.
-        points: The cutter points of the path.
-        path: The path on the wheel.
-        process: Speeds, approach and home.
+    """Join the passes of a path into one motion from home to home, its free moves straight.
 
     Raises:
         UnreachableApproachError: If an approach or retract leaves reach or limits.
     """
-    parts = [Motion.off_wheel(process.home[None], MoveKind.HOME, -1)]
-    for index in range(int(points.pass_index[-1]) + 1):
+
+    def lead_at(k: int, kind: MoveKind) -> Array:
+        column, t = int(path.cutter_point[k]), path.contact_position[k]
+        return lead(cell, points, process, kind, path.ik_branch, column, t, path.q[k])
+
+    home = Motion.off_wheel(process.home[None], MoveKind.HOME, -1)
+    parts = [home]
+    for index in range(points.n_passes):
         on_pass = np.flatnonzero(path.pass_index == index)
-        first, last = int(on_pass[0]), int(on_pass[-1])
-        lead_in, lead_out = (
-            lead(
-                cell,
-                points,
-                process,
-                kind,
-                path.ik_branch,
-                int(path.cutter_point[k]),
-                path.contact_position[k],
-                path.q[k],
-            )
-            for k, kind in ((first, MoveKind.APPROACH), (last, MoveKind.RETRACT))
-        )
+        lead_in = lead_at(on_pass[0], MoveKind.APPROACH)
+        lead_out = lead_at(on_pass[-1], MoveKind.RETRACT)
         free = MoveKind.HOME if index == 0 else MoveKind.LINK
         place = path.cutter_point[on_pass]
         parts += [
@@ -95,29 +82,24 @@ def whole_motion(
             ),
             Motion.off_wheel(lead_out, MoveKind.RETRACT, index),
         ]
-    parts.append(Motion.off_wheel(process.home[None], MoveKind.HOME, -1))
-    return Motion.joined(parts)
+    return Motion.joined([*parts, home])
 
 
-def linked(motion: Motion, links: Links) -> Motion:
-    """Lead the free moves of a motion around what is in their way.
-
-    Args:
-        motion: The motion, every free move of it a single straight one.
-        links: Finds the ways.
+def linked(motion: Motion, search: FreeMoveSearch) -> Motion:
+    """Lead the free moves of a motion around obstacles.
 
     Raises:
-        BlockedLinkError: If there is none for one of them.
+        BlockedMotionError: If one of them cannot be found.
     """
     moves = np.flatnonzero(motion.free[1:]) + 1
-    on_the_way = []
+    inserted = []
     for move in moves.tolist():
         try:
-            on_the_way.append(links.find(motion.q[move - 1], motion.q[move]))
-        except NoLinkError as error:
-            raise BlockedLinkError(move, error) from error
-    before = np.repeat(moves, [len(q) for q in on_the_way])
-    return motion.with_inserted(before, np.concatenate(on_the_way)) if len(before) else motion
+            inserted.append(search.find(motion.q[move - 1], motion.q[move]))
+        except BlockedMoveError as error:
+            raise BlockedMotionError(move, error) from error
+    before = np.repeat(moves, [len(q) for q in inserted])
+    return motion.with_inserted(before, np.concatenate(inserted)) if len(before) else motion
 
 
 def lead(
@@ -132,15 +114,7 @@ def lead(
 ) -> Array:
     """Return configurations from just off the wheel to the far end of a lead, shape (k, 6).
 
-    Args:
-        cell: The cell.
-        points: The cutter points.
-        process: How long it is, and how far it turns.
-        kind: Whether it is the approach or the retract.
-        ik_branch: Slot of the inverse kinematics.
-        column: The cutter point that is ground.
-        contact_position: Where on the wheel.
-        q_contact: The configuration that grinds it in [rad], shape (6,).
+    `q_contact` in [rad], shape (6,), grinds the cutter point of the column at the contact position.
 
     Raises:
         UnreachableApproachError: If it leaves reach or limits.

@@ -15,7 +15,7 @@ from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import PartTree, signed_wheel_distance
 from opl.cell.workcell import PART, SECOND_OPINION, WHEEL, WorkCell
 from opl.geometry.frames import Array
-from opl.motion.check import RESOLUTION, densify
+from opl.motion.collision_check import RESOLUTION, densify
 
 # [m] a piece may be as long as to move no point farther than this from its middle; what would need
 # a distance beyond the clearance smaller than the last is taken to be too near
@@ -26,16 +26,16 @@ MOST_SPHERES = 32
 MOST_CORNERS = 100
 
 
-class FreeMoves:
-    """Straight joint moves off the wheel, asked whether they are free.
+class StraightMoves:
+    """Are straight joint moves off the wheel free?
 
     Robot and part against all that stands still, wheel included, is proven along the whole move, at
     the clearance and what the second opinion may differ by. Links and held bodies against each
-    other are asked every `RESOLUTION`, as everywhere in the planner.
+    other are checked every `RESOLUTION`, as everywhere in the planner.
     """
 
     def __init__(self, cell: WorkCell, scene: CollisionScene, part: PartTree) -> None:
-        self.asked = 0  # configurations
+        self.checked = 0  # configurations
         self.levers = scene.levers()
         self._cell = cell
         self._scene = scene
@@ -54,15 +54,15 @@ class FreeMoves:
         dense, _ = densify(np.stack([start, end]), RESOLUTION)
         # the middle first, then the quarters: a move that is not free is mostly known so sooner
         for configuration in dense[_halving(len(dense))]:
-            self.asked += 1
+            self.checked += 1
             if self._scene.collides(configuration[None])[0]:
                 return False
         if self._too_near_wheel(dense, 0.0).any():
             return False
         pieces = np.array([[0.0, 1.0]])
-        way = float(np.abs(end - start) @ self.levers)
+        longest = float(np.abs(end - start) @ self.levers)
         for reserve in RESERVES:
-            pieces = _cut(pieces, 2.0 * reserve / max(way, reserve))
+            pieces = _cut(pieces, 2.0 * reserve / max(longest, reserve))
             pieces = pieces[self._near(start, end, pieces, reserve)]
             if not len(pieces):
                 return True
@@ -72,17 +72,11 @@ class FreeMoves:
         """Return the first pair that is too near at a configuration, shape (6,), or None."""
         if self._too_near_wheel(q[None], RESERVES[-1])[0]:
             return PART, WHEEL
-        return next(
-            (
-                pair
-                for scene in (self._scene, self._wider[RESERVES[-1]])
-                for pair in scene.colliding_pairs(q)
-            ),
-            None,
-        )
+        pairs = self._scene.colliding_pairs(q) or self._wider[RESERVES[-1]].colliding_pairs(q)
+        return pairs[0] if pairs else None
 
     def first_pair(self, start: Array, end: Array) -> BodyPair | None:
-        """Return the first pair that is met on the way between two configurations, or None."""
+        """Return the first pair that collides on the move between two configurations, or None."""
         dense, _ = densify(np.stack([start, end]), RESOLUTION)
         pairs = (self.pair_at(configuration) for configuration in dense)
         return next((pair for pair in pairs if pair is not None), None)
@@ -90,7 +84,7 @@ class FreeMoves:
     def _near(self, start: Array, end: Array, pieces: Array, reserve: float) -> np.ndarray:
         """Return which pieces, shape (n, 2) in fractions, their middle does not free."""
         q = start + pieces.mean(axis=1)[:, None] * (end - start)
-        self.asked += len(q)
+        self.checked += len(q)
         near = self._wider[reserve].collides(q)
         near[~near] = self._too_near_wheel(q[~near], reserve)
         return near
@@ -99,13 +93,10 @@ class FreeMoves:
         """Return at which ``q``, shape (n, 6), the part does not keep away from the wheel."""
         needed = self._cell.part_from_wheel + SECOND_OPINION + reserve
         wheel = self._cell.wheel
-        Ts_contact0_workpiece = self._cell.Ts_contact0_workpiece(
-            forward_kinematics(self._cell.robot, q)
-        )
-        R, p = (
-            Ts_contact0_workpiece[:, :3, :3].swapaxes(1, 2),
-            Ts_contact0_workpiece[:, None, :3, 3],
-        )
+        Ts_base_flange = forward_kinematics(self._cell.robot, q)
+        Ts_contact0_workpiece = self._cell.Ts_contact0_workpiece(Ts_base_flange)
+        R = Ts_contact0_workpiece[:, :3, :3].swapaxes(1, 2)
+        p = Ts_contact0_workpiece[:, None, :3, 3]
         near = np.asarray((wheel.signed_distance(self._corners @ R + p) < needed).any(axis=1))
         centres = self._spheres[:, :3] @ R[~near] + p[~near]
         doubtful = (wheel.signed_distance(centres) - self._spheres[:, 3] < needed).any(axis=1)

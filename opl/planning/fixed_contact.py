@@ -1,4 +1,4 @@
-"""What the same work costs when the contact is kept at t = 0, as a teacher at the pendant would."""
+"""What the same work costs when the contact is kept at t = 0, as in programs taught by hand."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
+from opl.planning.multi_start import Start, tracks_from_best_start, try_recursive
 from opl.planning.open_matrix import OpenMatrix
 from opl.planning.plan import Found
 from opl.planning.problem import GrindingProblem, build_problem
-from opl.planning.starts import Start, tracks_from_best_start, try_recursive
 
 MOST_CHECKS = 50  # of contact-fixed motions, which differ in the counts of turns only
 
@@ -57,12 +57,9 @@ def keep_contact(problem: GrindingProblem) -> FixedContact:
     cut = np.flatnonzero(fixed.cuts)
     if len(cut):
         deepest = -1e3 * float(fixed.wheel_distance.min())
-        return FixedContact(
-            q,
-            False,
-            f"{PART} cuts into {WHEEL} at {len(cut)} of {len(q)} cutter points "
-            f"({runs_of(cut)}), {deepest:.2f} mm deep at most",
-        )
+        where = f"{len(cut)} of {len(q)} cutter points ({runs_of(cut)})"
+        reason = f"{PART} cuts into {WHEEL} at {where}, {deepest:.2f} mm deep at most"
+        return FixedContact(q, False, reason)
     if not isinstance(try_recursive(fixed, Start.BEST, MOST_CHECKS), Found):
         return FixedContact(q, False, "every motion that was checked collides")
     return FixedContact(q, True, "")

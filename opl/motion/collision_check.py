@@ -13,17 +13,17 @@ from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.motion.motion import Motion
 
-RESOLUTION = np.deg2rad(1.0)  # largest joint change between two configurations that are asked
+RESOLUTION = np.deg2rad(1.0)  # largest joint change between two configurations that are checked
 
 
 @dataclass(frozen=True)
-class Fault:
+class CollidingMove:
     """A move that collides.
 
     Attributes:
         move: Index of the configuration that the move ends at.
         pair: Names of the two bodies.
-        at_end: Whether the configuration itself collides, not only the way to it.
+        at_end: Whether the configuration itself collides, not only the move to it.
     """
 
     move: int
@@ -34,9 +34,8 @@ class Fault:
 def densify(q: Array, resolution: float) -> tuple[Array, np.ndarray]:
     """Put configurations on the joint lines between configurations.
 
-    Args:
-        q: Joint positions in [rad], shape (n, 6).
-        resolution: Largest change of any joint between two of the result in [rad].
+    `q` is in [rad], shape (n, 6); no joint changes by more than `resolution` in [rad] between two
+    of the result.
 
     Returns:
         Configurations, shape (m, 6), ending with the last; and for each the index of the move that
@@ -50,33 +49,27 @@ def densify(q: Array, resolution: float) -> tuple[Array, np.ndarray]:
     return np.concatenate([q[:1], dense]), np.concatenate([[0], move])
 
 
-def find_faults(
+def colliding_moves(
     cell: WorkCell, scene: CollisionScene, part: PartTree, motion: Motion
-) -> list[Fault]:
+) -> list[CollidingMove]:
     """Return every move of a motion that collides, once each, in order.
 
-    The part may sink into the belt by its largest penetration while it is on the wheel or on its
-    way to and from it; on free moves it keeps the clearance from the wheel as from all else.
-
-    Args:
-        cell: The cell.
-        scene: Its geometry.
-        part: The triangles of the part.
-        motion: The motion.
+    The part may sink into the belt by its largest penetration while it is on the wheel, on
+    approaches and on retracts; on free moves it keeps its clearance from the wheel.
     """
     q, move = densify(motion.q, RESOLUTION)
     Ts_base_flange = forward_kinematics(cell.robot, q)
     needed = np.where(motion.free[move], cell.part_from_wheel, -cell.planned_penetration)
     Ts_contact0_workpiece = cell.Ts_contact0_workpiece(Ts_base_flange)
     cuts = signed_wheel_distance(part, cell.wheel, Ts_contact0_workpiece, needed) < needed
-    # a move that is refused for the wheel need not be asked about the rest
-    ask = ~np.isin(move, move[cuts])
+    # a move that is refused for the wheel need not be checked further
+    unrefused = ~np.isin(move, move[cuts])
     hits = np.zeros(len(q), dtype=bool)
-    hits[ask] = scene.collides(q[ask])
+    hits[unrefused] = scene.collides(q[unrefused])
     faults = []
     for index in np.unique(move[cuts | hits]):
         on_move = np.flatnonzero(move == index)
         first = on_move[(cuts | hits)[on_move]][0]
         pair = (PART, WHEEL) if cuts[first] else scene.colliding_pairs(q[first])[0]
-        faults.append(Fault(int(index), pair, bool((cuts | hits)[on_move[-1]])))
+        faults.append(CollidingMove(int(index), pair, bool((cuts | hits)[on_move[-1]])))
     return faults
