@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opl.cell.robot import Robot
-from opl.errors import InputError, OplError
+from opl.errors import InputError, PassTimeError, SettingError
 from opl.program.moves import PassTime, Program
 from opl.program.played import Corners, Reading, Speed
 from opl.program.settings import ProgramSettings
@@ -107,25 +107,23 @@ def known_posts() -> list[str]:
     return sorted({entry.name for entry in entry_points(group=GROUP)})
 
 
-def find_post(name: str, where: str = "program.controller") -> Post:
-    """Return the post of a controller.
-
-    Args:
-        name: As a job names it.
-        where: File and key, for messages.
+def find_post(name: str) -> Post:
+    """Return the post of a controller by the name that jobs give it.
 
     Raises:
-        InputError: If there is none, or it cannot be loaded.
+        SettingError: If there is none, or it cannot be loaded.
     """
     found = [entry for entry in entry_points(group=GROUP) if entry.name == name]
     if not found:
-        raise InputError(where, f"unknown controller {name!r}; known: {', '.join(known_posts())}")
+        known = ", ".join(known_posts())
+        raise SettingError("controller", f"unknown controller {name!r}; known: {known}")
     try:
         post = found[0].load()
     except Exception as error:  # a package of the site's own: whatever is wrong in it
-        raise InputError(where, f"post {found[0].value} cannot be loaded: {error}") from error
+        message = f"post {found[0].value} cannot be loaded: {error}"
+        raise SettingError("controller", message) from error
     if not isinstance(post, Post):
-        raise InputError(where, f"post {found[0].value} is no opl.program.posts.Post")
+        raise SettingError("controller", f"post {found[0].value} is no opl.program.posts.Post")
     return post
 
 
@@ -167,7 +165,7 @@ def pass_times(
         controller: For messages.
 
     Raises:
-        OplError: If a pass does not keep its time.
+        PassTimeError: If a pass does not keep its time.
     """
     wanted: dict[int, float] = {}
     written: dict[int, float] = {}
@@ -180,9 +178,8 @@ def pass_times(
     found = {index: PassTime(wanted[index], written[index]) for index in sorted(wanted)}
     for index, one in found.items():
         if abs(one.error) > PASS_TIME_TOLERANCE:
-            raise OplError(
+            raise PassTimeError(
                 f"pass {index + 1} would take {one.written:.2f} s instead of {one.wanted:.2f} s: "
-                f"{controller} cannot be told speeds so low; raise process.feed_mm_s, or ask for "
-                "program.motion: straight"
+                f"{controller} takes no speeds so low"
             )
     return tuple(found.values())

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opl.cell.robot import Robot
-from opl.errors import InputError, UnsafeError
+from opl.errors import InputError, SettingError, UnsafeError
 
 Array = NDArray[np.float64]
 Pulses = NDArray[np.int64]
@@ -114,41 +114,36 @@ class PulseScale:
         return np.rint(q * self.pulses_per_radian).astype(np.int64)
 
 
-def require_known(robot: Robot, where: str) -> None:
+def require_known(robot: Robot) -> None:
     """Refuse to count a robot in pulses that are not known.
 
-    Args:
-        robot: Whose program.
-        where: File and key that would give them.
-
     Raises:
-        InputError: If the ratio of a joint is missing; tells the ways out.
+        SettingError: If the ratio of a joint is missing; names what gives it.
     """
     missing = ", ".join(robot.missing_pulses)
     if missing:
-        raise InputError(
-            where,
+        raise SettingError(
+            "pulses_per_radian",
             f"no pulses per degree are known of {missing} of {robot.title} (robot: {robot.name}), "
             "so its program cannot be written in pulses; give the controller's own (opl robots "
             "import-params)",
         )
 
 
-def require_accepted(unverified: Collection[str], accepted: Collection[str], where: str) -> None:
+def require_accepted(unverified: Collection[str], accepted: Collection[str]) -> None:
     """Refuse pulses of joints whose ratio nobody has confirmed and the user has not accepted.
 
     Args:
         unverified: Names of the joints whose ratio is not confirmed.
         accepted: Names of the joints the user accepts all the same.
-        where: File and key that would accept them.
 
     Raises:
-        InputError: If a joint is missing; tells the ways out.
+        SettingError: If a joint is missing; names what helps.
     """
     missing = [name for name in unverified if name not in accepted]
     if missing:
-        raise InputError(
-            where,
+        raise SettingError(
+            "accepted_pulses",
             f"the pulses per degree of {', '.join(missing)} are not verified, so a pulse program "
             "may lead anywhere; give the file of the controller's own (opl robots import-params), "
             f"or accept them by name: [{', '.join(missing)}]",

@@ -54,9 +54,8 @@ def write_jobs(
         OplError: If a pass has more moves than a job can hold, or cannot keep its time.
     """
     if settings.positions is PositionForm.PULSES:
-        require_known(robot, "program.pulse_ratios")
-        where = "program.accept_unverified_pulses"
-        require_accepted(robot.unverified_pulses, settings.accepted_pulses, where)
+        require_known(robot)
+        require_accepted(robot.unverified_pulses, settings.accepted_pulses)
     parts = split_for(program, profile)
     clash = settings.actions.calls & {part.name for part in parts}
     if clash:

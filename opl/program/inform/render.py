@@ -12,7 +12,7 @@ from datetime import datetime
 from pathlib import Path
 
 from opl.cell.robot import Robot
-from opl.errors import InputError
+from opl.errors import InputError, SettingError
 from opl.files import resources
 from opl.program.controller import ControllerProfile
 from opl.program.inform.check import find_faults
@@ -158,15 +158,11 @@ def _require_legal(
 ) -> None:
     """Refuse what no template can make legal, before one gets the blame."""
     if not 0 <= settings.tool <= profile.highest_tool:
-        raise InputError(
-            "program.tool", f"must be 0 to {profile.highest_tool}, got {settings.tool}"
-        )
+        raise SettingError("tool", f"must be 0 to {profile.highest_tool}, got {settings.tool}")
     frame = settings.user_frame
     if frame is not None and not 1 <= frame.number <= profile.highest_user_frame:
-        raise InputError(
-            "program.user_frame.number",
-            f"must be 1 to {profile.highest_user_frame}, got {frame.number}",
-        )
+        allowed = f"1 to {profile.highest_user_frame}"
+        raise SettingError("user_frame", f"must be {allowed}, got {frame.number}")
     for name in (layout.name, *layout.calls):
         if fault := profile.name_fault(name):
             raise InputError("program name", fault)
