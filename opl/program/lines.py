@@ -10,16 +10,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from opl.cell.full_turns import nearest_turn
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
-from opl.geometry.frames import inverse, pose, transform
+from opl.geometry.frames import Array, inverse, pose, transform
 from opl.program.moves import Kind, Program
-
-Array = NDArray[np.float64]
 
 _BETWEEN = np.array([0.25, 0.5, 0.75])
 LINE_STEP = 1e-3  # [m] of the tool point between configurations on a line

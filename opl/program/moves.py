@@ -11,16 +11,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from opl.errors import UnsafeError
+from opl.geometry.frames import Array
 from opl.motion.motion import Motion, Phase, TimedMotion, VerifiedMotion
 from opl.program.actions import NO_ACTIONS, Action, Actions
 from opl.program.stops import actions_at, stops_at
-
-Array = NDArray[np.float64]
 
 # Speed of the move to the first configuration. Nothing is known of where the robot starts from, so
 # that move is proven by nobody but the person who watches it.
@@ -146,6 +146,19 @@ class Program:
     calls: tuple[str, ...] = ()
     pass_times: tuple[PassTime, ...] = ()
     cycle: CycleTime | None = None
+
+    @property
+    def q(self) -> Array:
+        """Where the moves end, joint positions in [rad], shape (n, 6)."""
+        return np.array([move.q for move in self.moves]).reshape(-1, 6)
+
+    @property
+    def chained(self) -> list[bool]:
+        """Whether each move but the first goes on with the pass of the move before."""
+        return [
+            move.ground_pass is not None and move.ground_pass == before.ground_pass
+            for before, move in pairwise(self.moves)
+        ]
 
 
 def plan_moves(

@@ -19,16 +19,12 @@ from datetime import datetime
 from importlib.metadata import entry_points
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from opl.cell.robot import Robot
 from opl.errors import InputError, PassTimeError, SettingError
+from opl.geometry.frames import Array
 from opl.program.moves import PassTime, Program
 from opl.program.played import Corners, Reading, Speed
 from opl.program.settings import ProgramSettings
-
-Array = NDArray[np.float64]
 
 GROUP = "opl.posts"
 

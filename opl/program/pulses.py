@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from opl.cell.robot import Robot
 from opl.errors import InputError, SettingError, UnsafeError
+from opl.geometry.frames import Array
 
-Array = NDArray[np.float64]
 Pulses = NDArray[np.int64]
 
 

@@ -7,12 +7,10 @@ from enum import Enum
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from opl.geometry.frames import Array
 from opl.program.actions import NO_ACTIONS, Actions
 from opl.program.moves import Kind
-
-Array = NDArray[np.float64]
 
 
 class MotionForm(str, Enum):
@@ -60,7 +58,8 @@ class ByKind:
 
     def of(self, kind: Kind) -> int | None:
         """Return the number for a kind of move."""
-        return {Kind.WHEEL: self.on_wheel, Kind.LEAD: self.lead, Kind.AIR: self.air}[kind]
+        number: int | None = getattr(self, kind.value)
+        return number
 
 
 @dataclass(frozen=True, eq=False)

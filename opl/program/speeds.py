@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from opl.geometry.frames import Array
 
 # A move makes up for the rounding of those before it by at most this factor of its own time.
 MOST_CORRECTION = 2.0

@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.files import resources
-from opl.geometry.frames import roll_pitch_yaw
+from opl.geometry.frames import Array, roll_pitch_yaw
 from opl.motion.motion import VerifiedMotion
 from opl.program.layout import fill
 from opl.program.posts import Written
 from opl.program.pulses import PulseScale
-
-Array = NDArray[np.float64]
 
 TEMPLATE = resources.folder("templates") / "csv" / "table.csv.j2"
 

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
-import numpy as np
-from numpy.typing import NDArray
-
 from opl.cell.robot import Robot, forward_kinematics
+from opl.geometry.frames import Array
 from opl.motion.motion import VerifiedMotion
 from opl.program.actions import Action
 from opl.program.cycle import cycle_time
@@ -19,8 +17,6 @@ from opl.program.posts import find_post
 from opl.program.pulses import PulseScale
 from opl.program.settings import MotionForm, ProgramSettings
 from opl.program.table import render_table
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -138,7 +138,7 @@ def test_what_the_controller_does_not_take_is_told_before_planning(changes, mess
         (
             PassTimeError("too slow"),
             OplError,
-            "too slow; raise process.feed_mm_s, or write program",
+            "too slow; raise process.feed_mm_s, or write",
         ),
         (TimeLawError("no law"), UnsafeError, "no law; raise process.max_acceleration_deg_s2"),
     ],

@@ -12,11 +12,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from opl.cell.robot import Robot
+from opl.geometry.frames import Array
 from opl.program.fanuc.rounding import DECIMALS, from_fanuc
 from opl.program.moves import START_SPEED
 from opl.program.played import Corner, Corners, ReadMove, Speed, SpeedUnit
-from opl.program.settings import Array, ProgramSettings
 from opl.program.statements import NUMBER, Listing, Notes, Words, code_lines
 
 _STATE = "(?:ON|OFF)"
@@ -43,7 +42,9 @@ _POSITION = re.compile(
 )
 _GROUP = re.compile(r"DEFAULT_GROUP ?= ?(.*);")
 _HALF_DIGIT = 0.5 * np.deg2rad(10.0**-DECIMALS) * np.array([1.0, 1.0, 2.0, 1.0, 1.0, 1.0])
-LARGEST_CNT = 100.0
+START = Speed(SpeedUnit.TOP_SPEED, START_SPEED, f"{100.0 * START_SPEED:.0f}%")
+_CNT = Corner(100.0, "CNT100")
+CORNERS = Corners(Corner(0.0, "FINE"), _CNT, _CNT, _CNT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,15 +68,7 @@ class _State:
 
 
 def parse(text: str, source: str) -> Listing:
-    """Return the program of a file.
-
-    Args:
-        text: Of the file.
-        source: The file, for messages.
-
-    Raises:
-        InputError: If it holds no program.
-    """
+    """Return the program of a file; see `listing_reader`."""
     notes, state = Notes(source, _WORDS), _State()
     sections = _sections(notes, text)
     for line, code in sections["/ATTR"]:
@@ -232,14 +225,3 @@ def _check_jumps(notes: Notes, state: _State) -> None:
         low, high = sorted((places[0], index))
         if any(low <= move <= high for move in state.moves):
             notes.doubt(line, "jumps past moves")
-
-
-def start_speed(robot: Robot) -> Speed:
-    """Return the fastest first move."""
-    return Speed(SpeedUnit.TOP_SPEED, START_SPEED, f"{100.0 * START_SPEED:.0f}%")
-
-
-def corners(settings: ProgramSettings) -> Corners:
-    """Return the largest corners: CNT100 wherever the robot need not stop."""
-    corner = Corner(LARGEST_CNT, f"CNT{LARGEST_CNT:.0f}")
-    return Corners(Corner(0.0, "FINE"), corner, corner, corner)

@@ -9,17 +9,14 @@ inferred: jobs saved by controllers show no-flip for B < 0, and none was found w
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.cell.full_turns import FULL_TURN, angular_distance
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
 from opl.errors import UnsafeError
-from opl.geometry.frames import from_roll_pitch_yaw, inverse, roll_pitch_yaw
+from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, roll_pitch_yaw
 from opl.program.controller import ControllerProfile
 from opl.program.settings import PositionForm, ProgramSettings
-
-Array = NDArray[np.float64]
 
 # In the order of RCONF, the joints whose half turn it names.
 _HALF_TURN_JOINTS = (3, 5, 0)  # R, T, S

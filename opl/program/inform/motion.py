@@ -5,18 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.cell.robot import Robot, forward_kinematics
-from opl.geometry.frames import inverse, rotation_angle
+from opl.geometry.frames import Array, inverse, rotation_angle
 from opl.program.controller import ControllerProfile
 from opl.program.inform.cartesian import frame_pose, rconf_of, rectan, require_read_back
 from opl.program.moves import Program
 from opl.program.pulses import PulseScale
 from opl.program.settings import PositionForm, ProgramSettings
 from opl.program.speeds import SpeedRange, speeds_keeping_time
-
-Array = NDArray[np.float64]
 
 # Below so many last digits V is too coarse for a move in which the tool point hardly moves.
 _FINE_ENOUGH = 10.0

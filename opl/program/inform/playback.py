@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.cell.robot import Robot
 from opl.errors import InputError
 from opl.findings import Finding, Level
+from opl.geometry.frames import Array
 from opl.program.inform.job import InformJob
 from opl.program.inform.sequence import Visit, first_job, visits
 from opl.program.inform.times import job_configurations
@@ -18,8 +18,6 @@ from opl.program.played import Corner, Corners, Playback, ReadMove, Speed, Speed
 from opl.program.played import play as play_moves
 from opl.program.pulses import PulseScale
 from opl.program.settings import ProgramSettings
-
-Array = NDArray[np.float64]
 
 # What the number of each speed is multiplied by to be in SI.
 _UNITS = {

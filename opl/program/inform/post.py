@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from datetime import datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.cell.robot import Robot
 from opl.errors import InputError
+from opl.geometry.frames import Array
 from opl.program.controller import ControllerProfile
 from opl.program.inform.cartesian import frame_pose
 from opl.program.inform.compare import differences_in_meaning
@@ -27,8 +27,6 @@ from opl.program.posts import Post, Reader, Written, pass_times
 from opl.program.profiles import PROFILES
 from opl.program.pulses import require_accepted, require_known
 from opl.program.settings import PositionForm, ProgramSettings
-
-Array = NDArray[np.float64]
 
 
 def write_jobs(

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.cell.robot import Robot
+from opl.geometry.frames import Array
 from opl.program.controller import ControllerProfile
 from opl.program.inform.motion import write_positions
 from opl.program.moves import Move, Program
 from opl.program.pulses import PulseScale
 from opl.program.settings import PositionForm, ProgramSettings
-
-Array = NDArray[np.float64]
 
 
 def rounded(q: Array, robot: Robot, settings: ProgramSettings, profile: ControllerProfile) -> Array:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.cell.robot import Robot, forward_kinematics
-from opl.geometry.frames import inverse, rotation_angle
+from opl.geometry.frames import Array, inverse, rotation_angle
 from opl.program.inform.cartesian import configurations, pose_of
 from opl.program.inform.job import InformJob
 from opl.program.pulses import PulseScale
-
-Array = NDArray[np.float64]
 
 
 def job_configurations(

@@ -11,15 +11,16 @@ import re
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from opl.cell.robot import Robot
-from opl.geometry.frames import pose
+from opl.geometry.frames import Array, pose
 from opl.program.played import Corner, Corners, ReadMove, Speed, SpeedUnit
-from opl.program.rapid.rounding import DECIMALS
-from opl.program.settings import Array, ProgramSettings
 from opl.program.statements import NUMBER, Listing, Notes, Words, code_lines
 
-# Speed of the move to the first configuration, which has no time: 50 mm/s at the tool point.
-START = 50
+DECIMALS = 4
+# Of the move to the first configuration, which has no time.
+START = Speed(SpeedUnit.TOOL_POINT, 0.05, "v50")
+_FINEST_ZONE = 0.3  # z0 in [mm] of the tool point; the others are named after theirs
+_ZONE = Corner(_FINEST_ZONE, "z0")
+CORNERS = Corners(Corner(0.0, "fine"), _ZONE, _ZONE, _ZONE)
 
 _WORDS = Words(
     passing=re.compile(r'(?:SetDO do[0-9]+, ?[01]|TPWrite "[^"]*"|TPErase) ?;', re.I),
@@ -37,22 +38,13 @@ _NO_AXES = r"\[9E9(?:,9E9){5}\]"
 _REST = rf",v([0-9]+)(?:\\T:=({NUMBER}))?,(fine|z[0-9]+),(\w+);"
 _ABSOLUTE = re.compile(rf"MoveAbsJ\[{_ROW},{_NO_AXES}\](?:\\NoEOffs)?{_REST}", re.I)
 _LINE = re.compile(rf"MoveL\[{_ROW},{_ROW},{_ROW},{_NO_AXES}\]{_REST}", re.I)
-_FINEST_ZONE = 0.3  # z0 in [mm] of the tool point; the others are named after theirs
 _HALF_DIGIT = np.full(6, 0.5 * np.deg2rad(10.0**-DECIMALS))
 # What the digits of a pose may do to a joint in [rad], in no singularity.
 _POSE_DIGITS = np.full(6, 1e-4)
 
 
 def parse(text: str, source: str) -> Listing:
-    """Return the program of a module.
-
-    Args:
-        text: Of the file.
-        source: The file, for messages.
-
-    Raises:
-        InputError: If it holds no procedure.
-    """
+    """Return the program of a module; see `listing_reader`."""
     notes = Notes(source, _WORDS)
     passed = 0  # of the lines that enclose the procedure
     free = False  # whether ConfL is off
@@ -145,14 +137,3 @@ def _move(
 
 def _numbers(text: str) -> Array:
     return np.array([float(number) for number in text.split(",")])
-
-
-def start_speed(robot: Robot) -> Speed:
-    """Return the fastest first move."""
-    return Speed(SpeedUnit.TOOL_POINT, START * 1e-3, f"v{START}")
-
-
-def corners(settings: ProgramSettings) -> Corners:
-    """Return the largest zones: the finest there is wherever the robot need not stop."""
-    zone = Corner(_FINEST_ZONE, "z0")
-    return Corners(Corner(0.0, "fine"), zone, zone, zone)
