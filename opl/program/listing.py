@@ -116,10 +116,10 @@ def _meaning(listing: Listing) -> list[tuple[str, str]]:
 
 def _where(move: ReadMove, robot: Robot) -> Iterator[str]:
     if move.target.shape == (4, 4):
-        yield "in the base frame: " + pose_text(move.target)
+        yield "in the base frame: " + pose_text(pose_values(move.target))
         return
     yield angles_text(move.target, robot)
-    yield "flange " + pose_text(controller_poses(robot, move.target))
+    yield "flange " + pose_text(pose_values(controller_poses(robot, move.target)))
 
 
 def angles_text(q: Array, robot: Robot) -> str:
@@ -128,10 +128,14 @@ def angles_text(q: Array, robot: Robot) -> str:
     return "angles " + " ".join(f"{name} {angle:.3f}" for name, angle in named)
 
 
-def pose_text(T: Array) -> str:
-    """Return a pose in [mm] and [deg] for people."""
-    x, y, z = T[:3, 3] * 1e3
-    rx, ry, rz = np.rad2deg(roll_pitch_yaw(T))
+def pose_values(T: Array) -> tuple[float, ...]:
+    """Return x, y, z in [mm] and rx, ry, rz in [deg] of a pose."""
+    return (*T[:3, 3] * 1e3, *np.rad2deg(roll_pitch_yaw(T)))
+
+
+def pose_text(values: tuple[float, ...]) -> str:
+    """Return x, y, z in [mm] and rx, ry, rz in [deg] for people."""
+    x, y, z, rx, ry, rz = values
     return f"x {x:.3f} y {y:.3f} z {z:.3f} rx {rx:.4f} ry {ry:.4f} rz {rz:.4f}"
 
 

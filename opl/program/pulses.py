@@ -76,11 +76,13 @@ class PulseScale:
         """Lower and upper limits in pulses, as the controller keeps them, shapes (6,)."""
         return self._nearest(self.lower), self._nearest(self.upper)
 
-    def to_pulses(self, q: Array) -> Pulses:
+    def to_pulses(self, q: Array, inwards: bool = False) -> Pulses:
         """Return the pulses nearest to joint positions.
 
         Args:
             q: Joint positions in [rad], shape (..., 6).
+            inwards: Whether a joint at its limit is rounded inwards, if that limit is no whole
+                number of pulses.
 
         Returns:
             Pulses, shape (..., 6).
@@ -104,6 +106,11 @@ class PulseScale:
                 f"{np.rad2deg(stack[place]):.3f} deg is {pulses[place]} pulses, the soft limits "
                 f"are {lower[joint]} and {upper[joint]}"
             )
+        if inwards:
+            slack = 1e-6  # pulses
+            lowest = np.ceil(self.lower * self.pulses_per_radian - slack)
+            highest = np.floor(self.upper * self.pulses_per_radian + slack)
+            pulses = np.clip(pulses, lowest, highest).astype(np.int64)
         return pulses.reshape(np.shape(q))
 
     def to_angles(self, pulses: NDArray[np.generic]) -> Array:

@@ -218,7 +218,7 @@ def test_tool_the_controller_does_not_have_is_refused(tool):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("in steps %}\n{% if step.conf", "in steps[1:] %}\n{% if step.conf",
+        ("in steps %}\n{% if step.rconf", "in steps[1:] %}\n{% if step.rconf",
          "NPOS is 20,0,0,0,0,0, there are 19"),
         ("={{ step.values }}", "=0,0,0,0,0,0", r"position 1: must be C00000=0,-38000"),
         ("{{ step.word }}", "MOVL", r"move 1: must be MOVJ C00000 VJ=5.00 PL=0, is MOVL"),

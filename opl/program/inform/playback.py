@@ -12,19 +12,13 @@ from opl.findings import Finding, Level
 from opl.geometry.frames import Array
 from opl.program.inform.job import InformJob
 from opl.program.inform.sequence import Visit, first_job, visits
-from opl.program.inform.times import job_configurations
+from opl.program.inform.times import job_configurations, written_speed
 from opl.program.moves import SAME_CONFIGURATION, START_SPEED
 from opl.program.played import Corner, Corners, Playback, ReadMove, Speed, SpeedUnit
 from opl.program.played import play as play_moves
 from opl.program.pulses import PulseScale
 from opl.program.settings import ProgramSettings
 
-# What the number of each speed is multiplied by to be in SI.
-_UNITS = {
-    "VJ": (SpeedUnit.TOP_SPEED, 1e-2),
-    "V": (SpeedUnit.TOOL_POINT, 1e-3),
-    "VR": (SpeedUnit.HAND, float(np.deg2rad(1.0))),
-}
 # Instructions at which the robot stands still.
 _WAITS = ("TIMER", "WAIT", "PAUSE", "CALL")
 
@@ -90,14 +84,12 @@ def _move(
     visit: Visit, target: Array, resolution: Array, starts: bool, waits: tuple[str, ...]
 ) -> ReadMove:
     step = visit.step
-    tag = next(name for name, _ in step.tags if name in _UNITS)
-    unit, factor = _UNITS[tag]
-    value, level = step.tag(tag) or "nan", step.tag("PL")
+    level = step.tag("PL")
     size = float(level) if level is not None and level.isdecimal() else np.inf
     return ReadMove(
         target=target,
         straight=step.word == "MOVL",
-        speed=Speed(unit, factor * float(value), f"{tag}={value}"),
+        speed=written_speed(step),
         corner=Corner(size, "none" if level is None else f"PL={level}"),
         tool=str(_tool(visit)),
         place=_place(visit),

@@ -9,18 +9,20 @@ import numpy as np
 
 from opl.cell.robot import Robot
 from opl.errors import InputError
+from opl.findings import Finding, Level
 from opl.geometry.frames import Array
 from opl.program.controller import ControllerProfile
 from opl.program.inform.cartesian import frame_pose
+from opl.program.inform.check import find_faults
 from opl.program.inform.compare import differences_in_meaning
-from opl.program.inform.files import decode, program_jobs
+from opl.program.inform.job import InformJob
 from opl.program.inform.layout import VARIABLES
-from opl.program.inform.parse import parse, read_jobs
+from opl.program.inform.motion import rounded
+from opl.program.inform.parse import decode, parse, read_jobs, unparse
 from opl.program.inform.playback import corners, play, start_speed
 from opl.program.inform.render import FILE_SUFFIX, TEMPLATE, render, split_for
-from opl.program.inform.rounding import rounded
 from opl.program.inform.summary import describe
-from opl.program.inform.times import move_times
+from opl.program.inform.times import move_times, written_speed
 from opl.program.moves import Program
 from opl.program.played import Reading
 from opl.program.posts import Post, Reader, Written, pass_times
@@ -68,9 +70,7 @@ def write_jobs(
         for move, line, time in zip(part.moves, job.moves, written_times, strict=True):
             if move.duration is None and move.motion_index in speeds:
                 continue  # a part begins where the one before it ended
-            speeds[move.motion_index] = next(
-                f"{tag}={value}" for tag, value in line.tags if tag in ("VJ", "V", "VR")
-            )
+            speeds[move.motion_index] = written_speed(line).text
             if np.isfinite(time):
                 times[move.motion_index] = float(time)
     return Written(files, speeds, times, pass_times(program, times, profile.name))
@@ -90,7 +90,17 @@ def read(
     Raises:
         InputError: If the files are no jobs, not those of one program, or of another robot.
     """
-    jobs, refused = program_jobs(files, profile)
+    jobs: dict[str, InformJob] = {}
+    refused: list[Finding] = []
+    for source, data in files.items():
+        text, _ = decode(data)
+        several = read_jobs(text, source)
+        for job in several:
+            if job.name in jobs:
+                raise InputError(source, f"a job {job.name} was given before")
+            jobs[job.name] = job
+            faults = find_faults(text if len(several) == 1 else unparse(job), profile)
+            refused += [Finding(Level.ERROR, "file", source, fault) for fault in faults]
     playback, doubtful = play(jobs, robot, settings)
     foreign = sorted({name for job in jobs.values() for name in job.calls} - jobs.keys())
     return Reading(playback, tuple(foreign), (*refused, *doubtful))

@@ -19,7 +19,7 @@ from opl.program.inform.check import find_faults
 from opl.program.inform.layout import JobLayout, Step, differences
 from opl.program.inform.motion import write_positions, write_speeds
 from opl.program.inform.parse import parse
-from opl.program.inform.words import ActionWriter
+from opl.program.inform.words import ACTIONS, require_accepted_action
 from opl.program.layout import fill
 from opl.program.moves import Move, Program
 from opl.program.names import short_name
@@ -29,8 +29,7 @@ from opl.program.split import split
 FILE_SUFFIX = ".JBI"
 TEMPLATE = resources.folder("templates") / "inform" / "job.jbi.j2"
 
-STOP_LEVEL = 0
-
+_STOP_LEVEL = 0
 # Of a template that goes wrong on every line, a few faults tell as much as all.
 _FAULTS_SHOWN = 10
 
@@ -111,27 +110,25 @@ def _steps(
 ) -> tuple[Step, ...]:
     positions = write_positions(part, robot, settings, profile)
     speeds = write_speeds(part, positions.q, robot, settings.T_flange_tool, profile)
-    actions = ActionWriter(profile)
-    steps = []
-    rconf_before = None
-    for number, move in enumerate(part.moves):
-        rconf = positions.rconfs[number]
-        word, speed = speeds[number]
-        steps.append(
-            Step(
-                label=f"C{number:0{profile.label_digits}d}",
-                values=positions.values[number],
-                rconf=rconf if rconf != rconf_before else None,
-                word=word,
-                speed=speed,
-                level=str(STOP_LEVEL if move.exact_stop else settings.levels.of(move.kind)),
-                ramps=_ramps(move, settings),
-                comment=move.comment,
-                actions=actions.lines(move.actions),
-            )
+    for move in part.moves:
+        for action in move.actions:
+            require_accepted_action(action, profile)
+    actions = ACTIONS.all_lines([move.actions for move in part.moves])
+    rconfs = [None, *positions.rconfs]
+    return tuple(
+        Step(
+            label=f"C{number:0{profile.label_digits}d}",
+            values=positions.values[number],
+            rconf=rconfs[number + 1] if rconfs[number + 1] != rconfs[number] else None,
+            word=speeds[number][0],
+            speed=speeds[number][1],
+            level=str(_STOP_LEVEL if move.exact_stop else settings.levels.of(move.kind)),
+            ramps=_ramps(move, settings),
+            comment=move.comment,
+            actions=actions[number],
         )
-        rconf_before = rconf
-    return tuple(steps)
+        for number, move in enumerate(part.moves)
+    )
 
 
 def _ramps(move: Move, settings: ProgramSettings) -> str:

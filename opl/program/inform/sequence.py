@@ -50,8 +50,8 @@ def first_job(jobs: Mapping[str, InformJob]) -> str:
     called = {name for job in jobs.values() for name in job.calls}
     starts = [name for name in jobs if name not in called]
     if len(starts) != 1:
-        told = f"start with one job and give those it calls; no job calls {' or '.join(starts)}"
-        raise InputError("program", told if starts else "the jobs call each other in a circle")
+        message = f"start with one job and give those it calls; no job calls {' or '.join(starts)}"
+        raise InputError("program", message if starts else "the jobs call each other in a circle")
     return starts[0]
 
 

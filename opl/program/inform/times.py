@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
-from opl.cell.robot import Robot, forward_kinematics
-from opl.geometry.frames import Array, inverse, rotation_angle
+from opl.cell.robot import Robot
+from opl.geometry.frames import Array, inverse
 from opl.program.inform.cartesian import configurations, pose_of
-from opl.program.inform.job import InformJob
+from opl.program.inform.job import InformJob, Instruction
+from opl.program.played import Speed, SpeedUnit, move_time
 from opl.program.pulses import PulseScale
+
+# What the number of each speed is multiplied by to be in SI.
+_UNITS = {
+    "VJ": (SpeedUnit.TOP_SPEED, 1e-2),
+    "V": (SpeedUnit.TOOL_POINT, 1e-3),
+    "VR": (SpeedUnit.HAND, float(np.deg2rad(1.0))),
+}
 
 
 def job_configurations(
@@ -39,6 +49,13 @@ def job_configurations(
     return q
 
 
+def written_speed(move: Instruction) -> Speed:
+    """Return the one speed of a move, VJ, V or VR."""
+    tag, value = next((name, value) for name, value in move.tags if name in _UNITS)
+    unit, factor = _UNITS[tag]
+    return Speed(unit, factor * float(value), f"{tag}={value}")
+
+
 def move_times(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool: Array) -> Array:
     """Return the time of each move at its written speed in [s], ramps left out; NaN for the first.
 
@@ -49,16 +66,8 @@ def move_times(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool:
         T_flange_tool: Its tool.
     """
     q = job_configurations(job, robot, T_base_frame, T_flange_tool)
-    Ts_base_tool = forward_kinematics(robot, q) @ T_flange_tool
-    times = np.full(len(q), np.nan)
-    for k, move in enumerate(job.moves[1:], start=1):
-        if percent := move.tag("VJ"):
-            at_top_speed = (np.abs(q[k] - q[k - 1]) / robot.max_speed).max()
-            times[k] = at_top_speed * 100.0 / float(percent)
-        elif mm_per_second := move.tag("V"):
-            way = np.linalg.norm(Ts_base_tool[k, :3, 3] - Ts_base_tool[k - 1, :3, 3])
-            times[k] = way * 1e3 / float(mm_per_second)
-        elif degrees_per_second := move.tag("VR"):
-            turn = rotation_angle(Ts_base_tool[k - 1], Ts_base_tool[k])
-            times[k] = np.rad2deg(turn) / float(degrees_per_second)
-    return times
+    times = [
+        move_time(written_speed(move), start, end, robot, T_flange_tool)
+        for move, (start, end) in zip(job.moves[1:], pairwise(q), strict=True)
+    ]
+    return np.array([np.nan, *times][: len(q)])
