@@ -123,16 +123,16 @@ def find_post(name: str) -> Post:
     return post
 
 
-def suffixes_read() -> dict[str, str]:
-    """Return a post for each suffix of files that opl can read, its name by the suffix."""
-    found: dict[str, str] = {}
+def readers() -> dict[str, Reader]:
+    """Return the reader of each suffix of files that opl can read, by the suffix in capitals."""
+    found: dict[str, Reader] = {}
     for name in known_posts():
         try:
             reader = find_post(name).reader
         except InputError:
             continue  # a post that cannot be loaded is an error for the job that names it only
         if reader is not None:
-            found.setdefault(reader.suffix.upper(), name)
+            found.setdefault(reader.suffix.upper(), reader)
     return found
 
 
@@ -142,11 +142,10 @@ def reader_for(path: Path) -> Reader:
     Raises:
         InputError: If no post reads such files.
     """
-    known = suffixes_read()
-    reader = find_post(known[path.suffix.upper()]).reader if path.suffix.upper() in known else None
-    if reader is None:
+    known = readers()
+    if path.suffix.upper() not in known:
         raise InputError(str(path), f"is no program that can be read: {', '.join(sorted(known))}")
-    return reader
+    return known[path.suffix.upper()]
 
 
 def pass_times(
@@ -163,15 +162,13 @@ def pass_times(
     Raises:
         PassTimeError: If a pass does not keep its time.
     """
-    wanted: dict[int, float] = {}
-    written: dict[int, float] = {}
+    sums: dict[int, tuple[float, float]] = {}
     for move in program.moves:
         if move.ground_pass is not None and move.duration is not None:
-            wanted[move.ground_pass] = wanted.get(move.ground_pass, 0.0) + move.duration
-            written[move.ground_pass] = (
-                written.get(move.ground_pass, 0.0) + times[move.motion_index]
-            )
-    found = {index: PassTime(wanted[index], written[index]) for index in sorted(wanted)}
+            wanted, written = sums.get(move.ground_pass, (0.0, 0.0))
+            both = wanted + move.duration, written + times[move.motion_index]
+            sums[move.ground_pass] = both
+    found = {index: PassTime(*both) for index, both in sorted(sums.items())}
     for index, one in found.items():
         if abs(one.error) > PASS_TIME_TOLERANCE:
             raise PassTimeError(

@@ -14,7 +14,7 @@ from opl.geometry.toolpath import CutterPoints
 from opl.job import keys
 from opl.job.load import Job
 from opl.motion.motion import TimedMotion
-from opl.program.posts import Reader, find_post, suffixes_read
+from opl.program.posts import Reader, find_post, readers
 from opl.proof.written import written_findings
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import Verification, replay
@@ -112,7 +112,7 @@ def _require_language(job: Job, files: Mapping[str, bytes], reader: Reader) -> N
     """Refuse files that by their names are of another language than the job's controller."""
     for name in files:
         suffix = Path(name).suffix.upper()
-        if suffix in suffixes_read() and suffix != reader.suffix.upper():
+        if suffix in readers() and suffix != reader.suffix.upper():
             raise InputError(
                 job.source.at(keys.PROGRAM_CONTROLLER),
                 f"{job.program.controller} takes {reader.suffix} files, got {name}",

@@ -10,7 +10,6 @@ import numpy as np
 from opl.cell.robot import Robot
 from opl.errors import InputError
 from opl.findings import Finding, Level
-from opl.geometry.frames import Array
 from opl.program.controller import ControllerProfile
 from opl.program.inform.cartesian import frame_pose
 from opl.program.inform.check import find_faults
@@ -133,21 +132,23 @@ def file_differences(first: tuple[str, bytes], second: tuple[str, bytes]) -> lis
 
 def post_of(profile: ControllerProfile) -> Post:
     """Return the post of a controller."""
-
-    def write(program: Program, robot: Robot, settings: ProgramSettings, date: datetime) -> Written:
-        return write_jobs(program, robot, settings, profile, date)
-
-    def read_files(files: Mapping[str, bytes], robot: Robot, settings: ProgramSettings) -> Reading:
-        return read(files, robot, settings, profile)
-
-    def rounded_q(q: Array, robot: Robot, settings: ProgramSettings) -> Array:
-        return rounded(q, robot, settings, profile)
-
     reader = Reader(
-        FILE_SUFFIX, read_files, rounded_q, start_speed, corners, describe_file, file_differences
+        FILE_SUFFIX,
+        lambda files, robot, settings: read(files, robot, settings, profile),
+        lambda q, robot, settings: rounded(q, robot, settings, profile),
+        start_speed,
+        corners,
+        describe_file,
+        file_differences,
     )
-    title = f"Yaskawa {profile.name} (INFORM)"
-    return Post(title, write, TEMPLATE, VARIABLES, counts_pulses=True, reader=reader)
+    return Post(
+        f"Yaskawa {profile.name} (INFORM)",
+        lambda program, robot, settings, date: write_jobs(program, robot, settings, profile, date),
+        TEMPLATE,
+        VARIABLES,
+        counts_pulses=True,
+        reader=reader,
+    )
 
 
 NX100, DX100, DX200, YRC1000 = (

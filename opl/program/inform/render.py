@@ -22,9 +22,8 @@ from opl.program.inform.parse import parse
 from opl.program.inform.words import ACTIONS, require_accepted_action
 from opl.program.layout import fill
 from opl.program.moves import Move, Program
-from opl.program.names import short_name
 from opl.program.settings import PositionForm, ProgramSettings
-from opl.program.split import split
+from opl.program.split import short_name, split
 
 FILE_SUFFIX = ".JBI"
 TEMPLATE = resources.folder("templates") / "inform" / "job.jbi.j2"
