@@ -17,10 +17,10 @@ from opl.job.bodies import Matrix, pose_of
 from opl.job.refusals import keys_named
 from opl.job.source import Source
 from opl.program.actions import Actions
+from opl.program.export import try_out
 from opl.program.posts import Post, find_post, known_posts
 from opl.program.ratios import with_ratios
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
-from opl.program.write import try_out
 
 _MAY_COUNT_PULSES = ("Yaskawa", "unknown")  # makers
 

@@ -1,8 +1,8 @@
 """How long a written program runs, with the ramps that the controller puts to its moves.
 
 The speeds of a program are those between the ramps: a controller comes up to them from rest and
-goes down to rest wherever it stops. How long that takes is told by the time law that planned the
-moves, now at rest at both ends of every stretch between two stops.
+goes down to rest wherever it stops. How long that takes says the time law that planned the
+moves, now at rest at both ends of each run between two stops.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def cycle_time(
     """
     spent = dict.fromkeys(Kind, 0.0)
     ramps = 0.0
-    for moves in _stretches(program.moves):
+    for moves in _runs(program.moves):
         limits = JointLimits(robot.max_speed, _acceleration(moves[1:], robot, settings))
         wanted = np.array([move.duration or 0.0 for move in moves[1:]])
         q = np.array([move.q for move in moves])
@@ -59,7 +59,7 @@ def cycle_time(
     )
 
 
-def _stretches(moves: Sequence[Move]) -> Iterator[Sequence[Move]]:
+def _runs(moves: Sequence[Move]) -> Iterator[Sequence[Move]]:
     """Yield the moves from one stop to the next; the first of each is where it starts."""
     start = 0
     for k in range(1, len(moves)):
@@ -69,7 +69,7 @@ def _stretches(moves: Sequence[Move]) -> Iterator[Sequence[Move]]:
 
 
 def _acceleration(moves: Sequence[Move], robot: Robot, settings: ProgramSettings) -> np.ndarray:
-    """Return the joint accelerations of a stretch as the program asks for them, shape (6,)."""
+    """Return the joint accelerations of a run as the program sets them, shape (6,)."""
     percents = [100.0]
     for ramp in (settings.acceleration, settings.deceleration):
         percents += [percent for move in moves if (percent := ramp.of(move.kind))]

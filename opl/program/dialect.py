@@ -1,13 +1,13 @@
 """What the writers of RAPID, KRL, FANUC and UR programs share: steps as texts, templates, times.
 
 A template may lay a program out anew; that no move or action got lost or changed is seen from the
-text, whatever the language (`Dialect.render`). What the program does then is for its reader.
+text, whatever the language. What the program does then is for its reader.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -62,19 +62,19 @@ class Step:
 class ActionTexts:
     """How a language writes actions: texts in whose braces stands what differs.
 
-    Of signals ``number``, ``state`` and the ``other`` state; of a timed wait ``seconds``,
-    ``hundredths``, ``thousandths``, and for labels the ``count`` of such waits so far and three
-    numbers ``first``, ``second``, ``third`` of its own.
+    The fields of the action, ``state`` in words, and the ``other`` state. Of a timed wait besides
+    ``hundredths`` and ``thousandths`` of a second, and for labels the ``count`` of such waits so
+    far and three numbers ``first``, ``second``, ``third`` of its own.
 
     Attributes:
         states: A signal that is off, and one that is on.
         output: Switches an output.
-        dwell: Stands still for ``seconds``.
+        dwell: Stands still.
         wait: Waits for an input.
         timed_wait: The same, and pauses when it takes too long. Started again by a person, it waits
             again instead of going on without the signal.
-        call: Calls the program ``name``.
-        remark: The line ``text`` for people.
+        call: Calls a program.
+        remark: A line for people.
     """
 
     states: tuple[str, str]
@@ -85,42 +85,36 @@ class ActionTexts:
     call: str
     remark: str
 
-    def lines(self, action: Action, count: int) -> tuple[str, ...]:
-        """Return the instructions of an action, given the count of timed waits with its own."""
-        if isinstance(action, Remark):
-            return (self.remark.format(text=action.text),)
-        if isinstance(action, Call):
-            return (self.call.format(name=action.name),)
-        if isinstance(action, Dwell):
-            return (self.dwell.format(seconds=action.seconds),)
-        values: dict[str, object] = {
-            "number": action.number,
-            "state": self.states[action.state],
-            "other": self.states[not action.state],
-        }
-        if isinstance(action, SetOutput):
-            return (self.output.format(**values),)
-        if action.timeout is None:
-            return tuple(line.format(**values) for line in self.wait)
-        values |= {
-            "seconds": action.timeout,
-            "hundredths": round(action.timeout * 100),
-            "thousandths": round(action.timeout * 1000),
-            "count": count,
-            **{name: 3 * count - k for k, name in enumerate(("third", "second", "first"))},
-        }
-        return tuple(line.format(**values) for line in self.timed_wait)
-
-    def all_lines(self, groups: Sequence[Sequence[Action]]) -> list[tuple[str, ...]]:
+    def lines(self, groups: Iterable[Sequence[Action]]) -> list[tuple[str, ...]]:
         """Return the instructions of each group of actions of one program, in order."""
         count, found = 0, []
         for group in groups:
             lines: list[str] = []
             for action in group:
-                count += isinstance(action, WaitInput) and action.timeout is not None
-                lines += self.lines(action, count)
+                count += getattr(action, "timeout", None) is not None
+                lines += self._texts(action, count)
             found.append(tuple(lines))
         return found
+
+    def _texts(self, action: Action, count: int) -> Iterator[str]:
+        values = dict(vars(action))
+        texts = {
+            SetOutput: [self.output],
+            Dwell: [self.dwell],
+            WaitInput: self.wait,
+            Call: [self.call],
+            Remark: [self.remark],
+        }[type(action)]
+        if isinstance(action, (SetOutput, WaitInput)):
+            values["state"] = self.states[action.state]
+            values["other"] = self.states[not action.state]
+        if isinstance(action, WaitInput) and action.timeout is not None:
+            texts = self.timed_wait
+            values["hundredths"] = round(action.timeout * 100)
+            values["thousandths"] = round(action.timeout * 1000)
+            values |= {"count": count, "third": 3 * count}
+            values |= {"first": 3 * count - 2, "second": 3 * count - 1}
+        return (text.format(**values) for text in texts)
 
 
 @dataclass(frozen=True)
@@ -173,7 +167,7 @@ class Dialect:
                 does not say what the steps say, or a pass does not keep its time.
         """
         self._require_legal(program, settings)
-        actions = self.actions.all_lines([move.actions for move in program.moves])
+        actions = self.actions.lines(move.actions for move in program.moves)
         both = list(zip(program.moves, moves, strict=True))
         steps = [
             Step(*texts, move.comment, lines)

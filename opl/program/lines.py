@@ -22,7 +22,7 @@ _BETWEEN = np.array([0.25, 0.5, 0.75])
 LINE_STEP = 1e-3  # [m] of the tool point between configurations on a line
 LINE_TURN = np.deg2rad(0.5)  # of the hand and of any joint between them
 # Farthest that the end of a line may be from the configuration it is written with in [rad]: poses
-# have few digits. A line that ends on another branch is off by far more.
+# have few digits. A line that ends on another ik_branch is off by far more.
 _SAME_END = np.deg2rad(0.5)
 _FURTHEST_TURN = np.deg2rad(20.0)  # of a joint from one to the next on a line: beyond, it flips
 

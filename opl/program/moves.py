@@ -28,8 +28,7 @@ START_SPEED = 0.05
 # Configurations nearer to each other than this in every joint [rad] are one: a micrometre at the
 # end of the arm, a tenth of an encoder pulse.
 SAME_CONFIGURATION = 1e-6
-# What a move may ask above a joint's top speed before it is refused: the last digit a controller
-# can be told.
+# What a move may need above a joint's top speed before it is refused: the last digit of a speed.
 OVERSPEED = 1e-4
 
 

@@ -63,7 +63,7 @@ def prove(
         job: Cell, feed and tolerances.
         points: The cutter points of the job.
         files: Content of all files of the program by what messages call them.
-        progress: Told the part of the motion that is replayed, 0 to 1.
+        progress: Gets the part of the motion that is replayed, 0 to 1.
 
     Raises:
         InputError: If the files are not those of one program of the job's controller and robot.

@@ -32,7 +32,7 @@ def written_findings(
     """Return what is wrong with speeds, stops, and the configurations at both ends.
 
     Args:
-        job: What is asked for.
+        job: What is requested.
         points: Its cutter points.
         written: The written configurations with their labels and written times, one for each move.
         playback: The moves they are from.

@@ -10,8 +10,8 @@ from opl.errors import InputError
 from opl.geometry.frames import transform
 from opl.geometry.mesh import box_corners
 from opl.planning.states import NodeState, node_states
+from opl.program.export import StraightLimit, write_program
 from opl.program.moves import Program
-from opl.program.write import StraightLimit, write_program
 from opl.report.pictures import contact_chart, joint_chart
 from opl.run.values import Planned, Proven
 

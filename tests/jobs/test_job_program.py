@@ -16,9 +16,9 @@ from opl.job.program import ProgramSection
 from opl.job.refusals import keys_named
 from opl.job.source import Source
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
+from opl.program.export import try_out
 from opl.program.inform import TEMPLATE
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings
-from opl.program.write import try_out
 from tests.support.program_samples import HOME, ROBOT, UNVERIFIED
 
 EYE = "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 180], [0, 0, 0, 1]]"

@@ -10,13 +10,13 @@ from opl.cell.robot import forward_kinematics
 from opl.cli.commands import main
 from opl.errors import InputError, OplError
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
+from opl.program.export import StraightLimit, write_program
 from opl.program.inform import find_faults, parse
-from opl.program.inform.layout import VARIABLES, JobLayout, Step
+from opl.program.inform.job_layout import VARIABLES, JobLayout, Step
 from opl.program.moves import Program, plan_moves
 from opl.program.posts import find_post, known_posts, reader_for
 from opl.program.profiles import PROFILES
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
-from opl.program.write import StraightLimit, write_program
 from tests.support.example_post import install, install_example_post
 from tests.support.program_samples import (
     DATE,

@@ -30,11 +30,6 @@ def play(
 ) -> tuple[Playback | None, list[Finding]]:
     """Return what a controller does with jobs, and what is in doubt; None if something is.
 
-    Args:
-        jobs: All jobs of a program by name.
-        robot: Whose program.
-        settings: Tool, user frame, and which jobs of the user's own may be called.
-
     Raises:
         InputError: If the jobs are not those of one program, or of another robot.
     """

@@ -12,13 +12,13 @@ from opl.errors import InputError
 from opl.findings import Finding, Level
 from opl.program.controller import ControllerProfile
 from opl.program.inform.cartesian import frame_pose
-from opl.program.inform.check import find_faults
 from opl.program.inform.compare import differences_in_meaning
+from opl.program.inform.faults import find_faults
 from opl.program.inform.job import InformJob
-from opl.program.inform.layout import VARIABLES
-from opl.program.inform.motion import rounded
+from opl.program.inform.job_layout import VARIABLES
 from opl.program.inform.parse import decode, parse, read_jobs, unparse
 from opl.program.inform.playback import corners, play, start_speed
+from opl.program.inform.positions import rounded
 from opl.program.inform.render import FILE_SUFFIX, TEMPLATE, render, split_for
 from opl.program.inform.summary import describe
 from opl.program.inform.times import move_times, written_speed
@@ -38,13 +38,6 @@ def write_jobs(
     date: datetime,
 ) -> Written:
     """Return the job files of a program: one, or a master and the parts it calls.
-
-    Args:
-        program: What the robot shall do.
-        robot: Who shall do it.
-        settings: How it is written.
-        profile: The controller.
-        date: Date of the jobs.
 
     Raises:
         InputError: If something the job asks for is not legal on the controller, the template is
@@ -79,12 +72,6 @@ def read(
     files: Mapping[str, bytes], robot: Robot, settings: ProgramSettings, profile: ControllerProfile
 ) -> Reading:
     """Read the job files of a program: the master and all parts it calls.
-
-    Args:
-        files: Content by what messages call the file.
-        robot: Whose program.
-        settings: Tool, user frame, and which jobs of the user's own may be called.
-        profile: The controller.
 
     Raises:
         InputError: If the files are no jobs, not those of one program, or of another robot.

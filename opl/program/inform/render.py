@@ -15,10 +15,10 @@ from opl.cell.robot import Robot
 from opl.errors import InputError, SettingError
 from opl.files import resources
 from opl.program.controller import ControllerProfile
-from opl.program.inform.check import find_faults
-from opl.program.inform.layout import JobLayout, Step, differences
-from opl.program.inform.motion import write_positions, write_speeds
+from opl.program.inform.faults import find_faults
+from opl.program.inform.job_layout import JobLayout, Step, differences
 from opl.program.inform.parse import parse
+from opl.program.inform.positions import write_positions, write_speeds
 from opl.program.inform.words import ACTIONS, require_accepted_action
 from opl.program.layout import fill
 from opl.program.moves import Move, Program
@@ -53,12 +53,7 @@ def render(
 ) -> str:
     """Return one job, line ends CR LF, all ASCII; the same arguments give the same bytes.
 
-    Args:
-        part: What the robot shall do, no longer than a job can be.
-        robot: Who shall do it.
-        settings: How the job is written.
-        profile: The controller.
-        date: Date of the job.
+    The part is no longer than a job can be.
 
     Raises:
         InputError: If the name, a number or a comment is not legal on the controller, or the
@@ -72,7 +67,7 @@ def render(
     faults = find_faults(text, profile) or tuple(differences(parse(text), layout))
     if faults:
         shown = [*faults[:_FAULTS_SHOWN], *(["..."] if len(faults) > _FAULTS_SHOWN else [])]
-        raise InputError(str(template), "\n".join(["does not give the job asked for:", *shown]))
+        raise InputError(str(template), "\n".join(["does not give the job it should:", *shown]))
     return text
 
 
@@ -112,7 +107,7 @@ def _steps(
     for move in part.moves:
         for action in move.actions:
             require_accepted_action(action, profile)
-    actions = ACTIONS.all_lines([move.actions for move in part.moves])
+    actions = ACTIONS.lines(move.actions for move in part.moves)
     rconfs = [None, *positions.rconfs]
     return tuple(
         Step(

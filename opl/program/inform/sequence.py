@@ -58,12 +58,7 @@ def first_job(jobs: Mapping[str, InformJob]) -> str:
 def visits(
     jobs: Mapping[str, InformJob], start: str, foreign: Collection[str]
 ) -> tuple[list[Visit], list[Finding]]:
-    """Return the moves in order, and what cannot be followed.
-
-    Args:
-        jobs: The jobs by name.
-        start: The one that is started.
-        foreign: Names of jobs that may be called without being given: the user's own.
+    """Return the moves in order, and what cannot be followed; foreign jobs are the user's own.
 
     Raises:
         InputError: If a job is called that is not there.

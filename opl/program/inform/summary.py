@@ -23,10 +23,6 @@ def describe(job: InformJob, robot: Robot) -> list[str]:
     Positions in pulses are shown as joint angles and as the pose of the flange in the base frame,
     Cartesian ones as the pose that the file gives. Those of tool 0 in the base frame are shown as
     joint angles too; what other tools and user frames are, only the controller knows.
-
-    Args:
-        job: The job.
-        robot: Whose job it is taken for.
     """
     return [*_summary(job), "", *_steps(job, robot)]
 

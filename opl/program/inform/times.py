@@ -27,12 +27,6 @@ def job_configurations(
     """Return the joint positions of the taught positions of a job in [rad], shape (n, 6).
 
     NaN stands for a position that no configuration within the limits, or more than one, belongs to.
-
-    Args:
-        job: The job.
-        robot: Whose job.
-        T_base_frame: The frame of its Cartesian positions.
-        T_flange_tool: Its tool.
     """
     scale = PulseScale.of(robot)
     q = np.full((len(job.positions), 6), np.nan)

@@ -14,7 +14,7 @@ ACTIONS = ActionTexts(
     wait=("WAIT IN#({number})={state}",),
     timed_wait=(
         "*WAIT{count}",
-        "WAIT IN#({number})={state} T={seconds:.2f}",
+        "WAIT IN#({number})={state} T={timeout:.2f}",
         "PAUSE IF IN#({number})={other}",
         "JUMP *WAIT{count} IF IN#({number})={other}",
     ),

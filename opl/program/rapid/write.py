@@ -38,10 +38,10 @@ DIALECT = Dialect(
         dwell="WaitTime {seconds:.2f};",
         wait=("WaitDI di{number}, {state};",),
         timed_wait=(
-            "WaitDI di{number}, {state}\\MaxTime:={seconds:.2f}\\TimeFlag:=late;",
+            "WaitDI di{number}, {state}\\MaxTime:={timeout:.2f}\\TimeFlag:=late;",
             "WHILE late DO",
             "Stop;",
-            "WaitDI di{number}, {state}\\MaxTime:={seconds:.2f}\\TimeFlag:=late;",
+            "WaitDI di{number}, {state}\\MaxTime:={timeout:.2f}\\TimeFlag:=late;",
             "ENDWHILE",
         ),
         call="{name};",

@@ -37,7 +37,7 @@ DIALECT = Dialect(
             "while get_standard_digital_in({number}) != {state}:",
             "sleep(0.01)",
             "waited = waited + 0.01",
-            "if waited >= {seconds:.2f}:",
+            "if waited >= {timeout:.2f}:",
             'popup("no signal at input {number}", blocking=True)',
             "waited = 0.0",
             "end",

@@ -9,7 +9,6 @@ from datetime import datetime
 from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import Array
 from opl.motion.motion import VerifiedMotion
-from opl.program.actions import Action
 from opl.program.cycle import cycle_time
 from opl.program.lines import with_straight_moves
 from opl.program.moves import START_SPEED, Kind, Move, Program, plan_moves
@@ -72,9 +71,9 @@ def write_program(
 
 
 def try_out(name: str, home: Array, robot: Robot, settings: ProgramSettings) -> None:
-    """Write a program that goes home only, with all that is asked for around the passes.
+    """Write a program that goes home only, with all actions around the passes.
 
-    Whatever the controller or the template does not take is so told before the long work of
+    What the controller or the template does not take is so refused before the long work of
     planning.
 
     Args:
@@ -86,17 +85,10 @@ def try_out(name: str, home: Array, robot: Robot, settings: ProgramSettings) -> 
     Raises:
         OplError: If the post refuses it.
     """
-    asked = settings.actions
-    actions: tuple[Action, ...] = (
-        *asked.at_start,
-        *asked.before_pass,
-        *asked.after_pass,
-        *asked.at_end,
-    )
     moves = tuple(
         Move(home, START_SPEED, exact_stop=True, on_wheel=False, motion_index=k, kind=kind)
         for k, kind in enumerate(Kind)
     )
-    last = replace(moves[-1], actions=actions)
+    last = replace(moves[-1], actions=settings.actions.every)
     program = Program(name, moves=(*moves[:-1], last))
     find_post(settings.controller).write(program, robot, settings, datetime(2000, 1, 1))

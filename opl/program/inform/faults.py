@@ -15,24 +15,10 @@ from opl.program.inform.parse import parse
 # Order in which controllers write the headers that occur once; the others hold for the positions
 # after them and stand among those.
 _HEADER_ORDER = (
-    "/JOB",
-    "//NAME",
-    "///FOLDERNAME",
-    "//POS",
-    "///NPOS",
-    "//ARGINFO",
-    "///ARGTYPE",
-    "///COMMENT",
-    "//INST",
-    "///DATE",
-    "///COMM",
-    "///ATTR",
-    "////FRAME",
-    "///GROUP1",
-    "///GROUP2",
-    "///GROUP3",
+    "/JOB", "//NAME", "///FOLDERNAME", "//POS", "///NPOS", "//ARGINFO", "///ARGTYPE", "///COMMENT",
+    "//INST", "///DATE", "///COMM", "///ATTR", "////FRAME", "///GROUP1", "///GROUP2", "///GROUP3",
     "///LVARS",
-)
+)  # fmt: skip
 _REQUIRED_HEADERS = ("//POS", "///NPOS", "//INST", "///DATE", "///ATTR")
 _DATE = re.compile(r"[0-9]{4}/[0-9]{2}/[0-9]{2} [0-9]{2}:[0-9]{2}")
 _NOT_PRINTABLE = re.compile(r"[^\t -~]")
@@ -42,12 +28,7 @@ _VARIABLE = re.compile(r"[A-Z]+(?:[0-9]+|\[.*\])")
 
 
 def find_faults(text: str, profile: ControllerProfile) -> tuple[str, ...]:
-    """Return what a controller would refuse or misread, one line each, empty if nothing.
-
-    Args:
-        text: A whole file.
-        profile: The controller.
-    """
+    """Return what a controller would refuse or misread in a whole file, one line each."""
     try:
         job = parse(text)
     except InputError as error:
