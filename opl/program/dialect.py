@@ -119,7 +119,7 @@ class ActionTexts:
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a language is written, as far as that is done the same way for all of them.
+    """How a language is written, as far as all of them are written alike.
 
     Attributes:
         maker: For messages.

@@ -27,7 +27,7 @@ def fixed(value: float, decimals: int) -> str:
 
 
 def within(values: Array, lower: Array, upper: Array, decimals: int) -> Array:
-    """Return values rounded to some decimals, inwards where a limit is in the way.
+    """Return values rounded to some decimals, inwards at a limit.
 
     Args:
         values: Any number of rows, shape (..., k).

@@ -52,7 +52,7 @@ def write_program(
         comments: Lines at the top.
 
     Raises:
-        OplError: If the controller does not take the program as the job asks for it.
+        OplError: If the controller does not take the program with the settings of the job.
     """
     post = find_post(settings.controller)
     program = plan_moves(

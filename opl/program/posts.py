@@ -78,7 +78,7 @@ class Reader:
 
 @dataclass(frozen=True)
 class Post:
-    """One way to write programs.
+    """How programs are written for one controller.
 
     Attributes:
         title: The controller, for people.

@@ -1,4 +1,4 @@
-"""What a job asks of its program, in SI units; the YAML keys are known in `opl.job.load` only."""
+"""The settings of a job for its program, in SI units; their keys are known in `opl.job` only."""
 
 from __future__ import annotations
 

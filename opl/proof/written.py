@@ -1,4 +1,4 @@
-"""Speeds, stops and ends of a written program against what its job asks for."""
+"""Speeds, stops and ends of a written program against those of its job."""
 
 from __future__ import annotations
 

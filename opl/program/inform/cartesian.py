@@ -1,4 +1,4 @@
-"""Cartesian positions of INFORM jobs: RECTAN values and RCONF, both ways.
+"""Cartesian positions of INFORM jobs: RECTAN values and RCONF, written and read.
 
 RCONF names one of the eight configurations of a pose: flip or not, upper or lower arm, front or
 rear, and whether R, T and S stand beyond half a turn. That flip is the configuration with B not

@@ -40,7 +40,7 @@ def write_jobs(
     """Return the job files of a program: one, or a master and the parts it calls.
 
     Raises:
-        InputError: If something the job asks for is not legal on the controller, the template is
+        InputError: If a setting of the job is not legal on the controller, the template is
             unusable, or a pulse ratio is neither verified nor accepted.
         UnsafeError: If a configuration is beyond the soft limits.
         OplError: If a pass has more moves than a job can hold, or cannot keep its time.
