@@ -15,7 +15,7 @@ from opl.cell.robot import Robot
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, fastest_law
 from opl.program.actions import Call, Dwell, WaitInput
-from opl.program.moves import CycleTime, Kind, Move, Program
+from opl.program.moves import CycleTime, Move, Program, Purpose
 from opl.program.settings import ProgramSettings
 
 
@@ -34,7 +34,7 @@ def cycle_time(
     Raises:
         UnsafeError: If the time law does not keep the joints' limits.
     """
-    spent = dict.fromkeys(Kind, 0.0)
+    spent = dict.fromkeys(Purpose, 0.0)
     ramps = 0.0
     for moves in _runs(program.moves):
         limits = JointLimits(robot.max_speed, _acceleration(moves[1:], robot, settings))
@@ -50,9 +50,9 @@ def cycle_time(
             spent[move.kind] += times.get(move.motion_index, float(time))
     actions = [action for move in program.moves for action in move.actions]
     return CycleTime(
-        passes=spent[Kind.WHEEL],
-        leads=spent[Kind.LEAD],
-        air=spent[Kind.AIR],
+        passes=spent[Purpose.WHEEL],
+        leads=spent[Purpose.LEAD],
+        air=spent[Purpose.AIR],
         waits=sum((one.seconds for one in actions if isinstance(one, Dwell)), 0.0),
         ramps=ramps,
         open_ended=any(isinstance(one, (WaitInput, Call)) for one in actions),

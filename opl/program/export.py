@@ -11,7 +11,7 @@ from opl.geometry.frames import Array
 from opl.motion.motion import VerifiedMotion
 from opl.program.cycle import cycle_time
 from opl.program.lines import with_straight_moves
-from opl.program.moves import START_SPEED, Kind, Move, Program, plan_moves
+from opl.program.moves import START_SPEED, Move, Program, Purpose, plan_moves
 from opl.program.posts import find_post
 from opl.program.pulses import PulseScale
 from opl.program.settings import MotionForm, ProgramSettings
@@ -31,7 +31,7 @@ class StraightLimit:
     tolerance: float
 
 
-def write_program(
+def export_program(
     verified: VerifiedMotion,
     name: str,
     robot: Robot,
@@ -87,7 +87,7 @@ def try_out(name: str, home: Array, robot: Robot, settings: ProgramSettings) -> 
     """
     moves = tuple(
         Move(home, START_SPEED, exact_stop=True, on_wheel=False, motion_index=k, kind=kind)
-        for k, kind in enumerate(Kind)
+        for k, kind in enumerate(Purpose)
     )
     last = replace(moves[-1], actions=settings.actions.every)
     program = Program(name, moves=(*moves[:-1], last))

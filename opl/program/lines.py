@@ -16,7 +16,7 @@ from opl.cell.full_turns import nearest_turn
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import Array, inverse, pose, transform
-from opl.program.moves import Kind, Program
+from opl.program.moves import Program, Purpose
 
 _BETWEEN = np.array([0.25, 0.5, 0.75])
 LINE_STEP = 1e-3  # [m] of the tool point between configurations on a line
@@ -42,7 +42,7 @@ def with_straight_moves(
     strays = stray(robot, np.array([move.q for move in program.moves]), T_flange_tool, corners)
     moves = [program.moves[0]] if program.moves else []
     for move, distance in zip(program.moves[1:], strays, strict=True):
-        straight = move.kind is not Kind.AIR and bool(distance <= tolerance)
+        straight = move.kind is not Purpose.AIR and bool(distance <= tolerance)
         moves.append(replace(move, straight=straight))
     return replace(program, moves=tuple(moves))
 

@@ -13,7 +13,7 @@ from opl.errors import InputError
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, roll_pitch_yaw
 from opl.program.digits import Rounding
-from opl.program.played import Corners, Reading, ReadMove, Speed, play
+from opl.program.played import Corners, Reading, ReadMove, WrittenSpeed, play
 from opl.program.posts import Reader
 from opl.program.settings import ProgramSettings
 from opl.program.statements import Listing
@@ -24,7 +24,7 @@ def listing_reader(
     parse: Callable[[str, str], Listing],
     tool_name: Callable[[ProgramSettings], str],
     rounded: Rounding,
-    start: Callable[[Robot], Speed],
+    start: Callable[[Robot], WrittenSpeed],
     corners: Corners,
 ) -> Reader:
     """Return the reader of a language whose programs are listings of one file.

@@ -32,7 +32,7 @@ SAME_CONFIGURATION = 1e-6
 OVERSPEED = 1e-4
 
 
-class Kind(str, Enum):
+class Purpose(str, Enum):
     """What a move is for."""
 
     WHEEL = "on_wheel"  # grinding
@@ -40,7 +40,7 @@ class Kind(str, Enum):
     AIR = "air"  # from and to home, and between passes
 
     @classmethod
-    def of(cls, phase: Phase) -> Kind:
+    def of(cls, phase: Phase) -> Purpose:
         """Return the kind of a move by what happens during it."""
         return {Phase.GRINDING: cls.WHEEL, Phase.FREE: cls.AIR}.get(phase, cls.LEAD)
 
@@ -70,7 +70,7 @@ class Move:
     on_wheel: bool
     motion_index: int
     duration: float | None = None
-    kind: Kind = Kind.AIR
+    kind: Purpose = Purpose.AIR
     ground_pass: int | None = None
     straight: bool = False
     comment: str | None = None
@@ -207,7 +207,7 @@ def plan_moves(
                 on_wheel=bool(on_wheel[m]),
                 motion_index=int(configuration),
                 duration=times[m] if m else None,
-                kind=Kind.of(phase),
+                kind=Purpose.of(phase),
                 ground_pass=pass_here if phase is Phase.GRINDING else None,
                 comment=comment if pass_here != pass_before else None,
                 actions=done_there.get(m, ()),

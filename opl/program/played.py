@@ -22,7 +22,7 @@ from opl.cell.robot import Robot, forward_kinematics
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, inverse, rotation_angle
 from opl.program.lines import straight_configurations
-from opl.program.moves import Kind
+from opl.program.moves import Purpose
 
 # How far beyond a quarter turn an axis may be where the file names its neighbour [rad]: digits.
 _QUARTER_SLACK = np.deg2rad(0.01)
@@ -39,7 +39,7 @@ class SpeedUnit(Enum):
 
 
 @dataclass(frozen=True)
-class Speed:
+class WrittenSpeed:
     """The speed of a move as written.
 
     Attributes:
@@ -80,7 +80,7 @@ class Corners:
     lead: Corner
     air: Corner
 
-    def of(self, kind: Kind) -> Corner:
+    def of(self, kind: Purpose) -> Corner:
         """Return the largest corner after a move of a kind."""
         corner: Corner = getattr(self, kind.value)
         return corner
@@ -109,7 +109,7 @@ class ReadMove:
 
     target: Array
     straight: bool
-    speed: Speed
+    speed: WrittenSpeed
     corner: Corner
     tool: str
     place: str
@@ -218,7 +218,9 @@ def _faults(move: ReadMove, end: Array | None) -> Iterator[Finding]:
             yield _fault(move, "the quarter turns of its axes are not those of its pose")
 
 
-def move_time(speed: Speed, start: Array, end: Array, robot: Robot, T_flange_tool: Array) -> float:
+def move_time(
+    speed: WrittenSpeed, start: Array, end: Array, robot: Robot, T_flange_tool: Array
+) -> float:
     """Return the time of a move in [s], ramps left out."""
     if speed.unit is SpeedUnit.SECONDS:
         return speed.value

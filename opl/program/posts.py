@@ -23,7 +23,7 @@ from opl.cell.robot import Robot
 from opl.errors import InputError, PassTimeError, SettingError
 from opl.geometry.frames import Array
 from opl.program.moves import PassTime, Program
-from opl.program.played import Corners, Reading, Speed
+from opl.program.played import Corners, Reading, WrittenSpeed
 from opl.program.settings import ProgramSettings
 
 GROUP = "opl.posts"
@@ -70,7 +70,7 @@ class Reader:
     suffix: str
     read: Callable[[Mapping[str, bytes], Robot, ProgramSettings], Reading]
     rounded: Callable[[Array, Robot, ProgramSettings], Array]
-    start: Callable[[Robot], Speed]
+    start: Callable[[Robot], WrittenSpeed]
     corners: Callable[[ProgramSettings], Corners]
     describe: Callable[[str, bytes, Robot], list[str]]
     differences: Callable[[tuple[str, bytes], tuple[str, bytes]], list[str]]

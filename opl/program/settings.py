@@ -10,7 +10,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.program.actions import NO_ACTIONS, Actions
-from opl.program.moves import Kind
+from opl.program.moves import Purpose
 
 
 class MotionForm(str, Enum):
@@ -56,7 +56,7 @@ class ByKind:
     lead: int | None = None
     air: int | None = None
 
-    def of(self, kind: Kind) -> int | None:
+    def of(self, kind: Purpose) -> int | None:
         """Return the number for a kind of move."""
         number: int | None = getattr(self, kind.value)
         return number

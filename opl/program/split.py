@@ -6,7 +6,7 @@ import hashlib
 from dataclasses import replace
 
 from opl.errors import OplError
-from opl.program.moves import START_SPEED, Kind, Move, Program
+from opl.program.moves import START_SPEED, Move, Program, Purpose
 
 _LETTERS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 _MARK_LENGTH = 3
@@ -94,7 +94,7 @@ def _entry(move: Move) -> Move:
         speed=START_SPEED,
         exact_stop=True,
         duration=None,
-        kind=Kind.AIR,
+        kind=Purpose.AIR,
         ground_pass=None,
         straight=False,
         comment="START OF PART",

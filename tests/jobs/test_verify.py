@@ -18,7 +18,7 @@ from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.job.load import load_job
 from opl.program.inform.parse import decode, read_jobs
-from opl.program.inform.playback import play
+from opl.program.inform.playback import play_jobs
 from opl.program.inform.post import write_jobs
 from opl.program.profiles import DX200
 from opl.program.pulses import PulseScale
@@ -308,7 +308,7 @@ def test_a_limit_crossed_between_two_points_is_found(tmp_path):
     program.write_bytes(text.text.encode("ascii"))
     job = load_job(planned() / "job.yaml")
     (read,) = read_jobs(decode(program.read_bytes())[0])
-    playback, _ = play({read.name: read}, job.cell.robot, job.program)
+    playback, _ = play_jobs({read.name: read}, job.cell.robot, job.program)
     end = int(playback.stations[1])
     way = playback.q[: end + 1]
     rest = np.concatenate([playback.q[:1], playback.q[end:]])

@@ -9,7 +9,7 @@ from opl.cell.robot import forward_kinematics
 from opl.errors import InputError, UnsafeError
 from opl.geometry.frames import from_roll_pitch_yaw, pose
 from opl.program.inform import parse, write_jobs
-from opl.program.inform.cartesian import configurations, pose_of, rconf_of
+from opl.program.inform.cartesian import configurations, rconf_of, rectan_pose
 from opl.program.inform.times import job_configurations
 from opl.program.moves import Move, Program, plan_moves
 from opl.program.profiles import DX200, NX100
@@ -68,7 +68,7 @@ def test_cartesian_job_leads_to_the_configurations_it_was_made_of(form, profile)
     job = parse(write(q, profile, positions=form, user_frame=frame))
     seen = job_configurations(job, ROBOT, T_base_frame, T_FLANGE_TOOL)
     np.testing.assert_allclose(seen, q, atol=4e-4 if profile is NX100 else 4e-6)
-    written = T_base_frame @ pose_of(job.positions[3].values)
+    written = T_base_frame @ rectan_pose(job.positions[3].values)
     np.testing.assert_allclose(
         written[:3, 3], (forward_kinematics(ROBOT, q[3]) @ T_FLANGE_TOOL)[:3, 3], atol=1e-6
     )

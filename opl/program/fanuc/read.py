@@ -15,7 +15,7 @@ import numpy as np
 
 from opl.program.fanuc.rounding import DECIMALS, from_fanuc
 from opl.program.moves import START_SPEED
-from opl.program.played import Corner, Corners, ReadMove, Speed, SpeedUnit
+from opl.program.played import Corner, Corners, ReadMove, SpeedUnit, WrittenSpeed
 from opl.program.statements import NUMBER, Listing, Notes, Words, code_lines
 
 _STATE = "(?:ON|OFF)"
@@ -41,7 +41,7 @@ _POSITION = re.compile(
 )
 _GROUP = re.compile(r"DEFAULT_GROUP ?= ?(.*);")
 _HALF_DIGIT = 0.5 * np.deg2rad(10.0**-DECIMALS) * np.array([1.0, 1.0, 2.0, 1.0, 1.0, 1.0])
-START = Speed(SpeedUnit.TOP_SPEED, START_SPEED, f"{100.0 * START_SPEED:.0f}%")
+START = WrittenSpeed(SpeedUnit.TOP_SPEED, START_SPEED, f"{100.0 * START_SPEED:.0f}%")
 _CNT = Corner(100.0, "CNT100")
 CORNERS = Corners(Corner(0.0, "FINE"), _CNT, _CNT, _CNT)
 
@@ -175,7 +175,7 @@ class _Body:
             move = ReadMove(
                 target=from_fanuc(axes),
                 straight=word == "L",
-                speed=Speed(counts, value, speed + unit),
+                speed=WrittenSpeed(counts, value, speed + unit),
                 corner=Corner(0.0 if end == "FINE" else float(end[3:]) or 1.0, end),
                 tool=position.tool,
                 place=notes.place(line),

@@ -48,7 +48,7 @@ def rectan(Ts_frame_tool: Array, profile: ControllerProfile) -> list[str]:
     ]
 
 
-def pose_of(values: tuple[float, ...]) -> Array:
+def rectan_pose(values: tuple[float, ...]) -> Array:
     """Return the pose of RECTAN values, T_frame_tool, shape (4, 4)."""
     return from_roll_pitch_yaw(np.deg2rad(values[3:6]), np.array(values[:3]) * 1e-3)
 
@@ -105,7 +105,7 @@ def require_read_back(robot: Robot, q: Array, values: str, numbers: tuple[int, .
     for joint in _HALF_TURN_JOINTS:
         if abs(abs(q[joint]) - np.pi) < _HALF_TURN_WIDTH:
             raise _ambiguous(robot, q, joint, "its other half turn")
-    T_frame_tool = pose_of(tuple(float(value) for value in values.split(",")))
+    T_frame_tool = rectan_pose(tuple(float(value) for value in values.split(",")))
     T_base_flange = T_base_frame @ T_frame_tool @ inverse(T_flange_tool)
     found = configurations(robot, T_base_flange, numbers, q)
     for other in found:

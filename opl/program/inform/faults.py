@@ -27,7 +27,7 @@ _SIGNAL = re.compile(r"\b(IN|OT)#\(([0-9]{1,9})\)")
 _VARIABLE = re.compile(r"[A-Z]+(?:[0-9]+|\[.*\])")
 
 
-def find_faults(text: str, profile: ControllerProfile) -> tuple[str, ...]:
+def job_faults(text: str, profile: ControllerProfile) -> tuple[str, ...]:
     """Return what a controller would refuse or misread in a whole file, one line each."""
     try:
         job = parse(text)

@@ -37,7 +37,7 @@ VARIABLES = {
 
 
 @dataclass(frozen=True)
-class Step:
+class JobStep:
     """A position and the move to it, as texts; see `VARIABLES`."""
 
     label: str
@@ -70,7 +70,7 @@ class JobLayout:
     date: str
     title: str | None
     comments: tuple[str, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[JobStep, ...]
     calls: tuple[str, ...]
 
     def values(self) -> dict[str, object]:

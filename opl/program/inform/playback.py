@@ -14,16 +14,17 @@ from opl.program.inform.job import InformJob
 from opl.program.inform.sequence import Visit, first_job, visits
 from opl.program.inform.times import job_configurations, written_speed
 from opl.program.moves import SAME_CONFIGURATION, START_SPEED
-from opl.program.played import Corner, Corners, Playback, ReadMove, Speed, SpeedUnit
-from opl.program.played import play as play_moves
+from opl.program.played import Corner, Corners, Playback, ReadMove, SpeedUnit, WrittenSpeed, play
 from opl.program.pulses import PulseScale
 from opl.program.settings import ProgramSettings
 
+# The fastest first move of a job.
+START = WrittenSpeed(SpeedUnit.TOP_SPEED, START_SPEED, f"VJ={100.0 * START_SPEED:.2f}")
 # Instructions at which the robot stands still.
 _WAITS = ("TIMER", "WAIT", "PAUSE", "CALL")
 
 
-def play(
+def play_jobs(
     jobs: Mapping[str, InformJob],
     robot: Robot,
     settings: ProgramSettings,
@@ -57,16 +58,10 @@ def play(
             )
         )
         before = visit.job
-    playback, doubtful = play_moves(moves, robot, settings.T_flange_tool)
+    playback, doubtful = play(moves, robot, settings.T_flange_tool)
     if not found:
         return playback, doubtful
     return None, [*found, *(doubtful if moves else [])]
-
-
-def start_speed(robot: Robot) -> Speed:
-    """Return the fastest first move of a job."""
-    text = f"VJ={100.0 * START_SPEED:.2f}"
-    return Speed(SpeedUnit.TOP_SPEED, START_SPEED, text)
 
 
 def corners(settings: ProgramSettings) -> Corners:

@@ -62,7 +62,9 @@ def write_positions(
     return WrittenPositions(tuple(values), tuple(written), np.array(read_back).reshape(-1, 6))
 
 
-def rounded(q: Array, robot: Robot, settings: ProgramSettings, profile: ControllerProfile) -> Array:
+def rounded_to_job(
+    q: Array, robot: Robot, settings: ProgramSettings, profile: ControllerProfile
+) -> Array:
     """Return the configurations nearest to some that a job can express, shape (n, 6) in [rad].
 
     Pulses are whole, poses have few digits. A joint at its limit is rounded inwards.

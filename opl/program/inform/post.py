@@ -13,12 +13,12 @@ from opl.findings import Finding, Level
 from opl.program.controller import ControllerProfile
 from opl.program.inform.cartesian import frame_pose
 from opl.program.inform.compare import differences_in_meaning
-from opl.program.inform.faults import find_faults
+from opl.program.inform.faults import job_faults
 from opl.program.inform.job import InformJob
 from opl.program.inform.job_layout import VARIABLES
 from opl.program.inform.parse import decode, parse, read_jobs, unparse
-from opl.program.inform.playback import corners, play, start_speed
-from opl.program.inform.positions import rounded
+from opl.program.inform.playback import START, corners, play_jobs
+from opl.program.inform.positions import rounded_to_job
 from opl.program.inform.render import FILE_SUFFIX, TEMPLATE, render, split_for
 from opl.program.inform.summary import describe
 from opl.program.inform.times import move_times, written_speed
@@ -68,7 +68,7 @@ def write_jobs(
     return Written(files, speeds, times, pass_times(program, times, profile.name))
 
 
-def read(
+def _read(
     files: Mapping[str, bytes], robot: Robot, settings: ProgramSettings, profile: ControllerProfile
 ) -> Reading:
     """Read the job files of a program: the master and all parts it calls.
@@ -85,9 +85,9 @@ def read(
             if job.name in jobs:
                 raise InputError(source, f"a job {job.name} was given before")
             jobs[job.name] = job
-            faults = find_faults(text if len(several) == 1 else unparse(job), profile)
+            faults = job_faults(text if len(several) == 1 else unparse(job), profile)
             refused += [Finding(Level.ERROR, "file", source, fault) for fault in faults]
-    playback, doubtful = play(jobs, robot, settings)
+    playback, doubtful = play_jobs(jobs, robot, settings)
     foreign = sorted({name for job in jobs.values() for name in job.calls} - jobs.keys())
     return Reading(playback, tuple(foreign), (*refused, *doubtful))
 
@@ -121,9 +121,9 @@ def post_of(profile: ControllerProfile) -> Post:
     """Return the post of a controller."""
     reader = Reader(
         FILE_SUFFIX,
-        lambda files, robot, settings: read(files, robot, settings, profile),
-        lambda q, robot, settings: rounded(q, robot, settings, profile),
-        start_speed,
+        lambda files, robot, settings: _read(files, robot, settings, profile),
+        lambda q, robot, settings: rounded_to_job(q, robot, settings, profile),
+        lambda robot: START,
         corners,
         describe_file,
         file_differences,

@@ -15,8 +15,8 @@ from opl.cell.robot import Robot
 from opl.errors import InputError, SettingError
 from opl.files import resources
 from opl.program.controller import ControllerProfile
-from opl.program.inform.faults import find_faults
-from opl.program.inform.job_layout import JobLayout, Step, differences
+from opl.program.inform.faults import job_faults
+from opl.program.inform.job_layout import JobLayout, JobStep, differences
 from opl.program.inform.parse import parse
 from opl.program.inform.positions import write_positions, write_speeds
 from opl.program.inform.words import ACTIONS, require_accepted_action
@@ -64,7 +64,7 @@ def render(
     _require_legal(layout, settings, profile)
     template: Path = settings.template or TEMPLATE
     text = fill(template, layout.values()).replace("\n", "\r\n")
-    faults = find_faults(text, profile) or tuple(differences(parse(text), layout))
+    faults = job_faults(text, profile) or tuple(differences(parse(text), layout))
     if faults:
         shown = [*faults[:_FAULTS_SHOWN], *(["..."] if len(faults) > _FAULTS_SHOWN else [])]
         raise InputError(str(template), "\n".join(["does not give the job it should:", *shown]))
@@ -101,7 +101,7 @@ def _layout(
 
 def _steps(
     part: Program, robot: Robot, settings: ProgramSettings, profile: ControllerProfile
-) -> tuple[Step, ...]:
+) -> tuple[JobStep, ...]:
     positions = write_positions(part, robot, settings, profile)
     speeds = write_speeds(part, positions.q, robot, settings.T_flange_tool, profile)
     for move in part.moves:
@@ -110,7 +110,7 @@ def _steps(
     actions = ACTIONS.lines(move.actions for move in part.moves)
     rconfs = [None, *positions.rconfs]
     return tuple(
-        Step(
+        JobStep(
             label=f"C{number:0{profile.label_digits}d}",
             values=positions.values[number],
             rconf=rconfs[number + 1] if rconfs[number + 1] != rconfs[number] else None,

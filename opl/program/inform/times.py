@@ -8,9 +8,9 @@ import numpy as np
 
 from opl.cell.robot import Robot
 from opl.geometry.frames import Array, inverse
-from opl.program.inform.cartesian import configurations, pose_of
+from opl.program.inform.cartesian import configurations, rectan_pose
 from opl.program.inform.job import InformJob, Instruction
-from opl.program.played import Speed, SpeedUnit, move_time
+from opl.program.played import SpeedUnit, WrittenSpeed, move_time
 from opl.program.pulses import PulseScale
 
 # What the number of each speed is multiplied by to be in SI.
@@ -36,18 +36,18 @@ def job_configurations(
         if position.coordinates == "PULSE":
             q[k] = scale.to_angles(np.array(position.values[:6]))
         elif position.coordinates == "RECTAN" and len(position.rconf) >= 6:
-            T_base_flange = T_base_frame @ pose_of(position.values) @ inverse(T_flange_tool)
+            T_base_flange = T_base_frame @ rectan_pose(position.values) @ inverse(T_flange_tool)
             found = configurations(robot, T_base_flange, position.rconf)
             if len(found) == 1:
                 q[k] = found[0]
     return q
 
 
-def written_speed(move: Instruction) -> Speed:
+def written_speed(move: Instruction) -> WrittenSpeed:
     """Return the one speed of a move, VJ, V or VR."""
     tag, value = next((name, value) for name, value in move.tags if name in _UNITS)
     unit, factor = _UNITS[tag]
-    return Speed(unit, factor * float(value), f"{tag}={value}")
+    return WrittenSpeed(unit, factor * float(value), f"{tag}={value}")
 
 
 def move_times(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool: Array) -> Array:

@@ -16,11 +16,11 @@ from scipy.spatial.transform import Rotation
 
 from opl.geometry.frames import pose
 from opl.program.moves import START_SPEED
-from opl.program.played import Corner, Corners, ReadMove, Speed, SpeedUnit
+from opl.program.played import Corner, Corners, ReadMove, SpeedUnit, WrittenSpeed
 from opl.program.statements import NUMBER, Listing, Notes, Words, read_enclosed
 
 DECIMALS = 4
-START = Speed(SpeedUnit.TOP_SPEED, START_SPEED, f"BAS(#VEL_PTP, {100.0 * START_SPEED:.0f})")
+START = WrittenSpeed(SpeedUnit.TOP_SPEED, START_SPEED, f"BAS(#VEL_PTP, {100.0 * START_SPEED:.0f})")
 # Approximation as opl sets it: percent of C_PTP, and distance of C_DIS in [mm].
 _PTP_CORNER, _LIN_CORNER = 1.0, 0.5
 _STOP = Corner(0.0, "exact stop")
@@ -106,7 +106,7 @@ def _ptp(state: Mapping[str, str], values: list[float], rounds: bool, place: str
     return ReadMove(
         target=np.deg2rad(values),
         straight=False,
-        speed=Speed(SpeedUnit.TOP_SPEED, percent / 100.0, f"BAS(#VEL_PTP, {percent})"),
+        speed=WrittenSpeed(SpeedUnit.TOP_SPEED, percent / 100.0, f"BAS(#VEL_PTP, {percent})"),
         corner=_corner(rounds, f"C_PTP with {_CPTP} = {state[_CPTP]}", state[_CPTP], _PTP_CORNER),
         tool=state[_TOOL],
         place=place,
@@ -120,7 +120,9 @@ def _lin(state: Mapping[str, str], values: list[float], rounds: bool, place: str
     return ReadMove(
         target=pose(turned, np.array(values[:3]) * 1e-3),
         straight=True,
-        speed=Speed(SpeedUnit.TOOL_POINT, float(state[_METRES]), f"{_METRES} = {state[_METRES]}"),
+        speed=WrittenSpeed(
+            SpeedUnit.TOOL_POINT, float(state[_METRES]), f"{_METRES} = {state[_METRES]}"
+        ),
         corner=_corner(rounds, f"C_DIS with {_CDIS} = {state[_CDIS]}", state[_CDIS], _LIN_CORNER),
         tool=state[_TOOL],
         place=place,

@@ -12,12 +12,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from opl.geometry.frames import pose
-from opl.program.played import Corner, Corners, ReadMove, Speed, SpeedUnit
+from opl.program.played import Corner, Corners, ReadMove, SpeedUnit, WrittenSpeed
 from opl.program.statements import NUMBER, Listing, Notes, Words, code_lines
 
 DECIMALS = 4
 # Of the move to the first configuration, which has no time.
-START = Speed(SpeedUnit.TOOL_POINT, 0.05, "v50")
+START = WrittenSpeed(SpeedUnit.TOOL_POINT, 0.05, "v50")
 _FINEST_ZONE = 0.3  # z0 in [mm] of the tool point; the others are named after theirs
 _ZONE = Corner(_FINEST_ZONE, "z0")
 CORNERS = Corners(Corner(0.0, "fine"), _ZONE, _ZONE, _ZONE)
@@ -105,9 +105,9 @@ def _statement(notes: Notes, line: int, code: str, free: bool) -> None:
     if time is None:
         if notes.begun:
             notes.doubt(line, "a move after the first one needs its time (argument T)")
-        speed = Speed(SpeedUnit.TOOL_POINT, float(v) * 1e-3, f"v{v}")
+        speed = WrittenSpeed(SpeedUnit.TOOL_POINT, float(v) * 1e-3, f"v{v}")
     else:
-        speed = Speed(SpeedUnit.SECONDS, float(time), f"\\T:={time}")
+        speed = WrittenSpeed(SpeedUnit.SECONDS, float(time), f"\\T:={time}")
     zone = zone.lower()
     move = ReadMove(
         target=target,

@@ -11,7 +11,7 @@ import numpy as np
 
 from opl.cell.robot import Robot
 from opl.program.moves import START_SPEED
-from opl.program.played import Corner, Corners, ReadMove, Speed, SpeedUnit
+from opl.program.played import Corner, Corners, ReadMove, SpeedUnit, WrittenSpeed
 from opl.program.statements import NUMBER, Listing, Notes, Words, read_enclosed
 
 DECIMALS = 6
@@ -76,9 +76,9 @@ def _move(notes: Notes, line: int, found: re.Match[str], tool: str | None) -> Re
     if time is None and notes.begun:
         notes.doubt(line, "a move after the first one needs its time (t)")
     speed = (
-        Speed(SpeedUnit.LEADING_JOINT, float(velocity), f"v={velocity}")
+        WrittenSpeed(SpeedUnit.LEADING_JOINT, float(velocity), f"v={velocity}")
         if time is None
-        else Speed(SpeedUnit.SECONDS, float(time), f"t={time}")
+        else WrittenSpeed(SpeedUnit.SECONDS, float(time), f"t={time}")
     )
     return ReadMove(
         target=np.array([float(joint) for joint in joints.split(",")]),
@@ -91,7 +91,7 @@ def _move(notes: Notes, line: int, found: re.Match[str], tool: str | None) -> Re
     )
 
 
-def start_speed(robot: Robot) -> Speed:
+def start_speed(robot: Robot) -> WrittenSpeed:
     """Return the fastest first move."""
     text = f"{START_SPEED * robot.max_speed.min():.4f}"
-    return Speed(SpeedUnit.LEADING_JOINT, float(text), f"v={text}")
+    return WrittenSpeed(SpeedUnit.LEADING_JOINT, float(text), f"v={text}")
