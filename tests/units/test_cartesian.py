@@ -115,6 +115,6 @@ def test_meaning_of_flip_nobody_has_seen_is_said_in_the_job():
 
 @pytest.mark.parametrize(("number", "profile"), [(64, DX200), (25, NX100)])
 def test_user_frame_the_controller_does_not_have_is_refused(number, profile):
-    with pytest.raises(InputError, match=r"user_frame.number: must be 1 to"):
+    with pytest.raises(InputError, match=r"user_frame: must be 1 to"):
         write(verified_motion().motion.q[0], profile, positions=PositionForm.USER,
               user_frame=UserFrame(number, T_BASE_USER))  # fmt: skip
