@@ -31,6 +31,15 @@ class InputError(OplError):
         self.message = message
 
 
+class SettingError(InputError):
+    """A setting of a job is unusable; the room that finds it knows its name, not its key.
+
+    Args:
+        where: The setting by its name in Python, e.g. ``user_frame``.
+        message: The value seen and the values allowed.
+    """
+
+
 class NoPathError(OplError):
     """No track satisfies reach, limits, continuity and freedom from collision.
 
@@ -55,6 +64,14 @@ class UnsafeError(OplError):
     """A motion was planned but could not be proven safe, so no program was written."""
 
     exit_status = 4
+
+
+class TimeLawError(UnsafeError):
+    """No time law keeps the speeds and accelerations of the joints."""
+
+
+class PassTimeError(OplError):
+    """A pass cannot be written so that it keeps its time."""
 
 
 class Cancelled(OplError):

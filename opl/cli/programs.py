@@ -79,7 +79,7 @@ def template_vars(controller: str | None) -> None:
     Example: opl templates vars DX200
     """
     for name in opl.known_posts() if controller is None else [controller]:
-        post = opl.find_post(name, "controller")
+        post = opl.find_post(name)
         click.echo(f"{name}: {post.title}, layout {post.template}")
         width = max(len(variable) for variable in post.variables)
         for variable, meaning in post.variables.items():

@@ -38,6 +38,14 @@ PROCESS_CONTACT_SPEED = "process.max_contact_speed"
 PROCESS_MAX_DWELL = "process.max_dwell_s"
 PROCESS_MAX_ACCELERATION = "process.max_acceleration_deg_s2"
 
+# by the setting that a `SettingError` names
+OF_PROGRAM = {
+    "controller": "program.controller",
+    "tool": "program.tool",
+    "user_frame": "program.user_frame.number",
+    "accepted_pulses": "program.accept_unverified_pulses",
+    "pulses_per_radian": "program.pulse_ratios",
+}
 PROGRAM_CONTROLLER = "program.controller"
 PROGRAM_MOTION = "program.motion"
 PROGRAM_PULSE_RATIOS = "program.pulse_ratios"

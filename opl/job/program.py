@@ -9,18 +9,18 @@ from pydantic import ConfigDict, Field, model_validator
 
 from opl.cell.robot import Robot
 from opl.cell.spherical_wrist import SphericalWristArm
-from opl.errors import InputError, OplError
+from opl.errors import InputError, OplError, SettingError
 from opl.files.documents import Document
 from opl.geometry.frames import Array
 from opl.job.actions import ActionSection
 from opl.job.bodies import Matrix, pose_of
+from opl.job.refusals import keys_named
 from opl.job.source import Source
 from opl.program.actions import Actions
+from opl.program.export import try_out
 from opl.program.posts import Post, find_post, known_posts
-from opl.program.pulses import require_accepted, require_known
 from opl.program.ratios import with_ratios
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
-from opl.program.write import try_out
 
 _MAY_COUNT_PULSES = ("Yaskawa", "unknown")  # makers
 
@@ -175,21 +175,19 @@ class ProgramSection(Document):
         Raises:
             InputError: If something in it is unknown, or the controller does not take it.
         """
-        post = find_post(self.controller, source.at("program.controller"))
-        self._require_possible(source, post, robot)
-        where = source.at("program.accept_unverified_pulses")
-        for joint in self.accept_unverified_pulses:
-            if joint not in robot.joint_names:
-                known = ", ".join(robot.joint_names)
-                raise InputError(where, f"no such joint {joint!r}; have: {known}")
-        if post.counts_pulses and self.positions == "pulses":
-            require_known(robot, source.at("program.pulse_ratios"))
-            require_accepted(robot.unverified_pulses, self.accept_unverified_pulses, where)
-        settings = self._settings(source)
-        try:
-            try_out(name, home, robot, settings)
-        except OplError as error:
-            raise InputError(source.label, str(error)) from error
+        with keys_named(source):
+            self._require_possible(source, find_post(self.controller), robot)
+            for joint in self.accept_unverified_pulses:
+                if joint not in robot.joint_names:
+                    known = ", ".join(robot.joint_names)
+                    raise SettingError("accepted_pulses", f"no such joint {joint!r}; have: {known}")
+            settings = self._settings(source)
+            try:
+                try_out(name, home, robot, settings)
+            except SettingError:
+                raise
+            except OplError as error:
+                raise InputError(source.label, str(error)) from error
         return settings
 
     def _settings(self, source: Source) -> ProgramSettings:

@@ -1,11 +1,47 @@
-"""Refusals of a planned path in words that name the keys of the job."""
+"""Refusals of the rooms below, which know no keys, in words that name the keys of the job."""
 
 from __future__ import annotations
 
-from opl.errors import NoPathError
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from opl.errors import (
+    InputError,
+    NoPathError,
+    OplError,
+    PassTimeError,
+    SettingError,
+    TimeLawError,
+    UnsafeError,
+)
 from opl.job import keys
+from opl.job.source import Source
 from opl.motion.feed import SlowStretch
 from opl.motion.process_settings import ProcessSettings
+
+
+@contextmanager
+def keys_named(source: Source) -> Iterator[None]:
+    """Name file and keys in what is refused while a motion is timed or a program is written.
+
+    Args:
+        source: The job file or mapping.
+
+    Raises:
+        InputError: Instead of a `SettingError`.
+        OplError: Instead of a `PassTimeError`; names the keys that help.
+        UnsafeError: Instead of a `TimeLawError`; names the key that helps.
+    """
+    try:
+        yield
+    except SettingError as error:
+        raise InputError(source.at(keys.OF_PROGRAM[error.where]), error.message) from error
+    except PassTimeError as error:
+        advice = f"raise {keys.PROCESS_FEED}, or write {keys.PROGRAM_MOTION}: straight"
+        raise OplError(f"{error}; {advice}") from error
+    except TimeLawError as error:
+        advice = f"raise {keys.PROCESS_MAX_ACCELERATION} if the robot can do more"
+        raise UnsafeError(f"{error}; {advice}") from error
 
 
 def dwell_refusal(

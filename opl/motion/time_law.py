@@ -17,7 +17,7 @@ from toppra.algorithm import TOPPRA
 from toppra.constraint import LinearConstraint
 from toppra.interpolator import AbstractGeometricPath
 
-from opl.errors import UnsafeError
+from opl.errors import TimeLawError, UnsafeError
 from opl.geometry.frames import Array
 from opl.motion.rounded import SAME_PLACE, RoundedLine
 
@@ -174,10 +174,7 @@ def _path_speed(
         else:
             return path_speed
         if around >= last:
-            raise UnsafeError(
-                "no time law keeps the joints' speeds and accelerations; raise "
-                "process.max_acceleration_deg_s2 if the robot can do more"
-            )
+            raise TimeLawError("no time law keeps the joints' speeds and accelerations")
         around = min(4 * around, last)
 
 

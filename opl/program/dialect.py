@@ -1,27 +1,26 @@
 """What the writers of RAPID, KRL, FANUC and UR programs share: steps as texts, templates, times.
 
 A template may lay a program out anew; that no move or action got lost or changed is seen from the
-text, whatever the language (`Dialect.render`). What the program does then is for its reader.
+text, whatever the language. What the program does then is for its reader.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.errors import InputError
-from opl.program.actions import Action, Remark
+from opl.geometry.frames import Array
+from opl.program.actions import Action, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.layout import fill
 from opl.program.moves import Move, Program
 from opl.program.posts import Written, pass_times
 from opl.program.settings import ProgramSettings
-
-Array = NDArray[np.float64]
 
 # Name and meaning of what the templates of all these languages get.
 VARIABLES = {
@@ -60,31 +59,136 @@ class Step:
 
 
 @dataclass(frozen=True)
+class ActionTexts:
+    """How a language writes actions: texts in whose braces stands what differs.
+
+    The fields of the action, ``state`` in words, and the ``other`` state. Of a timed wait besides
+    ``hundredths`` and ``thousandths`` of a second, and for labels the ``count`` of such waits so
+    far and three numbers ``first``, ``second``, ``third`` of its own.
+
+    Attributes:
+        states: A signal that is off, and one that is on.
+        output: Switches an output.
+        dwell: Stands still.
+        wait: Waits for an input.
+        timed_wait: The same, and pauses when it takes too long. Started again by a person, it waits
+            again instead of going on without the signal.
+        call: Calls a program.
+        remark: A line for people.
+    """
+
+    states: tuple[str, str]
+    output: str
+    dwell: str
+    wait: tuple[str, ...]
+    timed_wait: tuple[str, ...]
+    call: str
+    remark: str
+
+    def lines(self, groups: Iterable[Sequence[Action]]) -> list[tuple[str, ...]]:
+        """Return the instructions of each group of actions of one program, in order."""
+        count, found = 0, []
+        for group in groups:
+            lines: list[str] = []
+            for action in group:
+                count += getattr(action, "timeout", None) is not None
+                lines += self._texts(action, count)
+            found.append(tuple(lines))
+        return found
+
+    def _texts(self, action: Action, count: int) -> Iterator[str]:
+        values = dict(vars(action))
+        texts = {
+            SetOutput: [self.output],
+            Dwell: [self.dwell],
+            WaitInput: self.wait,
+            Call: [self.call],
+            Remark: [self.remark],
+        }[type(action)]
+        if isinstance(action, (SetOutput, WaitInput)):
+            values["state"] = self.states[action.state]
+            values["other"] = self.states[not action.state]
+        if isinstance(action, WaitInput) and action.timeout is not None:
+            texts = self.timed_wait
+            values["hundredths"] = round(action.timeout * 100)
+            values["thousandths"] = round(action.timeout * 1000)
+            values |= {"count": count, "third": 3 * count}
+            values |= {"first": 3 * count - 2, "second": 3 * count - 1}
+        return (text.format(**values) for text in texts)
+
+
+@dataclass(frozen=True)
 class Dialect:
-    """The rules of a language that are checked the same way for all of them.
+    """How a language is written, as far as all of them are written alike.
 
     Attributes:
         maker: For messages.
+        suffix: How the name of a file ends.
+        template: The layout that comes with opl.
         name: What a program name must match.
         name_rule: The same in words.
         comment_length: Most characters of a comment.
         motion: Finds the motion instructions in a program.
         line_end: How lines end.
+        actions: How actions are written.
     """
 
     maker: str
+    suffix: str
+    template: Path
     name: re.Pattern[str]
     name_rule: str
     comment_length: int
     motion: re.Pattern[str]
     line_end: str
+    actions: ActionTexts
 
-    def require_legal(self, program: Program, settings: ProgramSettings) -> None:
-        """Refuse names and comments that the language does not take.
+    def write(
+        self,
+        program: Program,
+        settings: ProgramSettings,
+        date: datetime,
+        tool: str,
+        moves: Sequence[tuple[str, str, str, float]],
+        own_values: Callable[[Sequence[Step]], Mapping[str, object]] = lambda steps: {},
+    ) -> Written:
+        """Return a program as written, its passes timed.
+
+        Args:
+            program: What the robot shall do.
+            settings: How it is written.
+            date: Of the file.
+            tool: As the language names it.
+            moves: Motion instruction, target, speed and time [s] of each move.
+            own_values: What a template of this language gets besides, given the steps.
 
         Raises:
-            InputError: For the first of them.
+            OplError: If the language does not take a name or comment, the template is unusable or
+                does not say what the steps say, or a pass does not keep its time.
         """
+        self._require_legal(program, settings)
+        actions = self.actions.lines(move.actions for move in program.moves)
+        both = list(zip(program.moves, moves, strict=True))
+        steps = [
+            Step(*texts, move.comment, lines)
+            for (move, texts), lines in zip(both, actions, strict=True)
+        ]
+        values = {
+            "name": program.name,
+            "date": f"{date:%Y-%m-%d %H:%M}",
+            "title": settings.title,
+            "tool": tool,
+            "comments": program.comments,
+            **own_values(steps),
+        }
+        text = self._render(settings.template or self.template, values, steps)
+        times = {move.motion_index: texts[3] for move, texts in both if np.isfinite(texts[3])}
+        speeds = {move.motion_index: texts[2] for move, texts in both}
+        kept = pass_times(program, times, "this controller")
+        return Written({program.name + self.suffix: text}, speeds, times, kept)
+
+    def _require_legal(self, program: Program, settings: ProgramSettings) -> None:
+        """Refuse names and comments that the language does not take."""
         for name in (program.name, *sorted(settings.actions.calls)):
             if not self.name.fullmatch(name):
                 raise InputError(
@@ -102,12 +206,8 @@ class Dialect:
                     f"got {text!r}",
                 )
 
-    def render(self, template: Path, values: Mapping[str, object], steps: Sequence[Step]) -> str:
-        """Fill a template and read the result back.
-
-        Raises:
-            InputError: If the template is unusable, or its program does not say what the steps say.
-        """
+    def _render(self, template: Path, values: Mapping[str, object], steps: Sequence[Step]) -> str:
+        """Fill a template and read the result back."""
         text = fill(template, {**values, "steps": steps})
         if not text.isascii():
             raise InputError(str(template), "gives a program that is not ASCII")
@@ -126,43 +226,6 @@ class Dialect:
 def _own_speed(step: Step) -> tuple[str, ...]:
     """Return the instruction that sets the speed, where that is not part of the move."""
     return () if step.speed in step.move else (step.speed,)
-
-
-def write_steps(
-    program: Program,
-    moves: Sequence[tuple[str, str, str, float]],
-    actions: Callable[[Action], Sequence[str]],
-) -> list[Step]:
-    """Return the steps of a program.
-
-    Args:
-        program: The program.
-        moves: Motion instruction, target, speed and time [s] of each move.
-        actions: Writes one action.
-    """
-    return [
-        Step(
-            instruction,
-            target,
-            speed,
-            time,
-            move.comment,
-            tuple(line for action in move.actions for line in actions(action)),
-        )
-        for move, (instruction, target, speed, time) in zip(program.moves, moves, strict=True)
-    ]
-
-
-def written(program: Program, file_name: str, text: str, steps: Sequence[Step]) -> Written:
-    """Return a program as written, its passes timed.
-
-    Raises:
-        OplError: If a pass does not keep its time.
-    """
-    both = list(zip(program.moves, steps, strict=True))
-    times = {move.motion_index: step.time for move, step in both if np.isfinite(step.time)}
-    speeds = {move.motion_index: step.speed for move, step in both}
-    return Written({file_name: text}, speeds, times, pass_times(program, times, "this controller"))
 
 
 def rounded_times(moves: Sequence[Move], decimals: int, shortest: float) -> Array:

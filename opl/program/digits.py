@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.cell.robot import Robot
 from opl.errors import UnsafeError
+from opl.geometry.frames import Array
+from opl.program.settings import ProgramSettings
 
-Array = NDArray[np.float64]
+Rounding = Callable[[Array, Robot, ProgramSettings], Array]
 
 _SLACK = 1e-6  # of a last digit: round-off in a limit that is a whole number of them
 
@@ -24,7 +27,7 @@ def fixed(value: float, decimals: int) -> str:
 
 
 def within(values: Array, lower: Array, upper: Array, decimals: int) -> Array:
-    """Return values rounded to some decimals, inwards where a limit is in the way.
+    """Return values rounded to some decimals, inwards at a limit.
 
     Args:
         values: Any number of rows, shape (..., k).
@@ -44,16 +47,16 @@ def within(values: Array, lower: Array, upper: Array, decimals: int) -> Array:
     return np.asarray(np.round(rounded / unit, decimals) + 0.0)
 
 
-def rounded_degrees(q: Array, robot: Robot, decimals: int) -> Array:
-    """Return the configurations nearest to some that degrees of few decimals can express.
+def rounded_radians(decimals: int) -> Rounding:
+    """Return what rounds configurations, shape (n, 6), to radians of few decimals."""
+    return lambda q, robot, settings: within(q, robot.lower, robot.upper, decimals)
 
-    Args:
-        q: Joint positions in [rad], shape (n, 6).
-        robot: Whose.
-        decimals: Digits of an angle behind the point.
 
-    Raises:
-        UnsafeError: If one is beyond the limits.
-    """
-    limits = np.rad2deg(robot.lower), np.rad2deg(robot.upper)
-    return np.deg2rad(within(np.rad2deg(q), *limits, decimals))
+def rounded_degrees(decimals: int) -> Rounding:
+    """Return what rounds configurations, shape (n, 6), to degrees of few decimals."""
+
+    def rounded(q: Array, robot: Robot, settings: ProgramSettings) -> Array:
+        limits = np.rad2deg(robot.lower), np.rad2deg(robot.upper)
+        return np.deg2rad(within(np.rad2deg(q), *limits, decimals))
+
+    return rounded

@@ -10,22 +10,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from opl.cell.full_turns import nearest_turn
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
-from opl.geometry.frames import inverse, pose, transform
-from opl.program.moves import Kind, Program
-
-Array = NDArray[np.float64]
+from opl.geometry.frames import Array, inverse, pose, transform
+from opl.program.moves import Program, Purpose
 
 _BETWEEN = np.array([0.25, 0.5, 0.75])
 LINE_STEP = 1e-3  # [m] of the tool point between configurations on a line
 LINE_TURN = np.deg2rad(0.5)  # of the hand and of any joint between them
 # Farthest that the end of a line may be from the configuration it is written with in [rad]: poses
-# have few digits. A line that ends on another branch is off by far more.
+# have few digits. A line that ends on another ik_branch is off by far more.
 _SAME_END = np.deg2rad(0.5)
 _FURTHEST_TURN = np.deg2rad(20.0)  # of a joint from one to the next on a line: beyond, it flips
 
@@ -45,7 +42,7 @@ def with_straight_moves(
     strays = stray(robot, np.array([move.q for move in program.moves]), T_flange_tool, corners)
     moves = [program.moves[0]] if program.moves else []
     for move, distance in zip(program.moves[1:], strays, strict=True):
-        straight = move.kind is not Kind.AIR and bool(distance <= tolerance)
+        straight = move.kind is not Purpose.AIR and bool(distance <= tolerance)
         moves.append(replace(move, straight=straight))
     return replace(program, moves=tuple(moves))
 

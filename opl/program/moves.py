@@ -11,16 +11,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from opl.errors import UnsafeError
+from opl.geometry.frames import Array
 from opl.motion.motion import Motion, Phase, TimedMotion, VerifiedMotion
 from opl.program.actions import NO_ACTIONS, Action, Actions
 from opl.program.stops import actions_at, stops_at
-
-Array = NDArray[np.float64]
 
 # Speed of the move to the first configuration. Nothing is known of where the robot starts from, so
 # that move is proven by nobody but the person who watches it.
@@ -28,12 +28,11 @@ START_SPEED = 0.05
 # Configurations nearer to each other than this in every joint [rad] are one: a micrometre at the
 # end of the arm, a tenth of an encoder pulse.
 SAME_CONFIGURATION = 1e-6
-# What a move may ask above a joint's top speed before it is refused: the last digit a controller
-# can be told.
+# What a move may need above a joint's top speed before it is refused: the last digit of a speed.
 OVERSPEED = 1e-4
 
 
-class Kind(str, Enum):
+class Purpose(str, Enum):
     """What a move is for."""
 
     WHEEL = "on_wheel"  # grinding
@@ -41,7 +40,7 @@ class Kind(str, Enum):
     AIR = "air"  # from and to home, and between passes
 
     @classmethod
-    def of(cls, phase: Phase) -> Kind:
+    def of(cls, phase: Phase) -> Purpose:
         """Return the kind of a move by what happens during it."""
         return {Phase.GRINDING: cls.WHEEL, Phase.FREE: cls.AIR}.get(phase, cls.LEAD)
 
@@ -71,7 +70,7 @@ class Move:
     on_wheel: bool
     motion_index: int
     duration: float | None = None
-    kind: Kind = Kind.AIR
+    kind: Purpose = Purpose.AIR
     ground_pass: int | None = None
     straight: bool = False
     comment: str | None = None
@@ -147,6 +146,19 @@ class Program:
     pass_times: tuple[PassTime, ...] = ()
     cycle: CycleTime | None = None
 
+    @property
+    def q(self) -> Array:
+        """Where the moves end, joint positions in [rad], shape (n, 6)."""
+        return np.array([move.q for move in self.moves]).reshape(-1, 6)
+
+    @property
+    def chained(self) -> list[bool]:
+        """Whether each move but the first goes on with the pass of the move before."""
+        return [
+            move.ground_pass is not None and move.ground_pass == before.ground_pass
+            for before, move in pairwise(self.moves)
+        ]
+
 
 def plan_moves(
     verified: VerifiedMotion,
@@ -195,7 +207,7 @@ def plan_moves(
                 on_wheel=bool(on_wheel[m]),
                 motion_index=int(configuration),
                 duration=times[m] if m else None,
-                kind=Kind.of(phase),
+                kind=Purpose.of(phase),
                 ground_pass=pass_here if phase is Phase.GRINDING else None,
                 comment=comment if pass_here != pass_before else None,
                 actions=done_there.get(m, ()),

@@ -20,11 +20,9 @@ from opl.cell.full_turns import nearest_turn
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
 from opl.findings import Finding, Level
-from opl.geometry.frames import inverse, rotation_angle
+from opl.geometry.frames import Array, inverse, rotation_angle
 from opl.program.lines import straight_configurations
-from opl.program.moves import Kind
-
-Array = NDArray[np.float64]
+from opl.program.moves import Purpose
 
 # How far beyond a quarter turn an axis may be where the file names its neighbour [rad]: digits.
 _QUARTER_SLACK = np.deg2rad(0.01)
@@ -41,7 +39,7 @@ class SpeedUnit(Enum):
 
 
 @dataclass(frozen=True)
-class Speed:
+class WrittenSpeed:
     """The speed of a move as written.
 
     Attributes:
@@ -82,9 +80,10 @@ class Corners:
     lead: Corner
     air: Corner
 
-    def of(self, kind: Kind) -> Corner:
+    def of(self, kind: Purpose) -> Corner:
         """Return the largest corner after a move of a kind."""
-        return {Kind.WHEEL: self.on_wheel, Kind.LEAD: self.lead, Kind.AIR: self.air}[kind]
+        corner: Corner = getattr(self, kind.value)
+        return corner
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +109,7 @@ class ReadMove:
 
     target: Array
     straight: bool
-    speed: Speed
+    speed: WrittenSpeed
     corner: Corner
     tool: str
     place: str
@@ -184,7 +183,7 @@ def play(
                 found.append(_fault(move, message))
                 leg = end[None]
         assert leg is not None
-        time = 0.0 if q is None else _time(move.speed, q, end, robot, T_flange_tool)
+        time = 0.0 if q is None else move_time(move.speed, q, end, robot, T_flange_tool)
         legs.append(leg)
         times.append(np.full(len(leg), time / len(leg)))
         q = end
@@ -219,7 +218,9 @@ def _faults(move: ReadMove, end: Array | None) -> Iterator[Finding]:
             yield _fault(move, "the quarter turns of its axes are not those of its pose")
 
 
-def _time(speed: Speed, start: Array, end: Array, robot: Robot, T_flange_tool: Array) -> float:
+def move_time(
+    speed: WrittenSpeed, start: Array, end: Array, robot: Robot, T_flange_tool: Array
+) -> float:
     """Return the time of a move in [s], ramps left out."""
     if speed.unit is SpeedUnit.SECONDS:
         return speed.value

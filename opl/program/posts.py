@@ -19,16 +19,12 @@ from datetime import datetime
 from importlib.metadata import entry_points
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from opl.cell.robot import Robot
-from opl.errors import InputError, OplError
+from opl.errors import InputError, PassTimeError, SettingError
+from opl.geometry.frames import Array
 from opl.program.moves import PassTime, Program
-from opl.program.played import Corners, Reading, Speed
+from opl.program.played import Corners, Reading, WrittenSpeed
 from opl.program.settings import ProgramSettings
-
-Array = NDArray[np.float64]
 
 GROUP = "opl.posts"
 
@@ -74,7 +70,7 @@ class Reader:
     suffix: str
     read: Callable[[Mapping[str, bytes], Robot, ProgramSettings], Reading]
     rounded: Callable[[Array, Robot, ProgramSettings], Array]
-    start: Callable[[Robot], Speed]
+    start: Callable[[Robot], WrittenSpeed]
     corners: Callable[[ProgramSettings], Corners]
     describe: Callable[[str, bytes, Robot], list[str]]
     differences: Callable[[tuple[str, bytes], tuple[str, bytes]], list[str]]
@@ -82,7 +78,7 @@ class Reader:
 
 @dataclass(frozen=True)
 class Post:
-    """One way to write programs.
+    """How programs are written for one controller.
 
     Attributes:
         title: The controller, for people.
@@ -107,38 +103,36 @@ def known_posts() -> list[str]:
     return sorted({entry.name for entry in entry_points(group=GROUP)})
 
 
-def find_post(name: str, where: str = "program.controller") -> Post:
-    """Return the post of a controller.
-
-    Args:
-        name: As a job names it.
-        where: File and key, for messages.
+def find_post(name: str) -> Post:
+    """Return the post of a controller by the name that jobs give it.
 
     Raises:
-        InputError: If there is none, or it cannot be loaded.
+        SettingError: If there is none, or it cannot be loaded.
     """
     found = [entry for entry in entry_points(group=GROUP) if entry.name == name]
     if not found:
-        raise InputError(where, f"unknown controller {name!r}; known: {', '.join(known_posts())}")
+        known = ", ".join(known_posts())
+        raise SettingError("controller", f"unknown controller {name!r}; known: {known}")
     try:
         post = found[0].load()
     except Exception as error:  # a package of the site's own: whatever is wrong in it
-        raise InputError(where, f"post {found[0].value} cannot be loaded: {error}") from error
+        message = f"post {found[0].value} cannot be loaded: {error}"
+        raise SettingError("controller", message) from error
     if not isinstance(post, Post):
-        raise InputError(where, f"post {found[0].value} is no opl.program.posts.Post")
+        raise SettingError("controller", f"post {found[0].value} is no opl.program.posts.Post")
     return post
 
 
-def suffixes_read() -> dict[str, str]:
-    """Return a post for each suffix of files that opl can read, its name by the suffix."""
-    found: dict[str, str] = {}
+def readers() -> dict[str, Reader]:
+    """Return the reader of each suffix of files that opl can read, by the suffix in capitals."""
+    found: dict[str, Reader] = {}
     for name in known_posts():
         try:
             reader = find_post(name).reader
         except InputError:
             continue  # a post that cannot be loaded is an error for the job that names it only
         if reader is not None:
-            found.setdefault(reader.suffix.upper(), name)
+            found.setdefault(reader.suffix.upper(), reader)
     return found
 
 
@@ -148,11 +142,10 @@ def reader_for(path: Path) -> Reader:
     Raises:
         InputError: If no post reads such files.
     """
-    known = suffixes_read()
-    reader = find_post(known[path.suffix.upper()]).reader if path.suffix.upper() in known else None
-    if reader is None:
+    known = readers()
+    if path.suffix.upper() not in known:
         raise InputError(str(path), f"is no program that can be read: {', '.join(sorted(known))}")
-    return reader
+    return known[path.suffix.upper()]
 
 
 def pass_times(
@@ -167,22 +160,19 @@ def pass_times(
         controller: For messages.
 
     Raises:
-        OplError: If a pass does not keep its time.
+        PassTimeError: If a pass does not keep its time.
     """
-    wanted: dict[int, float] = {}
-    written: dict[int, float] = {}
+    sums: dict[int, tuple[float, float]] = {}
     for move in program.moves:
         if move.ground_pass is not None and move.duration is not None:
-            wanted[move.ground_pass] = wanted.get(move.ground_pass, 0.0) + move.duration
-            written[move.ground_pass] = (
-                written.get(move.ground_pass, 0.0) + times[move.motion_index]
-            )
-    found = {index: PassTime(wanted[index], written[index]) for index in sorted(wanted)}
+            wanted, written = sums.get(move.ground_pass, (0.0, 0.0))
+            both = wanted + move.duration, written + times[move.motion_index]
+            sums[move.ground_pass] = both
+    found = {index: PassTime(*both) for index, both in sorted(sums.items())}
     for index, one in found.items():
         if abs(one.error) > PASS_TIME_TOLERANCE:
-            raise OplError(
+            raise PassTimeError(
                 f"pass {index + 1} would take {one.written:.2f} s instead of {one.wanted:.2f} s: "
-                f"{controller} cannot be told speeds so low; raise process.feed_mm_s, or ask for "
-                "program.motion: straight"
+                f"{controller} takes no speeds so low"
             )
     return tuple(found.values())

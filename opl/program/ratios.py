@@ -81,10 +81,6 @@ def with_ratios(robot: Robot, path: Path) -> Robot:
     The axes of the file are verified then; axes it leaves out stay as they were. Of two limits the
     narrower one holds.
 
-    Args:
-        robot: The robot as opl knows it.
-        path: The file.
-
     Raises:
         InputError: If the file is unusable or of another robot.
     """
@@ -135,11 +131,6 @@ class ImportedRatios:
 def import_pulse_ratios(parameter_file: Path, robot: Robot, file: Path) -> ImportedRatios:
     """Make a file of pulse ratios and soft limits from a controller's RC.PRM or ALL.PRM.
 
-    Args:
-        parameter_file: The controller's file.
-        robot: Whose controller it is from.
-        file: The file to write.
-
     Raises:
         InputError: If the one cannot be read or is no such file, or the other cannot be written.
     """
@@ -154,13 +145,7 @@ def import_pulse_ratios(parameter_file: Path, robot: Robot, file: Path) -> Impor
 
 
 def ratio_file(robot: Robot, parameters: AxisParameters, source: str) -> str:
-    """Return the text of a file with the controller's parameters.
-
-    Args:
-        robot: Whose parameters they are said to be.
-        parameters: As read from the controller's file.
-        source: Name of that file.
-    """
+    """Return the text of a file with the parameters from a controller's file, the source."""
     axes = zip(
         robot.joint_names,
         parameters.pulses_per_degree,

@@ -8,7 +8,7 @@ proven.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 from opl.errors import InputError
@@ -184,6 +184,42 @@ def code_lines(text: str, comment: str) -> Iterator[tuple[int, str]]:
         assert found is not None
         if found[1].strip():
             yield number, " ".join(found[1].split())
+
+
+def read_enclosed(
+    notes: Notes,
+    text: str,
+    comment: str,
+    begin: re.Pattern[str],
+    end: re.Pattern[str],
+    statement: Callable[[int, str], None],
+) -> Listing:
+    """Return a program whose statements stand between a line that names it and one that ends it.
+
+    Args:
+        notes: Of the file.
+        text: Of the file.
+        comment: The sign that opens a comment.
+        begin: The first line, the name its first group.
+        end: The last line.
+        statement: Notes a statement, given its line number and code.
+
+    Raises:
+        InputError: If the file holds no program.
+    """
+    ended, line = False, 0
+    for line, code in code_lines(text, comment):
+        if (found := begin.fullmatch(code)) and not notes.name:
+            notes.name = found[1]
+        elif ended or not notes.name:
+            notes.doubt(line, f"{code} stands outside of the program")
+        elif end.fullmatch(code) and not notes.inside_block:
+            ended = True
+        else:
+            statement(line, code)
+    if not ended:
+        notes.doubt(line, "the program does not end")
+    return notes.listing(line)
 
 
 def same_number(text: str) -> str:

@@ -13,11 +13,7 @@ MAX_BLENDED_TURN = np.deg2rad(10.0)
 
 
 def stops_at(motion: Motion) -> list[bool]:
-    """Return at which configurations the robot comes to rest.
-
-    Args:
-        motion: The motion, no configuration the same as the one before it.
-    """
+    """Return at which configurations, none like the one before it, the robot comes to rest."""
     stops = motion.ends_phase
     stops[0] = True
     steps = np.diff(motion.q, axis=0)
@@ -28,12 +24,7 @@ def stops_at(motion: Motion) -> list[bool]:
 
 
 def actions_at(motion: Motion, actions: Actions) -> dict[int, tuple[Action, ...]]:
-    """Return what is done at which configurations: in front of the wheel, and at home.
-
-    Args:
-        motion: The motion.
-        actions: What the job wants done.
-    """
+    """Return what is done at which configurations: in front of the wheel, and at home."""
     found = {0: actions.at_start}
     last = len(motion) - 1
     for phase, moves in motion.runs():

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.files import resources
-from opl.geometry.frames import roll_pitch_yaw
+from opl.geometry.frames import Array, roll_pitch_yaw
 from opl.motion.motion import VerifiedMotion
+from opl.program.digits import fixed
 from opl.program.layout import fill
 from opl.program.posts import Written
 from opl.program.pulses import PulseScale
-
-Array = NDArray[np.float64]
 
 TEMPLATE = resources.folder("templates") / "csv" / "table.csv.j2"
 
@@ -90,6 +88,4 @@ def _columns(joint_names: Sequence[str], with_pulses: bool) -> tuple[str, ...]:
 
 def _fixed(value: float, decimals: int) -> str:
     """Return a number with fixed decimals, never -0; empty for NaN."""
-    if np.isnan(value):
-        return ""
-    return f"{round(float(value), decimals) + 0.0:.{decimals}f}"
+    return "" if np.isnan(value) else fixed(float(value), decimals)

@@ -11,9 +11,10 @@ import numpy as np
 from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
+from opl.job import keys
 from opl.job.load import Job
 from opl.motion.motion import TimedMotion
-from opl.program.posts import Reader, find_post, suffixes_read
+from opl.program.posts import Reader, find_post, readers
 from opl.proof.written import written_findings
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import Verification, replay
@@ -62,7 +63,7 @@ def prove(
         job: Cell, feed and tolerances.
         points: The cutter points of the job.
         files: Content of all files of the program by what messages call them.
-        progress: Told the part of the motion that is replayed, 0 to 1.
+        progress: Gets the part of the motion that is replayed, 0 to 1.
 
     Raises:
         InputError: If the files are not those of one program of the job's controller and robot.
@@ -100,9 +101,9 @@ def reader_of(job: Job) -> Reader:
     Raises:
         InputError: If programs of its controller cannot be read.
     """
-    where = f"{job.path}: program.controller"
-    post = find_post(job.program.controller, where)
+    post = find_post(job.program.controller)
     if post.reader is None:
+        where = job.source.at(keys.PROGRAM_CONTROLLER)
         raise InputError(where, f"programs for {post.title} are written, not read back")
     return post.reader
 
@@ -111,8 +112,8 @@ def _require_language(job: Job, files: Mapping[str, bytes], reader: Reader) -> N
     """Refuse files that by their names are of another language than the job's controller."""
     for name in files:
         suffix = Path(name).suffix.upper()
-        if suffix in suffixes_read() and suffix != reader.suffix.upper():
+        if suffix in readers() and suffix != reader.suffix.upper():
             raise InputError(
-                f"{job.path}: program.controller",
+                job.source.at(keys.PROGRAM_CONTROLLER),
                 f"{job.program.controller} takes {reader.suffix} files, got {name}",
             )

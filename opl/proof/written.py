@@ -1,4 +1,4 @@
-"""Speeds, stops and ends of a written program against what its job asks for."""
+"""Speeds, stops and ends of a written program against those of its job."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion, Phase, TimedMotion
 from opl.motion.timing import time_motion
-from opl.program.moves import Kind
+from opl.program.moves import Purpose
 from opl.program.played import Playback
 from opl.program.posts import PASS_TIME_TOLERANCE, Reader
 from opl.program.speeds import MOST_CORRECTION
@@ -32,7 +32,7 @@ def written_findings(
     """Return what is wrong with speeds, stops, and the configurations at both ends.
 
     Args:
-        job: What is asked for.
+        job: What is requested.
         points: Its cutter points.
         written: The written configurations with their labels and written times, one for each move.
         playback: The moves they are from.
@@ -94,7 +94,7 @@ def _rounded_ends(
     """Look at how far corners may be rounded; the proof goes through them."""
     corners, stops = reader.corners(job.program), motion.ends_phase
     for k, move in enumerate(playback.moves):
-        limit = corners.stop if stops[k] else corners.of(Kind.of(motion.phase[k]))
+        limit = corners.stop if stops[k] else corners.of(Purpose.of(motion.phase[k]))
         if move.corner.size > limit.size * (1.0 + ROUND_OFF):
             message = f"must be {limit.text} at most, got {move.corner.text}"
             yield _error("level", f"{motion.place(k)} ({move.place})", message)

@@ -10,8 +10,8 @@ from opl.errors import InputError
 from opl.geometry.frames import transform
 from opl.geometry.mesh import box_corners
 from opl.planning.reasons import NodeState, node_states
+from opl.program.export import StraightLimit, export_program
 from opl.program.moves import Program
-from opl.program.write import StraightLimit, write_program
 from opl.report.pictures import contact_chart, joint_chart
 from opl.run.values import Planned, Proven
 
@@ -23,7 +23,7 @@ def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
     # what the proven path leaves of the allowed contact error
     left = job.search.max_contact_error - proven.verification.max_contact_error
     limit = StraightLimit(box_corners(vertices), left)
-    return write_program(
+    return export_program(
         proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), ["OPL"]
     )
 

@@ -12,6 +12,7 @@ from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
+from opl.job.refusals import keys_named
 from opl.program.posts import reader_for
 from opl.proof.digest import changed_since, digests_in
 from opl.proof.prove import Proof, prove
@@ -64,7 +65,7 @@ def prove_program(job: Job, files: Sequence[Path], watch: Watch | None = None) -
     watch = watch or Watch()
     content = {path: _content(path) for path in files}
     points = cut_surface(job, watch).points
-    with watch.stage(Stage.VERIFICATION) as progress:
+    with watch.stage(Stage.VERIFICATION) as progress, keys_named(job.source):
         found = prove(job, points, {str(path): data for path, data in content.items()}, progress)
     changed, as_written = _compared_with_results(content)
     proof = replace(found, findings=(*found.findings, *changed))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from opl.errors import NoFreeMoveError, NoPathError
 from opl.job.load import Job
-from opl.job.refusals import dwell_refusal
+from opl.job.refusals import dwell_refusal, keys_named
 from opl.motion.feed import slow_stretches
 from opl.motion.timing import time_motion
 from opl.proof.read_back import in_file_digits, read_back
@@ -58,6 +58,11 @@ def plan_path(surfaced: Surfaced, watch: Watch | None = None) -> Planned | Refus
         Cancelled: If the run was cancelled.
     """
     watch = watch or Watch()
+    with keys_named(surfaced.job.source):
+        return _plan(surfaced, watch)
+
+
+def _plan(surfaced: Surfaced, watch: Watch) -> Planned | Refused:
     prepared, job = prepare(surfaced, watch), surfaced.job
     try:
         with watch.stage(Stage.SEARCH):
@@ -123,7 +128,7 @@ def write_program(proven: Proven, watch: Watch | None = None) -> Run:
     """
     watch = watch or Watch()
     surfaced, plan = proven.surfaced, proven.planned.plan
-    with watch.stage(Stage.EXPORT):
+    with watch.stage(Stage.EXPORT), keys_named(surfaced.job.source):
         program, files = render_program(proven)
         files = {**files, **draw_charts(proven.planned)}
     with watch.stage(Stage.READ_BACK):

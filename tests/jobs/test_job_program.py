@@ -3,14 +3,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from opl.errors import InputError
+from opl.errors import (
+    InputError,
+    OplError,
+    PassTimeError,
+    SettingError,
+    TimeLawError,
+    UnsafeError,
+)
 from opl.files.documents import read
 from opl.job.program import ProgramSection
+from opl.job.refusals import keys_named
 from opl.job.source import Source
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
+from opl.program.export import try_out
 from opl.program.inform import TEMPLATE
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings
-from opl.program.write import try_out
 from tests.support.program_samples import HOME, ROBOT, UNVERIFIED
 
 EYE = "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 180], [0, 0, 0, 1]]"
@@ -76,6 +84,11 @@ def test_every_key_reaches_the_program_in_si(tmp_path):
     [
         ("controller: DX300", "controller: unknown controller 'DX300'; known: DX100, DX200"),
         ("accept_unverified_pulses: [Z]", "no such joint 'Z'; have: S, L, U, R, B, T"),
+        ("tool: 64", "program.tool: must be 0 to 63, got 64"),
+        (
+            f"positions: user\nuser_frame: {{number: 64, T_base_user_mm: {EYE}}}",
+            "program.user_frame.number: must be 1 to 63, got 64",
+        ),
         ("positions: user", "user_frame goes with positions: user, and only there"),
         ("tool: 2\nmotion: straight", "need T_flange_tool_mm, the data of tool 2"),
         (
@@ -102,7 +115,7 @@ def test_section_that_makes_no_sense_is_refused_with_its_key(tmp_path, text, mes
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"tool": 64}, "program.tool: must be 0 to 63, got 64"),
+        ({"tool": 64}, "tool: must be 0 to 63, got 64"),
         ({"title": 33 * "X"}, "program comment: has 33 characters"),
         ({"controller": "NX100", "tool": 24}, "must be 0 to 23"),
         ({"acceleration": ByKind(on_wheel=10)}, "ACC must be 20 to 100, got 10"),
@@ -116,6 +129,24 @@ def test_what_the_controller_does_not_take_is_told_before_planning(changes, mess
     try_out("SAMPLE", HOME, ROBOT, ProgramSettings())
     with pytest.raises(InputError, match=message):
         try_out("SAMPLE", HOME, ROBOT, ProgramSettings(**changes))
+
+
+@pytest.mark.parametrize(
+    ("error", "kind", "message"),
+    [
+        (SettingError("tool", "must be 0"), InputError, "job: program.tool: must be 0"),
+        (
+            PassTimeError("too slow"),
+            OplError,
+            "too slow; raise process.feed_mm_s, or write",
+        ),
+        (TimeLawError("no law"), UnsafeError, "no law; raise process.max_acceleration_deg_s2"),
+    ],
+)
+def test_refusals_of_the_rooms_below_get_the_keys_of_the_job(error, kind, message):
+    with pytest.raises(kind, match=message) as caught, keys_named(Source("job", Path())):
+        raise error
+    assert caught.type is kind and caught.value.exit_status == error.exit_status
 
 
 def test_pulse_ratios_of_the_controller_make_acceptance_needless(tmp_path):

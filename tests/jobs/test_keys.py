@@ -23,18 +23,6 @@ from tests.support.jobs import document, opl
 
 PAGE = Path(__file__).parents[2] / "docs" / "keys.md"
 
-# Key paths that other rooms still name in their messages. The list may only become shorter.
-STILL_NAMED_ELSEWHERE = {
-    "process.feed_mm_s",
-    "process.max_acceleration_deg_s2",
-    "program.accept_unverified_pulses",
-    "program.controller",
-    "program.motion",
-    "program.pulse_ratios",
-    "program.tool",
-    "program.user_frame.number",
-}
-
 
 def models_in(model, path=""):
     """Yield (key path, model) of a file and of all its sections."""
@@ -299,10 +287,7 @@ def named_outside(folder):
 
 
 def test_no_other_room_names_keys():
-    found = named_outside(Path(package.__file__).parent)
-    new = {key: modules for key, modules in found.items() if key not in STILL_NAMED_ELSEWHERE}
-    assert new == {}
-    assert found.keys() >= STILL_NAMED_ELSEWHERE, "cleaned: take it off the list"
+    assert named_outside(Path(package.__file__).parent) == {}
 
 
 def test_a_key_in_another_room_is_found(tmp_path):

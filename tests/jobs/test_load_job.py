@@ -135,7 +135,9 @@ CONSTANTS = {name: value for name, value in vars(keys).items() if name.isupper()
 NAMED = [value for value in CONSTANTS.values() if isinstance(value, str)]
 
 
-@pytest.mark.parametrize("path", [*NAMED, *keys.OF_PASSES.values(), *sorted(keys.OF_A_JOB)])
+@pytest.mark.parametrize(
+    "path", [*NAMED, *keys.OF_PASSES.values(), *keys.OF_PROGRAM.values(), *sorted(keys.OF_A_JOB)]
+)
 def test_every_named_key_path_is_one_of_a_job(path):
     schema = JobFile.model_json_schema()
     assert exists({"properties": schema["properties"]}, schema["$defs"], path.split("."))

@@ -105,8 +105,8 @@ def test_unknown_ratios_give_no_pulses():
         scale.to_pulses(HOME)
     assert np.isnan(scale.to_angles(np.ones(6))).all()
     with pytest.raises(InputError, match="no pulses per degree are known of A1, A2"):
-        require_known(load_robot("kr16"), "program.pulse_ratios")
-    require_known(load_robot("mh24"), "program.pulse_ratios")
+        require_known(load_robot("kr16"))
+    require_known(load_robot("mh24"))
 
 
 def test_a_gp12_in_poses_still_keeps_its_limits(tmp_path):

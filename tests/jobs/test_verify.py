@@ -17,8 +17,8 @@ import yaml
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.job.load import load_job
-from opl.program.inform.files import load_jobs
-from opl.program.inform.playback import play
+from opl.program.inform.parse import decode, read_jobs
+from opl.program.inform.playback import play_jobs
 from opl.program.inform.post import write_jobs
 from opl.program.profiles import DX200
 from opl.program.pulses import PulseScale
@@ -156,7 +156,7 @@ def test_a_run_ends_with_reading_back_what_it_writes():
 
 def test_proven_and_written_configurations_are_one():
     scale = PulseScale.of(load_job(planned() / "job.yaml").cell.robot)
-    (job,) = load_jobs(planned() / "out" / "V_SHAPE.JBI")
+    (job,) = read_jobs(decode((planned() / "out" / "V_SHAPE.JBI").read_bytes())[0])
     written = np.array([position.values for position in job.positions])
     proven = np.array([[float(row[f"{n}_deg"]) for n in "SLURBT"] for row in columns()])
     counted = np.deg2rad(proven) * scale.pulses_per_radian
@@ -307,8 +307,8 @@ def test_a_limit_crossed_between_two_points_is_found(tmp_path):
     program = tmp_path / "V_SHAPE.JBI"
     program.write_bytes(text.text.encode("ascii"))
     job = load_job(planned() / "job.yaml")
-    (read,) = load_jobs(program)
-    playback, _ = play({read.name: read}, job.cell.robot, job.program)
+    (read,) = read_jobs(decode(program.read_bytes())[0])
+    playback, _ = play_jobs({read.name: read}, job.cell.robot, job.program)
     end = int(playback.stations[1])
     way = playback.q[: end + 1]
     rest = np.concatenate([playback.q[:1], playback.q[end:]])

@@ -9,7 +9,7 @@ from opl.cell.robot import forward_kinematics
 from opl.errors import InputError, UnsafeError
 from opl.geometry.frames import from_roll_pitch_yaw, pose
 from opl.program.inform import parse, write_jobs
-from opl.program.inform.cartesian import configurations, pose_of, rconf_of
+from opl.program.inform.cartesian import configurations, rconf_of, rectan_pose
 from opl.program.inform.times import job_configurations
 from opl.program.moves import Move, Program, plan_moves
 from opl.program.profiles import DX200, NX100
@@ -68,7 +68,7 @@ def test_cartesian_job_leads_to_the_configurations_it_was_made_of(form, profile)
     job = parse(write(q, profile, positions=form, user_frame=frame))
     seen = job_configurations(job, ROBOT, T_base_frame, T_FLANGE_TOOL)
     np.testing.assert_allclose(seen, q, atol=4e-4 if profile is NX100 else 4e-6)
-    written = T_base_frame @ pose_of(job.positions[3].values)
+    written = T_base_frame @ rectan_pose(job.positions[3].values)
     np.testing.assert_allclose(
         written[:3, 3], (forward_kinematics(ROBOT, q[3]) @ T_FLANGE_TOOL)[:3, 3], atol=1e-6
     )
@@ -115,6 +115,6 @@ def test_meaning_of_flip_nobody_has_seen_is_said_in_the_job():
 
 @pytest.mark.parametrize(("number", "profile"), [(64, DX200), (25, NX100)])
 def test_user_frame_the_controller_does_not_have_is_refused(number, profile):
-    with pytest.raises(InputError, match=r"user_frame.number: must be 1 to"):
+    with pytest.raises(InputError, match=r"user_frame: must be 1 to"):
         write(verified_motion().motion.q[0], profile, positions=PositionForm.USER,
               user_frame=UserFrame(number, T_BASE_USER))  # fmt: skip

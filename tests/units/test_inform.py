@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opl.errors import InputError, OplError, UnsafeError
-from opl.program.inform import TEMPLATE, find_faults, parse, unparse, write_jobs
+from opl.program.inform import TEMPLATE, job_faults, parse, unparse, write_jobs
 from opl.program.inform import render as render_part
 from opl.program.moves import Move, Program, plan_moves
 from opl.program.profiles import DX200
@@ -218,7 +218,7 @@ def test_tool_the_controller_does_not_have_is_refused(tool):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("in steps %}\n{% if step.conf", "in steps[1:] %}\n{% if step.conf",
+        ("in steps %}\n{% if step.rconf", "in steps[1:] %}\n{% if step.rconf",
          "NPOS is 20,0,0,0,0,0, there are 19"),
         ("={{ step.values }}", "=0,0,0,0,0,0", r"position 1: must be C00000=0,-38000"),
         ("{{ step.word }}", "MOVL", r"move 1: must be MOVJ C00000 VJ=5.00 PL=0, is MOVL"),
@@ -287,7 +287,7 @@ def test_unreadable_template_is_refused(tmp_path, content):
 
 
 def test_legal_job_has_no_faults():
-    assert find_faults(job_text(), DX200) == ()
+    assert job_faults(job_text(), DX200) == ()
 
 
 @pytest.mark.parametrize(
@@ -320,11 +320,11 @@ def test_legal_job_has_no_faults():
     ],
 )
 def test_fault_is_found(changes, fault):
-    assert fault in "\n".join(find_faults(job_text(**changes), DX200))
+    assert fault in "\n".join(job_faults(job_text(**changes), DX200))
 
 
 def test_bare_line_feeds_are_a_fault():
-    assert "lines must end in CR LF" in find_faults(job_text().replace("\r\n", "\n"), DX200)
+    assert "lines must end in CR LF" in job_faults(job_text().replace("\r\n", "\n"), DX200)
 
 
 # reading
@@ -444,9 +444,9 @@ def test_any_text_is_read_or_refused_but_never_crashes(text):
     try:
         job = parse(text)
     except InputError:
-        assert find_faults(text, DX200)
+        assert job_faults(text, DX200)
     else:
-        find_faults(text, DX200)
+        job_faults(text, DX200)
         assert unparse(job) == re.sub("\r\n?|\n", "\r\n", text)
 
 
@@ -465,4 +465,4 @@ def test_a_damaged_job_is_read_or_refused_but_never_crashes(data):
     except OplError as error:
         assert re.match("job: line [0-9]+: ", str(error))
     else:
-        find_faults(unparse(job), DX200)
+        job_faults(unparse(job), DX200)

@@ -8,7 +8,7 @@ from opl.geometry.frames import rotation_angle
 from opl.program.inform import parse, write_jobs
 from opl.program.inform.times import job_configurations
 from opl.program.lines import stray, with_straight_moves
-from opl.program.moves import Kind, plan_moves
+from opl.program.moves import Purpose, plan_moves
 from opl.program.profiles import DX200
 from opl.program.settings import ProgramSettings
 from tests.support.program_samples import DATE, MAX_SPEED, ROBOT, verified_motion
@@ -24,7 +24,7 @@ def straight(tolerance=1e-3):
 
 def test_moves_on_the_wheel_and_along_its_normal_become_straight_and_no_others():
     for move in straight(tolerance=0.1).moves[1:]:
-        assert move.straight == (move.kind is not Kind.AIR)
+        assert move.straight == (move.kind is not Purpose.AIR)
 
 
 def test_moves_that_stray_too_far_stay_joint_moves():
@@ -66,7 +66,7 @@ def test_tool_point_that_only_turns_gets_its_speed_in_degrees():
     first, second, *_ = straight().moves
     moves = (
         replace(first, q=q[0]),
-        replace(second, q=q[1], duration=2.0, straight=True, kind=Kind.WHEEL),
+        replace(second, q=q[1], duration=2.0, straight=True, kind=Purpose.WHEEL),
     )
     program = replace(straight(), moves=moves)
     (text,) = write_jobs(program, ROBOT, ProgramSettings(), DX200, DATE).files.values()

@@ -10,13 +10,13 @@ from opl.cell.robot import forward_kinematics
 from opl.cli.commands import main
 from opl.errors import InputError, OplError
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
-from opl.program.inform import find_faults, parse
-from opl.program.inform.layout import VARIABLES, JobLayout, Step
+from opl.program.export import StraightLimit, export_program
+from opl.program.inform import job_faults, parse
+from opl.program.inform.job_layout import VARIABLES, JobLayout, JobStep
 from opl.program.moves import Program, plan_moves
 from opl.program.posts import find_post, known_posts, reader_for
 from opl.program.profiles import PROFILES
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
-from opl.program.write import StraightLimit, write_program
 from tests.support.example_post import install, install_example_post
 from tests.support.program_samples import (
     DATE,
@@ -45,7 +45,7 @@ def write(controller, *, robot=ROBOT, name="SAMPLE", n_passes=2, **changes):
     settings = replace(settings, **changes)
     if (controller, settings.motion) == ("KRL", MotionForm.JOINT):
         motion = slowed(motion, 0.2)  # else too slow for whole percents
-    return write_program(motion, name, robot, settings, limit, DATE, ["CELL 7"])
+    return export_program(motion, name, robot, settings, limit, DATE, ["CELL 7"])
 
 
 def programs(controller, **changes):
@@ -79,7 +79,7 @@ def test_jobs_keep_every_limit_of_their_controller(controller):
     long = {"name": "LONGER_THAN_NX100_TAKES", "n_passes": 85}
     for changes in ({"motion": MotionForm.STRAIGHT}, long):
         for name, text in programs(controller, **changes).items():
-            assert find_faults(text, profile) == ()
+            assert job_faults(text, profile) == ()
             job = parse(text)
             assert name == f"{job.name}.JBI" and len(job.name) <= profile.name_length
             assert text.isascii() and "\n" not in text.replace("\r\n", "")
@@ -92,7 +92,7 @@ def test_jobs_keep_every_limit_of_their_controller(controller):
 def test_five_thousand_points_split_off_the_belt_and_the_master_calls_every_part(controller):
     motion = verified_motion(n_passes=50, n_points=100)
     settings = ProgramSettings(controller=controller, actions=ACTIONS)
-    program, files = write_program(
+    program, files = export_program(
         motion, "GRIND_LONG", ROBOT, settings, StraightLimit(CORNERS, 0.0), DATE
     )
     jobs = {name: parse(text) for name, text in files.items() if name.endswith(".JBI")}
@@ -291,7 +291,7 @@ def test_documented_variables_of_jobs_are_the_ones_given():
     own = {name for name in VARIABLES if "." not in name}
     steps = {name.partition(".")[2] for name in VARIABLES if "." in name}
     assert own == set(layout.values())
-    assert steps == set(Step.__dataclass_fields__)
+    assert steps == set(JobStep.__dataclass_fields__)
 
 
 def test_unknown_controller_is_refused_with_the_known_ones():

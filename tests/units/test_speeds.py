@@ -37,7 +37,7 @@ def test_speed_is_written_with_its_decimals_and_in_its_range(value, text):
 
 def test_nearest_in_time_is_chosen_not_nearest_in_speed():
     # 0.0146 would round to 0.01, which is 46 % too slow; 0.02 is 27 % too fast
-    assert VJ.keeping_time(way=0.0146, time=1.0) == 0.02
+    assert VJ.keeping_time(distance=0.0146, time=1.0) == 0.02
 
 
 @given(st.lists(st.tuples(st.floats(0.02, 100.0), st.floats(0.01, 5.0)), min_size=1, max_size=60))

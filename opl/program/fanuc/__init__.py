@@ -5,16 +5,16 @@ configurations; moves carry their time in whole milliseconds. What is proven goe
 written points; the corners that CNT100 cuts off are not.
 """
 
-from opl.program.fanuc.read import corners, parse, start_speed
+from opl.program.fanuc.read import CORNERS, START, parse
 from opl.program.fanuc.rounding import rounded
-from opl.program.fanuc.write import TEMPLATE, VARIABLES, tool_name, write
+from opl.program.fanuc.write import DIALECT, VARIABLES, tool_name, write
 from opl.program.listing import listing_reader
 from opl.program.posts import Post
 
 POST = Post(
     "FANUC TP (.LS)",
     write,
-    TEMPLATE,
+    DIALECT.template,
     VARIABLES,
-    reader=listing_reader(".LS", parse, tool_name, rounded, start_speed, corners),
+    reader=listing_reader(DIALECT.suffix, parse, tool_name, rounded, lambda robot: START, CORNERS),
 )

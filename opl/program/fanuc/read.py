@@ -6,17 +6,16 @@ CNT is read, not played: the corners it cuts off are not replayed.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from opl.cell.robot import Robot
 from opl.program.fanuc.rounding import DECIMALS, from_fanuc
 from opl.program.moves import START_SPEED
-from opl.program.played import Corner, Corners, ReadMove, Speed, SpeedUnit
-from opl.program.settings import Array, ProgramSettings
+from opl.program.played import Corner, Corners, ReadMove, SpeedUnit, WrittenSpeed
 from opl.program.statements import NUMBER, Listing, Notes, Words, code_lines
 
 _STATE = "(?:ON|OFF)"
@@ -32,8 +31,7 @@ _WORDS = Words(
 )
 _LABEL = re.compile(r"LBL\[([0-9]+)\]")
 _JUMP = re.compile(r"(?:JMP |WAIT .*TIMEOUT, ?)LBL\[([0-9]+)\]")
-_FRAME = re.compile(r"UFRAME_NUM ?= ?([0-9]+)")
-_TOOL = re.compile(r"UTOOL_NUM ?= ?([0-9]+)")
+_SETTING = re.compile(r"(UFRAME_NUM|UTOOL_NUM) ?= ?([0-9]+)")
 _MOVE = re.compile(r"([JL]) ?P\[([0-9]+)\] ([0-9]+)(%|msec) (FINE|CNT[0-9]+)")
 _NUMBERED = re.compile(r"[0-9]+:(.*);")
 _POSITION = re.compile(
@@ -43,11 +41,17 @@ _POSITION = re.compile(
 )
 _GROUP = re.compile(r"DEFAULT_GROUP ?= ?(.*);")
 _HALF_DIGIT = 0.5 * np.deg2rad(10.0**-DECIMALS) * np.array([1.0, 1.0, 2.0, 1.0, 1.0, 1.0])
-LARGEST_CNT = 100.0
+START = WrittenSpeed(SpeedUnit.TOP_SPEED, START_SPEED, f"{100.0 * START_SPEED:.0f}%")
+_CNT = Corner(100.0, "CNT100")
+CORNERS = Corners(Corner(0.0, "FINE"), _CNT, _CNT, _CNT)
 
 
-@dataclass(frozen=True, eq=False)
-class _Position:
+_SECTIONS = ("/PROG", "/ATTR", "/MN", "/POS", "/END")
+_NEXT = dict(pairwise(("", *_SECTIONS)))
+Lines = list[tuple[int, str]]
+
+
+class _Position(NamedTuple):
     """A position as the list of them gives it: user frame, tool, and the texts of six axes."""
 
     frame: str
@@ -55,50 +59,27 @@ class _Position:
     axes: tuple[str, ...]
 
 
-@dataclass
-class _State:
-    """What holds until it is set again, and where labels, jumps and moves stand."""
-
-    frame: str | None = None
-    tool: str | None = None
-    labels: dict[str, list[int]] = field(default_factory=dict)
-    jumps: list[tuple[int, str, int]] = field(default_factory=list)
-    moves: list[int] = field(default_factory=list)
-
-
 def parse(text: str, source: str) -> Listing:
-    """Return the program of a file.
-
-    Args:
-        text: Of the file.
-        source: The file, for messages.
-
-    Raises:
-        InputError: If it holds no program.
-    """
-    notes, state = Notes(source, _WORDS), _State()
+    """Return the program of a file; see `listing_reader`."""
+    notes = Notes(source, _WORDS)
     sections = _sections(notes, text)
     for line, code in sections["/ATTR"]:
         group = _GROUP.fullmatch(code)
         if group and group[1].replace(" ", "") != "1,*,*,*,*":
             notes.doubt(line, f"moves the groups {group[1]}; opl knows programs of group 1 alone")
-    positions = _positions(notes, sections["/POS"])
+    body = _Body(notes, _positions(notes, sections["/POS"]))
     for index, (line, code) in enumerate(sections["/MN"]):
         numbered = _NUMBERED.fullmatch(code)
         inner = numbered[1].strip() if numbered else None
         if inner is None:
             notes.doubt(line, f"{code} is no numbered line that ends with ;")
         elif inner and not inner.startswith("!"):
-            _statement(notes, state, positions, index, line, inner)
-    _check_jumps(notes, state)
+            body.statement(index, line, inner)
+    body.check_jumps()
     last = max((line for lines in sections.values() for line, _ in lines), default=0)
     if not sections["/END"]:
         notes.doubt(last, "the program does not end")
     return notes.listing(last)
-
-
-_SECTIONS = ("/PROG", "/ATTR", "/MN", "/POS", "/END")
-Lines = list[tuple[int, str]]
 
 
 def _sections(notes: Notes, text: str) -> dict[str, Lines]:
@@ -113,7 +94,7 @@ def _sections(notes: Notes, text: str) -> dict[str, Lines]:
                 found[here].append((line, code))
             else:
                 notes.doubt(line, f"{code} stands outside of the program")
-        elif word != _next(here):
+        elif word != _NEXT.get(here):
             notes.doubt(line, f"{code} is not the section that follows {here or 'nothing'}")
         else:
             here = word
@@ -124,122 +105,92 @@ def _sections(notes: Notes, text: str) -> dict[str, Lines]:
     return found
 
 
-def _next(section: str) -> str | None:
-    """Return the section that follows one, the first after none."""
-    following = dict(pairwise(("", *_SECTIONS)))
-    return following.get(section)
-
-
 def _positions(notes: Notes, lines: Lines) -> dict[str, _Position]:
-    """Return the positions by number."""
+    """Return the positions by number; each ends with ``};``."""
     positions: dict[str, _Position] = {}
-    for line, code in _entries(lines):
-        found = _POSITION.fullmatch(code.replace(" ", ""))
-        if found is None:
-            notes.doubt(line, f"{code} is no position of group 1 in joint angles")
+    start, text = 0, ""
+    for line, code in [*lines, (0, "")]:
+        start = start if text else line
+        text += code
+        if not text or (line and not text.endswith("};")):
             continue
-        number, frame, tool, *axes = found.groups()
-        if number in positions:
-            notes.doubt(line, f"P[{number}] was given before")
-        positions[number] = _Position(frame, tool, tuple(axes))
+        if found := _POSITION.fullmatch(text.replace(" ", "")):
+            number, frame, tool, *axes = found.groups()
+            if number in positions:
+                notes.doubt(start, f"P[{number}] was given before")
+            positions[number] = _Position(frame, tool, tuple(axes))
+        else:
+            notes.doubt(start, f"{text} is no position of group 1 in joint angles")
+        text = ""
     return positions
 
 
-def _entries(lines: Lines) -> Iterator[tuple[int, str]]:
-    """Give the texts of positions, each with the line it begins on: they end with ``};``."""
-    start, text = 0, ""
-    for line, code in lines:
-        start = start if text else line
-        text += code
-        if text.endswith("};"):
-            yield start, text
-            text = ""
-    if text:
-        yield start, text
+@dataclass
+class _Body:
+    """What holds until it is set again, and at which lines labels, jumps and moves stand."""
 
+    notes: Notes
+    positions: Mapping[str, _Position]
+    holds: dict[str, str] = field(default_factory=dict)
+    labels: dict[str, list[int]] = field(default_factory=dict)
+    jumps: list[tuple[int, str, int]] = field(default_factory=list)
+    moves: list[int] = field(default_factory=list)
 
-def _statement(
-    notes: Notes,
-    state: _State,
-    positions: Mapping[str, _Position],
-    index: int,
-    line: int,
-    code: str,
-) -> None:
-    if found := _FRAME.fullmatch(code):
-        state.frame = found[1]
-        notes.setting(line, code)
-    elif found := _TOOL.fullmatch(code):
-        state.tool = found[1]
-        notes.setting(line, code)
-    elif found := _MOVE.fullmatch(code):
-        state.moves.append(index)
-        word, number, *rest = found.groups()
-        position = positions.get(number)
+    def statement(self, index: int, line: int, code: str) -> None:
+        notes, jump = self.notes, _JUMP.fullmatch(code)
+        if jump:
+            self.jumps.append((index, jump[1], line))
+        if found := _MOVE.fullmatch(code):
+            self.moves.append(index)
+            self._move(line, code, found)
+        elif found := _SETTING.fullmatch(code):
+            self.holds[found[1]] = found[2]
+            notes.setting(line, code)
+        elif label := _LABEL.fullmatch(code):
+            self.labels.setdefault(label[1], []).append(index)
+            notes.setting(line, code)
+        elif jump and code.startswith("JMP "):
+            notes.setting(line, code)
+        else:
+            if code.startswith("CALL "):
+                self.moves.append(index)  # no jump may pass it either
+            notes.other(line, code)
+
+    def _move(self, line: int, code: str, found: re.Match[str]) -> None:
+        notes = self.notes
+        word, number, speed, unit, end = found.groups()
+        position, tool = self.positions.get(number), self.holds.get("UTOOL_NUM")
         if position is None:
             notes.doubt(line, f"P[{number}] is not there")
-        elif state.frame != "0" or position.frame != "0":
+        elif not self.holds.get("UFRAME_NUM") == position.frame == "0":
             notes.doubt(line, "moves in a user frame, or before UFRAME_NUM=0")
-        elif position.tool != state.tool:
-            notes.doubt(line, f"P[{number}] is of tool {position.tool}, UTOOL_NUM {state.tool}")
+        elif position.tool != tool:
+            notes.doubt(line, f"P[{number}] is of tool {position.tool}, UTOOL_NUM {tool}")
         else:
-            axes = np.array([float(axis) for axis in position.axes])
-            move = _move(notes.place(line), word, axes, rest, position.tool)
-            if notes.begun == (move.speed.unit is SpeedUnit.TOP_SPEED):
+            if notes.begun == (unit == "%"):
                 notes.doubt(line, "the first move needs a speed in %, every other one in msec")
+            counts = SpeedUnit.TOP_SPEED if unit == "%" else SpeedUnit.SECONDS
+            value = float(speed) / (100.0 if unit == "%" else 1e3)
+            axes = np.deg2rad([float(axis) for axis in position.axes])
+            move = ReadMove(
+                target=from_fanuc(axes),
+                straight=word == "L",
+                speed=WrittenSpeed(counts, value, speed + unit),
+                corner=Corner(0.0 if end == "FINE" else float(end[3:]) or 1.0, end),
+                tool=position.tool,
+                place=notes.place(line),
+                resolution=_HALF_DIGIT,
+            )
             meaning = code.replace(f"P[{number}]", f"P[{','.join(position.axes)}]")
             notes.move(line, code, move, meaning)
-    else:
-        if label := _LABEL.fullmatch(code):
-            state.labels.setdefault(label[1], []).append(index)
-            notes.setting(line, code)
-            return
-        if jump := _JUMP.fullmatch(code):
-            state.jumps.append((index, jump[1], line))
-        if code.startswith("JMP ") and jump:
-            notes.setting(line, code)
-            return
-        if code.startswith("CALL "):
-            state.moves.append(index)  # no jump may pass it either
-        notes.other(line, code)
 
-
-def _move(place: str, word: str, axes: Array, rest: list[str], tool: str) -> ReadMove:
-    number, unit, end = rest
-    speed = (
-        Speed(SpeedUnit.TOP_SPEED, float(number) / 100.0, f"{number}%")
-        if unit == "%"
-        else Speed(SpeedUnit.SECONDS, float(number) / 1e3, f"{number}msec")
-    )
-    return ReadMove(
-        target=from_fanuc(np.deg2rad(axes)),
-        straight=word == "L",
-        speed=speed,
-        corner=Corner(0.0 if end == "FINE" else float(end[3:]) or 1.0, end),
-        tool=tool,
-        place=place,
-        resolution=_HALF_DIGIT,
-    )
-
-
-def _check_jumps(notes: Notes, state: _State) -> None:
-    """A jump may wait, but neither skip nor repeat a move."""
-    for index, label, line in state.jumps:
-        places = state.labels.get(label, [])
-        if len(places) != 1:
-            notes.doubt(line, f"LBL[{label}] is not there once")
-            continue
-        low, high = sorted((places[0], index))
-        if any(low <= move <= high for move in state.moves):
-            notes.doubt(line, "jumps past moves")
-
-
-def start_speed(robot: Robot) -> Speed:
-    """Return the fastest first move."""
-    return Speed(SpeedUnit.TOP_SPEED, START_SPEED, f"{100.0 * START_SPEED:.0f}%")
-
-
-def corners(settings: ProgramSettings) -> Corners:
-    """Return the largest corners: CNT100 wherever the robot need not stop."""
-    corner = Corner(LARGEST_CNT, f"CNT{LARGEST_CNT:.0f}")
-    return Corners(Corner(0.0, "FINE"), corner, corner, corner)
+    def check_jumps(self) -> None:
+        """A jump may wait, but neither skip nor repeat a move."""
+        for index, label, line in self.jumps:
+            places = self.labels.get(label, [])
+            if len(places) != 1:
+                self.notes.doubt(line, f"LBL[{label}] is not there once")
+                continue
+            low, high = sorted((places[0], index))
+            if any(low <= move <= high for move in self.moves):
+                self.notes.doubt(line, "jumps past moves")

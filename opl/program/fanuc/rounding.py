@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from opl.cell.robot import Robot
+from opl.geometry.frames import Array
 from opl.program.digits import within
-from opl.program.settings import Array, ProgramSettings
+from opl.program.settings import ProgramSettings
 
 DECIMALS = 3
 

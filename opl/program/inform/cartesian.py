@@ -1,25 +1,23 @@
-"""Cartesian positions of INFORM jobs: RECTAN values and RCONF, both ways.
+"""Cartesian positions of INFORM jobs: RECTAN values and RCONF, written and read.
 
 RCONF names one of the eight configurations of a pose: flip or not, upper or lower arm, front or
-    rear, and
-whether R, T and S stand beyond half a turn. That flip is the configuration with B not negative is
-inferred: jobs saved by controllers show no-flip for B < 0, and none was found with B > 0.
+rear, and whether R, T and S stand beyond half a turn. That flip is the configuration with B not
+negative is inferred: jobs saved by controllers show no-flip for B < 0, and none was found with
+B > 0.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.cell.full_turns import FULL_TURN, angular_distance
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
 from opl.errors import UnsafeError
-from opl.geometry.frames import from_roll_pitch_yaw, inverse, roll_pitch_yaw
+from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, roll_pitch_yaw
 from opl.program.controller import ControllerProfile
+from opl.program.digits import fixed
 from opl.program.settings import PositionForm, ProgramSettings
-
-Array = NDArray[np.float64]
 
 # In the order of RCONF, the joints whose half turn it names.
 _HALF_TURN_JOINTS = (3, 5, 0)  # R, T, S
@@ -43,14 +41,14 @@ def rectan(Ts_frame_tool: Array, profile: ControllerProfile) -> list[str]:
     angles = np.rad2deg(roll_pitch_yaw(Ts_frame_tool))
     return [
         ",".join(
-            [_fixed(value, profile.length_decimals) for value in length]
-            + [_fixed(value, profile.angle_decimals) for value in angle]
+            [fixed(float(value), profile.length_decimals) for value in length]
+            + [fixed(float(value), profile.angle_decimals) for value in angle]
         )
         for length, angle in zip(lengths, angles, strict=True)
     ]
 
 
-def pose_of(values: tuple[float, ...]) -> Array:
+def rectan_pose(values: tuple[float, ...]) -> Array:
     """Return the pose of RECTAN values, T_frame_tool, shape (4, 4)."""
     return from_roll_pitch_yaw(np.deg2rad(values[3:6]), np.array(values[:3]) * 1e-3)
 
@@ -106,29 +104,24 @@ def require_read_back(robot: Robot, q: Array, values: str, numbers: tuple[int, .
     """
     for joint in _HALF_TURN_JOINTS:
         if abs(abs(q[joint]) - np.pi) < _HALF_TURN_WIDTH:
-            raise _untold(robot, q, joint, "its other half turn")
-    T_frame_tool = pose_of(tuple(float(value) for value in values.split(",")))
+            raise _ambiguous(robot, q, joint, "its other half turn")
+    T_frame_tool = rectan_pose(tuple(float(value) for value in values.split(",")))
     T_base_flange = T_base_frame @ T_frame_tool @ inverse(T_flange_tool)
     found = configurations(robot, T_base_flange, numbers, q)
     for other in found:
         apart = np.abs(other - q)
         if apart.max() > _SAME_CONFIGURATION:
             joint = int(apart.argmax())
-            raise _untold(robot, q, joint, f"{np.rad2deg(other[joint]):.1f} deg")
+            raise _ambiguous(robot, q, joint, f"{np.rad2deg(other[joint]):.1f} deg")
     if not len(found):
-        raise _untold(robot, q, 4, "a configuration out of reach")
+        raise _ambiguous(robot, q, 4, "a configuration out of reach")
     configuration: Array = found[0]
     return configuration
 
 
-def _untold(robot: Robot, q: Array, joint: int, other: str) -> UnsafeError:
+def _ambiguous(robot: Robot, q: Array, joint: int, other: str) -> UnsafeError:
     shown = " ".join(f"{angle:.2f}" for angle in np.rad2deg(q))
     return UnsafeError(
         f"configuration {shown} deg: a Cartesian job cannot tell joint {robot.joint_names[joint]} "
         f"from {other}; move it away from there or write pulses"
     )
-
-
-def _fixed(value: float, decimals: int) -> str:
-    """Return a number with fixed decimals, never -0."""
-    return f"{round(float(value), decimals) + 0.0:.{decimals}f}"

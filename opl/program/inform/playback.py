@@ -5,43 +5,31 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.cell.robot import Robot
 from opl.errors import InputError
 from opl.findings import Finding, Level
+from opl.geometry.frames import Array
 from opl.program.inform.job import InformJob
 from opl.program.inform.sequence import Visit, first_job, visits
-from opl.program.inform.times import job_configurations
+from opl.program.inform.times import job_configurations, written_speed
 from opl.program.moves import SAME_CONFIGURATION, START_SPEED
-from opl.program.played import Corner, Corners, Playback, ReadMove, Speed, SpeedUnit
-from opl.program.played import play as play_moves
+from opl.program.played import Corner, Corners, Playback, ReadMove, SpeedUnit, WrittenSpeed, play
 from opl.program.pulses import PulseScale
 from opl.program.settings import ProgramSettings
 
-Array = NDArray[np.float64]
-
-# What the number of each speed is multiplied by to be in SI.
-_UNITS = {
-    "VJ": (SpeedUnit.TOP_SPEED, 1e-2),
-    "V": (SpeedUnit.TOOL_POINT, 1e-3),
-    "VR": (SpeedUnit.HAND, float(np.deg2rad(1.0))),
-}
+# The fastest first move of a job.
+START = WrittenSpeed(SpeedUnit.TOP_SPEED, START_SPEED, f"VJ={100.0 * START_SPEED:.2f}")
 # Instructions at which the robot stands still.
 _WAITS = ("TIMER", "WAIT", "PAUSE", "CALL")
 
 
-def play(
+def play_jobs(
     jobs: Mapping[str, InformJob],
     robot: Robot,
     settings: ProgramSettings,
 ) -> tuple[Playback | None, list[Finding]]:
     """Return what a controller does with jobs, and what is in doubt; None if something is.
-
-    Args:
-        jobs: All jobs of a program by name.
-        robot: Whose program.
-        settings: Tool, user frame, and which jobs of the user's own may be called.
 
     Raises:
         InputError: If the jobs are not those of one program, or of another robot.
@@ -70,16 +58,10 @@ def play(
             )
         )
         before = visit.job
-    playback, doubtful = play_moves(moves, robot, settings.T_flange_tool)
+    playback, doubtful = play(moves, robot, settings.T_flange_tool)
     if not found:
         return playback, doubtful
     return None, [*found, *(doubtful if moves else [])]
-
-
-def start_speed(robot: Robot) -> Speed:
-    """Return the fastest first move of a job."""
-    text = f"VJ={100.0 * START_SPEED:.2f}"
-    return Speed(SpeedUnit.TOP_SPEED, START_SPEED, text)
 
 
 def corners(settings: ProgramSettings) -> Corners:
@@ -92,14 +74,12 @@ def _move(
     visit: Visit, target: Array, resolution: Array, starts: bool, waits: tuple[str, ...]
 ) -> ReadMove:
     step = visit.step
-    tag = next(name for name, _ in step.tags if name in _UNITS)
-    unit, factor = _UNITS[tag]
-    value, level = step.tag(tag) or "nan", step.tag("PL")
+    level = step.tag("PL")
     size = float(level) if level is not None and level.isdecimal() else np.inf
     return ReadMove(
         target=target,
         straight=step.word == "MOVL",
-        speed=Speed(unit, factor * float(value), f"{tag}={value}"),
+        speed=written_speed(step),
         corner=Corner(size, "none" if level is None else f"PL={level}"),
         tool=str(_tool(visit)),
         place=_place(visit),

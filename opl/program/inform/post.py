@@ -6,29 +6,28 @@ from collections.abc import Mapping
 from datetime import datetime
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.cell.robot import Robot
 from opl.errors import InputError
+from opl.findings import Finding, Level
 from opl.program.controller import ControllerProfile
 from opl.program.inform.cartesian import frame_pose
 from opl.program.inform.compare import differences_in_meaning
-from opl.program.inform.files import decode, program_jobs
-from opl.program.inform.layout import VARIABLES
-from opl.program.inform.parse import parse, read_jobs
-from opl.program.inform.playback import corners, play, start_speed
+from opl.program.inform.faults import job_faults
+from opl.program.inform.job import InformJob
+from opl.program.inform.job_layout import VARIABLES
+from opl.program.inform.parse import decode, parse, read_jobs, unparse
+from opl.program.inform.playback import START, corners, play_jobs
+from opl.program.inform.positions import rounded_to_job
 from opl.program.inform.render import FILE_SUFFIX, TEMPLATE, render, split_for
-from opl.program.inform.rounding import rounded
 from opl.program.inform.summary import describe
-from opl.program.inform.times import move_times
+from opl.program.inform.times import move_times, written_speed
 from opl.program.moves import Program
 from opl.program.played import Reading
 from opl.program.posts import Post, Reader, Written, pass_times
 from opl.program.profiles import PROFILES
 from opl.program.pulses import require_accepted, require_known
 from opl.program.settings import PositionForm, ProgramSettings
-
-Array = NDArray[np.float64]
 
 
 def write_jobs(
@@ -40,23 +39,15 @@ def write_jobs(
 ) -> Written:
     """Return the job files of a program: one, or a master and the parts it calls.
 
-    Args:
-        program: What the robot shall do.
-        robot: Who shall do it.
-        settings: How it is written.
-        profile: The controller.
-        date: Date of the jobs.
-
     Raises:
-        InputError: If something the job asks for is not legal on the controller, the template is
+        InputError: If a setting of the job is not legal on the controller, the template is
             unusable, or a pulse ratio is neither verified nor accepted.
         UnsafeError: If a configuration is beyond the soft limits.
         OplError: If a pass has more moves than a job can hold, or cannot keep its time.
     """
     if settings.positions is PositionForm.PULSES:
-        require_known(robot, "program.pulse_ratios")
-        where = "program.accept_unverified_pulses"
-        require_accepted(robot.unverified_pulses, settings.accepted_pulses, where)
+        require_known(robot)
+        require_accepted(robot.unverified_pulses, settings.accepted_pulses)
     parts = split_for(program, profile)
     clash = settings.actions.calls & {part.name for part in parts}
     if clash:
@@ -71,30 +62,32 @@ def write_jobs(
         for move, line, time in zip(part.moves, job.moves, written_times, strict=True):
             if move.duration is None and move.motion_index in speeds:
                 continue  # a part begins where the one before it ended
-            speeds[move.motion_index] = next(
-                f"{tag}={value}" for tag, value in line.tags if tag in ("VJ", "V", "VR")
-            )
+            speeds[move.motion_index] = written_speed(line).text
             if np.isfinite(time):
                 times[move.motion_index] = float(time)
     return Written(files, speeds, times, pass_times(program, times, profile.name))
 
 
-def read(
+def _read(
     files: Mapping[str, bytes], robot: Robot, settings: ProgramSettings, profile: ControllerProfile
 ) -> Reading:
     """Read the job files of a program: the master and all parts it calls.
 
-    Args:
-        files: Content by what messages call the file.
-        robot: Whose program.
-        settings: Tool, user frame, and which jobs of the user's own may be called.
-        profile: The controller.
-
     Raises:
         InputError: If the files are no jobs, not those of one program, or of another robot.
     """
-    jobs, refused = program_jobs(files, profile)
-    playback, doubtful = play(jobs, robot, settings)
+    jobs: dict[str, InformJob] = {}
+    refused: list[Finding] = []
+    for source, data in files.items():
+        text, _ = decode(data)
+        several = read_jobs(text, source)
+        for job in several:
+            if job.name in jobs:
+                raise InputError(source, f"a job {job.name} was given before")
+            jobs[job.name] = job
+            faults = job_faults(text if len(several) == 1 else unparse(job), profile)
+            refused += [Finding(Level.ERROR, "file", source, fault) for fault in faults]
+    playback, doubtful = play_jobs(jobs, robot, settings)
     foreign = sorted({name for job in jobs.values() for name in job.calls} - jobs.keys())
     return Reading(playback, tuple(foreign), (*refused, *doubtful))
 
@@ -126,21 +119,23 @@ def file_differences(first: tuple[str, bytes], second: tuple[str, bytes]) -> lis
 
 def post_of(profile: ControllerProfile) -> Post:
     """Return the post of a controller."""
-
-    def write(program: Program, robot: Robot, settings: ProgramSettings, date: datetime) -> Written:
-        return write_jobs(program, robot, settings, profile, date)
-
-    def read_files(files: Mapping[str, bytes], robot: Robot, settings: ProgramSettings) -> Reading:
-        return read(files, robot, settings, profile)
-
-    def rounded_q(q: Array, robot: Robot, settings: ProgramSettings) -> Array:
-        return rounded(q, robot, settings, profile)
-
     reader = Reader(
-        FILE_SUFFIX, read_files, rounded_q, start_speed, corners, describe_file, file_differences
+        FILE_SUFFIX,
+        lambda files, robot, settings: _read(files, robot, settings, profile),
+        lambda q, robot, settings: rounded_to_job(q, robot, settings, profile),
+        lambda robot: START,
+        corners,
+        describe_file,
+        file_differences,
     )
-    title = f"Yaskawa {profile.name} (INFORM)"
-    return Post(title, write, TEMPLATE, VARIABLES, counts_pulses=True, reader=reader)
+    return Post(
+        f"Yaskawa {profile.name} (INFORM)",
+        lambda program, robot, settings, date: write_jobs(program, robot, settings, profile, date),
+        TEMPLATE,
+        VARIABLES,
+        counts_pulses=True,
+        reader=reader,
+    )
 
 
 NX100, DX100, DX200, YRC1000 = (

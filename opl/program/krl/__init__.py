@@ -5,16 +5,18 @@ written points; the corners that C_PTP and C_DIS cut off are not. A single joint
 percent of top speed faster than planned; passes keep their time.
 """
 
-from opl.program.krl.read import corners, parse, start_speed
-from opl.program.krl.rounding import rounded
-from opl.program.krl.write import TEMPLATE, VARIABLES, tool_name, write
+from opl.program.digits import rounded_degrees
+from opl.program.krl.read import CORNERS, DECIMALS, START, parse
+from opl.program.krl.write import DIALECT, VARIABLES, tool_name, write
 from opl.program.listing import listing_reader
 from opl.program.posts import Post
 
 POST = Post(
     "KUKA KRL",
     write,
-    TEMPLATE,
+    DIALECT.template,
     VARIABLES,
-    reader=listing_reader(".src", parse, tool_name, rounded, start_speed, corners),
+    reader=listing_reader(
+        DIALECT.suffix, parse, tool_name, rounded_degrees(DECIMALS), lambda robot: START, CORNERS
+    ),
 )

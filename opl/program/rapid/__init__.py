@@ -6,16 +6,18 @@ not.
 """
 
 from opl.program.dialect import VARIABLES
+from opl.program.digits import rounded_degrees
 from opl.program.listing import listing_reader
 from opl.program.posts import Post
-from opl.program.rapid.read import corners, parse, start_speed
-from opl.program.rapid.rounding import rounded
-from opl.program.rapid.write import TEMPLATE, tool_name, write
+from opl.program.rapid.read import CORNERS, DECIMALS, START, parse
+from opl.program.rapid.write import DIALECT, tool_name, write
 
 POST = Post(
     "ABB RAPID",
     write,
-    TEMPLATE,
+    DIALECT.template,
     VARIABLES,
-    reader=listing_reader(".mod", parse, tool_name, rounded, start_speed, corners),
+    reader=listing_reader(
+        DIALECT.suffix, parse, tool_name, rounded_degrees(DECIMALS), lambda robot: START, CORNERS
+    ),
 )

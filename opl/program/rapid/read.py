@@ -11,15 +11,16 @@ import re
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from opl.cell.robot import Robot
 from opl.geometry.frames import pose
-from opl.program.played import Corner, Corners, ReadMove, Speed, SpeedUnit
-from opl.program.rapid.rounding import DECIMALS
-from opl.program.settings import Array, ProgramSettings
+from opl.program.played import Corner, Corners, ReadMove, SpeedUnit, WrittenSpeed
 from opl.program.statements import NUMBER, Listing, Notes, Words, code_lines
 
-# Speed of the move to the first configuration, which has no time: 50 mm/s at the tool point.
-START = 50
+DECIMALS = 4
+# Of the move to the first configuration, which has no time.
+START = WrittenSpeed(SpeedUnit.TOOL_POINT, 0.05, "v50")
+_FINEST_ZONE = 0.3  # z0 in [mm] of the tool point; the others are named after theirs
+_ZONE = Corner(_FINEST_ZONE, "z0")
+CORNERS = Corners(Corner(0.0, "fine"), _ZONE, _ZONE, _ZONE)
 
 _WORDS = Words(
     passing=re.compile(r'(?:SetDO do[0-9]+, ?[01]|TPWrite "[^"]*"|TPErase) ?;', re.I),
@@ -37,22 +38,25 @@ _NO_AXES = r"\[9E9(?:,9E9){5}\]"
 _REST = rf",v([0-9]+)(?:\\T:=({NUMBER}))?,(fine|z[0-9]+),(\w+);"
 _ABSOLUTE = re.compile(rf"MoveAbsJ\[{_ROW},{_NO_AXES}\](?:\\NoEOffs)?{_REST}", re.I)
 _LINE = re.compile(rf"MoveL\[{_ROW},{_ROW},{_ROW},{_NO_AXES}\]{_REST}", re.I)
-_FINEST_ZONE = 0.3  # z0 in [mm] of the tool point; the others are named after theirs
 _HALF_DIGIT = np.full(6, 0.5 * np.deg2rad(10.0**-DECIMALS))
 # What the digits of a pose may do to a joint in [rad], in no singularity.
 _POSE_DIGITS = np.full(6, 1e-4)
 
 
+# The lines that enclose the procedure, and how many of them stand before its statements.
+_FRAME = (
+    re.compile(r"MODULE \w+", re.I),
+    re.compile(r"PROC (?P<name>\w+) ?\( ?\)", re.I),
+    re.compile(r"ENDPROC", re.I),
+    re.compile(r"ENDMODULE", re.I),
+)
+_INSIDE = 2
+_VARIABLE = re.compile(r"VAR bool late ?:= ?FALSE ?;", re.I)
+_CONF = re.compile(r"ConfL ?\\(On|Off) ?;", re.I)
+
+
 def parse(text: str, source: str) -> Listing:
-    """Return the program of a module.
-
-    Args:
-        text: Of the file.
-        source: The file, for messages.
-
-    Raises:
-        InputError: If it holds no procedure.
-    """
+    """Return the program of a module; see `listing_reader`."""
     notes = Notes(source, _WORDS)
     passed = 0  # of the lines that enclose the procedure
     free = False  # whether ConfL is off
@@ -76,83 +80,43 @@ def parse(text: str, source: str) -> Listing:
     return notes.listing(line)
 
 
-_FRAME = (
-    re.compile(r"MODULE \w+", re.I),
-    re.compile(r"PROC (?P<name>\w+) ?\( ?\)", re.I),
-    re.compile(r"ENDPROC", re.I),
-    re.compile(r"ENDMODULE", re.I),
-)
-_INSIDE = 2  # lines of them before the statements of the procedure
-_VARIABLE = re.compile(r"VAR bool late ?:= ?FALSE ?;", re.I)
-_CONF = re.compile(r"ConfL ?\\(On|Off) ?;", re.I)
-
-
 def _statement(notes: Notes, line: int, code: str, free: bool) -> None:
     tight = code.replace(" ", "")
-    if found := _ABSOLUTE.fullmatch(tight):
-        angles, *rest = found.groups()
-        target = _numbers(angles)
-        if len(target) == 6:
-            move = _move(notes, line, np.deg2rad(target), rest, straight=False)
-            notes.move(line, code, move, tight)
+    found = _ABSOLUTE.fullmatch(tight) or _LINE.fullmatch(tight)
+    groups = found.groups() if found else ()
+    *rows, v, time, zone, tool = groups or ("", "", "", "")
+    numbers = [np.array([float(number) for number in row.split(",")]) for row in rows]
+    sizes = [len(row) for row in numbers]
+    quarters: tuple[int, ...] = ()
+    if sizes == [6]:
+        (target,) = np.deg2rad(numbers)
+    elif sizes == [3, 4, 4]:
+        p, (w, *xyz), turns = numbers
+        if not free:
+            notes.doubt(line, "MoveL stands where ConfL is not off")
+        if abs(np.linalg.norm([w, *xyz]) - 1.0) > 1e-4:
+            notes.doubt(line, "the quaternion is not of length 1")
             return
-    elif found := _LINE.fullmatch(tight):
-        at, turned, quarters, *rest = found.groups()
-        p, quaternion, turns = _numbers(at), _numbers(turned), _numbers(quarters)
-        if (len(p), len(quaternion), len(turns)) == (3, 4, 4):
-            if not free:
-                notes.doubt(line, "MoveL stands where ConfL is not off")
-            if abs(np.linalg.norm(quaternion) - 1.0) > 1e-4:
-                notes.doubt(line, "the quaternion is not of length 1")
-                return
-            w, *xyz = quaternion
-            T = pose(Rotation.from_quat([*xyz, w]).as_matrix(), p * 1e-3)
-            cf = tuple(int(turn) for turn in turns[:3])
-            move = _move(notes, line, T, rest, straight=True, quarters=cf)
-            notes.move(line, code, move, tight)
-            return
-    notes.other(line, code)
-
-
-def _move(
-    notes: Notes,
-    line: int,
-    target: Array,
-    rest: list[str],
-    straight: bool,
-    quarters: tuple[int, ...] = (),
-) -> ReadMove:
-    v, time, zone, tool = rest
+        target = pose(Rotation.from_quat([*xyz, w]).as_matrix(), p * 1e-3)
+        quarters = tuple(int(turn) for turn in turns[:3])
+    else:
+        notes.other(line, code)
+        return
     if time is None:
         if notes.begun:
             notes.doubt(line, "a move after the first one needs its time (argument T)")
-        speed = Speed(SpeedUnit.TOOL_POINT, float(v) * 1e-3, f"v{v}")
+        speed = WrittenSpeed(SpeedUnit.TOOL_POINT, float(v) * 1e-3, f"v{v}")
     else:
-        speed = Speed(SpeedUnit.SECONDS, float(time), f"\\T:={time}")
+        speed = WrittenSpeed(SpeedUnit.SECONDS, float(time), f"\\T:={time}")
     zone = zone.lower()
-    size = 0.0 if zone == "fine" else float(zone[1:]) or _FINEST_ZONE
-    return ReadMove(
+    move = ReadMove(
         target=target,
-        straight=straight,
+        straight=len(rows) > 1,
         speed=speed,
-        corner=Corner(size, zone),
+        corner=Corner(0.0 if zone == "fine" else float(zone[1:]) or _FINEST_ZONE, zone),
         tool=tool.lower(),
         place=notes.place(line),
-        resolution=_POSE_DIGITS if straight else _HALF_DIGIT,
+        resolution=_POSE_DIGITS if len(rows) > 1 else _HALF_DIGIT,
         quarters=quarters,
     )
-
-
-def _numbers(text: str) -> Array:
-    return np.array([float(number) for number in text.split(",")])
-
-
-def start_speed(robot: Robot) -> Speed:
-    """Return the fastest first move."""
-    return Speed(SpeedUnit.TOOL_POINT, START * 1e-3, f"v{START}")
-
-
-def corners(settings: ProgramSettings) -> Corners:
-    """Return the largest zones: the finest there is wherever the robot need not stop."""
-    zone = Corner(_FINEST_ZONE, "z0")
-    return Corners(Corner(0.0, "fine"), zone, zone, zone)
+    notes.move(line, code, move, tight)

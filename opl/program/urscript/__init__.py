@@ -5,16 +5,18 @@ is proven goes through the written points; the corners that the blends cut off, 
 """
 
 from opl.program.dialect import VARIABLES
+from opl.program.digits import rounded_radians
 from opl.program.listing import listing_reader
 from opl.program.posts import Post
-from opl.program.urscript.read import corners, parse, start_speed
-from opl.program.urscript.rounding import rounded
-from opl.program.urscript.write import TEMPLATE, tool_name, write
+from opl.program.urscript.read import CORNERS, DECIMALS, parse, start_speed
+from opl.program.urscript.write import DIALECT, tool_name, write
 
 POST = Post(
     "Universal Robots URScript",
     write,
-    TEMPLATE,
+    DIALECT.template,
     VARIABLES,
-    reader=listing_reader(".script", parse, tool_name, rounded, start_speed, corners),
+    reader=listing_reader(
+        DIALECT.suffix, parse, tool_name, rounded_radians(DECIMALS), start_speed, CORNERS
+    ),
 )

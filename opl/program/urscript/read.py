@@ -11,13 +11,14 @@ import numpy as np
 
 from opl.cell.robot import Robot
 from opl.program.moves import START_SPEED
-from opl.program.played import Corner, Corners, ReadMove, Speed, SpeedUnit
-from opl.program.settings import ProgramSettings
-from opl.program.statements import NUMBER, Listing, Notes, Words, code_lines
-from opl.program.urscript.rounding import DECIMALS
+from opl.program.played import Corner, Corners, ReadMove, SpeedUnit, WrittenSpeed
+from opl.program.statements import NUMBER, Listing, Notes, Words, read_enclosed
 
+DECIMALS = 6
 # No corner needs a larger blend than this in [m].
 LARGEST_BLEND = 0.001
+_BLEND = Corner(LARGEST_BLEND, f"r={LARGEST_BLEND:.5f}")
+CORNERS = Corners(Corner(0.0, "r=0.00000"), _BLEND, _BLEND, _BLEND)
 
 _BOOL = "(?:True|False)"
 _WORDS = Words(
@@ -32,7 +33,7 @@ _WORDS = Words(
     closes=re.compile("end"),
     call=re.compile(r"([A-Za-z_]\w*)\(\)"),
 )
-_BEGIN = re.compile(r"def ([A-Za-z_]\w*)\(\):")
+_BEGIN, _END = re.compile(r"def ([A-Za-z_]\w*)\(\):"), re.compile("end")
 _TOOL = re.compile(rf"set_tcp\(p\[({NUMBER}(?:,{NUMBER}){{5}})\]\)")
 _MOVE = re.compile(
     rf"(move[jl])\(\[({NUMBER}(?:,{NUMBER}){{5}})\],"
@@ -42,27 +43,14 @@ _HALF_DIGIT = np.full(6, 0.5 * 10.0**-DECIMALS)
 
 
 def parse(text: str, source: str) -> Listing:
-    """Return the program of a script.
-
-    Args:
-        text: Of the file.
-        source: The file, for messages.
-
-    Raises:
-        InputError: If it defines no program.
-    """
+    """Return the program of a script; see `listing_reader`."""
     notes = Notes(source, _WORDS)
     tool: str | None = None
-    ended, line = False, 0
-    for line, code in code_lines(text, "#"):
+
+    def statement(line: int, code: str) -> None:
+        nonlocal tool
         tight = code.replace(" ", "")
-        if (begin := _BEGIN.fullmatch(code)) and not notes.name:
-            notes.name = begin[1]
-        elif ended or not notes.name:
-            notes.doubt(line, f"{code} stands outside of the program")
-        elif code == "end" and not notes.inside_block:
-            ended = True
-        elif found := _TOOL.fullmatch(tight):
+        if found := _TOOL.fullmatch(tight):
             tool = tool_text([float(number) for number in found[1].split(",")])
             notes.setting(line, code)
         elif found := _MOVE.fullmatch(tight):
@@ -71,9 +59,8 @@ def parse(text: str, source: str) -> Listing:
                 notes.move(line, code, move, tight)
         else:
             notes.other(line, code)
-    if not ended:
-        notes.doubt(line, "the program does not end")
-    return notes.listing(line)
+
+    return read_enclosed(notes, text, "#", _BEGIN, _END, statement)
 
 
 def tool_text(values: list[float]) -> str:
@@ -89,9 +76,9 @@ def _move(notes: Notes, line: int, found: re.Match[str], tool: str | None) -> Re
     if time is None and notes.begun:
         notes.doubt(line, "a move after the first one needs its time (t)")
     speed = (
-        Speed(SpeedUnit.LEADING_JOINT, float(velocity), f"v={velocity}")
+        WrittenSpeed(SpeedUnit.LEADING_JOINT, float(velocity), f"v={velocity}")
         if time is None
-        else Speed(SpeedUnit.SECONDS, float(time), f"t={time}")
+        else WrittenSpeed(SpeedUnit.SECONDS, float(time), f"t={time}")
     )
     return ReadMove(
         target=np.array([float(joint) for joint in joints.split(",")]),
@@ -104,13 +91,7 @@ def _move(notes: Notes, line: int, found: re.Match[str], tool: str | None) -> Re
     )
 
 
-def start_speed(robot: Robot) -> Speed:
+def start_speed(robot: Robot) -> WrittenSpeed:
     """Return the fastest first move."""
     text = f"{START_SPEED * robot.max_speed.min():.4f}"
-    return Speed(SpeedUnit.LEADING_JOINT, float(text), f"v={text}")
-
-
-def corners(settings: ProgramSettings) -> Corners:
-    """Return the largest blends wherever the robot need not stop."""
-    corner = Corner(LARGEST_BLEND, f"r={LARGEST_BLEND:.5f}")
-    return Corners(Corner(0.0, "r=0.00000"), corner, corner, corner)
+    return WrittenSpeed(SpeedUnit.LEADING_JOINT, float(text), f"v={text}")

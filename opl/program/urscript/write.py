@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from datetime import datetime
 
 import numpy as np
@@ -11,24 +10,42 @@ from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import Robot, controller_poses
 from opl.files import resources
-from opl.program.actions import Action, Call, Dwell, SetOutput, WaitInput
-from opl.program.dialect import Dialect, rounded_times, write_steps, written
+from opl.geometry.frames import Array
+from opl.program.dialect import ActionTexts, Dialect, rounded_times
 from opl.program.digits import fixed
 from opl.program.moves import Program
 from opl.program.posts import Written
-from opl.program.settings import Array, ProgramSettings
-from opl.program.urscript.read import LARGEST_BLEND, tool_text
-from opl.program.urscript.rounding import DECIMALS
+from opl.program.settings import ProgramSettings
+from opl.program.urscript.read import DECIMALS, LARGEST_BLEND, tool_text
 
-TEMPLATE = resources.folder("templates") / "urscript" / "program.script.j2"
-
-_DIALECT = Dialect(
+DIALECT = Dialect(
     maker="URScript",
+    suffix=".script",
+    template=resources.folder("templates") / "urscript" / "program.script.j2",
     name=re.compile(r"[A-Z][A-Z0-9_]{0,49}"),
     name_rule="a letter and up to 49 letters, digits or _",
     comment_length=80,
     motion=re.compile(r"^(?:move[jlpc]|servo[jc]|speed[jl])\("),
     line_end="\n",
+    actions=ActionTexts(
+        states=("False", "True"),
+        output="set_standard_digital_out({number}, {state})",
+        dwell="sleep({seconds:.2f})",
+        wait=("while get_standard_digital_in({number}) != {state}:", "sync()", "end"),
+        timed_wait=(
+            "waited = 0.0",
+            "while get_standard_digital_in({number}) != {state}:",
+            "sleep(0.01)",
+            "waited = waited + 0.01",
+            "if waited >= {timeout:.2f}:",
+            'popup("no signal at input {number}", blocking=True)',
+            "waited = 0.0",
+            "end",
+            "end",
+        ),
+        call="{name}()",
+        remark="# {text}",
+    ),
 )
 _BLEND_SHARE = 0.4  # of the shorter neighbouring move: two blends must not overlap
 _START_ACCELERATION = 0.3  # [rad/s^2] of the move to the first configuration
@@ -47,10 +64,8 @@ def _tool_pose(settings: ProgramSettings) -> list[str]:
 
 def write(program: Program, robot: Robot, settings: ProgramSettings, date: datetime) -> Written:
     """Return the program as URScript."""
-    _DIALECT.require_legal(program, settings)
     times = rounded_times(program.moves, 4, 0.0001)
-    q = np.array([move.q for move in program.moves]).reshape(-1, 6)
-    Ts_base_tool = controller_poses(robot, q) @ settings.T_flange_tool
+    Ts_base_tool = controller_poses(robot, program.q) @ settings.T_flange_tool
     blends = _blends(program, Ts_base_tool)
     moves = []
     for move, time, blend in zip(program.moves, times, blends, strict=True):
@@ -60,16 +75,8 @@ def write(program: Program, robot: Robot, settings: ProgramSettings, date: datet
             speed = f"a={_START_ACCELERATION}, v={move.speed * robot.max_speed.min():.4f}"
         word = "movel" if move.straight else "movej"
         moves.append((f"{word}({target}, {speed}, r={blend:.5f})", target, speed, float(time)))
-    steps = write_steps(program, moves, lambda action: [*_action(action)])
-    values = {
-        "name": program.name,
-        "date": f"{date:%Y-%m-%d %H:%M}",
-        "title": settings.title,
-        "tool": "p[" + ", ".join(_tool_pose(settings)) + "]",
-        "comments": program.comments,
-    }
-    text = _DIALECT.render(settings.template or TEMPLATE, values, steps)
-    return written(program, f"{program.name}.script", text, steps)
+    tool = "p[" + ", ".join(_tool_pose(settings)) + "]"
+    return DIALECT.write(program, settings, date, tool, moves)
 
 
 def _blends(program: Program, Ts_base_tool: Array) -> Array:
@@ -79,29 +86,3 @@ def _blends(program: Program, Ts_base_tool: Array) -> Array:
     room = np.minimum(_BLEND_SHARE * np.minimum(before, after), LARGEST_BLEND)
     stops = np.array([move.exact_stop for move in program.moves], dtype=bool)
     return np.where(stops, 0.0, room)
-
-
-def _action(action: Action) -> Iterator[str]:
-    if isinstance(action, SetOutput):
-        yield f"set_standard_digital_out({action.number}, {action.state})"
-    elif isinstance(action, Dwell):
-        yield f"sleep({action.seconds:.2f})"
-    elif isinstance(action, WaitInput):
-        missing = f"get_standard_digital_in({action.number}) != {action.state}"
-        if action.timeout is None:
-            yield from (f"while {missing}:", "sync()", "end")
-        else:
-            yield "waited = 0.0"
-            yield f"while {missing}:"
-            yield "sleep(0.01)"
-            yield "waited = waited + 0.01"
-            yield f"if waited >= {action.timeout:.2f}:"
-            # gone on with by a person, it waits again instead of going on without the signal
-            yield f'popup("no signal at input {action.number}", blocking=True)'
-            yield "waited = 0.0"
-            yield "end"
-            yield "end"
-    elif isinstance(action, Call):
-        yield f"{action.name}()"
-    else:
-        yield f"# {action.text}"

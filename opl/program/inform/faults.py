@@ -1,4 +1,4 @@
-"""Would a controller load and play this job? Every limit that can be told from its text alone."""
+"""Would a controller load and play this job? Every limit that its text alone can break."""
 
 from __future__ import annotations
 
@@ -15,24 +15,10 @@ from opl.program.inform.parse import parse
 # Order in which controllers write the headers that occur once; the others hold for the positions
 # after them and stand among those.
 _HEADER_ORDER = (
-    "/JOB",
-    "//NAME",
-    "///FOLDERNAME",
-    "//POS",
-    "///NPOS",
-    "//ARGINFO",
-    "///ARGTYPE",
-    "///COMMENT",
-    "//INST",
-    "///DATE",
-    "///COMM",
-    "///ATTR",
-    "////FRAME",
-    "///GROUP1",
-    "///GROUP2",
-    "///GROUP3",
+    "/JOB", "//NAME", "///FOLDERNAME", "//POS", "///NPOS", "//ARGINFO", "///ARGTYPE", "///COMMENT",
+    "//INST", "///DATE", "///COMM", "///ATTR", "////FRAME", "///GROUP1", "///GROUP2", "///GROUP3",
     "///LVARS",
-)
+)  # fmt: skip
 _REQUIRED_HEADERS = ("//POS", "///NPOS", "//INST", "///DATE", "///ATTR")
 _DATE = re.compile(r"[0-9]{4}/[0-9]{2}/[0-9]{2} [0-9]{2}:[0-9]{2}")
 _NOT_PRINTABLE = re.compile(r"[^\t -~]")
@@ -41,13 +27,8 @@ _SIGNAL = re.compile(r"\b(IN|OT)#\(([0-9]{1,9})\)")
 _VARIABLE = re.compile(r"[A-Z]+(?:[0-9]+|\[.*\])")
 
 
-def find_faults(text: str, profile: ControllerProfile) -> tuple[str, ...]:
-    """Return what a controller would refuse or misread, one line each, empty if nothing.
-
-    Args:
-        text: A whole file.
-        profile: The controller.
-    """
+def job_faults(text: str, profile: ControllerProfile) -> tuple[str, ...]:
+    """Return what a controller would refuse or misread in a whole file, one line each."""
     try:
         job = parse(text)
     except InputError as error:
@@ -164,34 +145,28 @@ def _word_faults(step: Instruction, profile: ControllerProfile) -> Iterator[str]
 
 
 def _move_faults(move: Instruction, profile: ControllerProfile) -> Iterator[str]:
-    speeds = (
-        ("VJ", profile.joint_speed),
-        ("V", profile.linear_speed),
-        ("VR", profile.angular_speed),
-    )
-    for name, allowed in speeds:
+    speeds = {
+        "VJ": profile.joint_speed,
+        "V": profile.linear_speed,
+        "VR": profile.angular_speed,
+    }
+    ramp, levels = profile.ramp_percent, (0, profile.position_levels)
+    whole = {"ACC": ramp, "DEC": ramp, "PL": levels}
+    for name in (*speeds, *whole):
         text = move.tag(name)
         if text is None or _VARIABLE.fullmatch(text):
             continue
+        if name in whole:
+            low, high = whole[name]
+            if text not in map(str, range(low, high + 1)):
+                yield f"line {move.line}: {name} must be {low} to {high}, got {text}"
+            continue
+        allowed = speeds[name]
         if not re.fullmatch(rf"[0-9]{{1,9}}\.[0-9]{{{allowed.decimals}}}", text):
             yield f"line {move.line}: {name} must have {allowed.decimals} decimals, got {text}"
         elif not allowed.lowest <= float(text) <= allowed.highest:
             span = f"{allowed.lowest} to {allowed.highest}"
             yield f"line {move.line}: {name} must be {span}, got {text}"
-    lowest, highest = profile.ramp_percent
-    for name in ("ACC", "DEC"):
-        percent = move.tag(name)
-        if percent is None or _VARIABLE.fullmatch(percent):
-            continue
-        if percent not in map(str, range(lowest, highest + 1)):
-            yield f"line {move.line}: {name} must be {lowest} to {highest}, got {percent}"
-    level = move.tag("PL")
-    if (
-        level is not None
-        and not _VARIABLE.fullmatch(level)
-        and level not in map(str, range(profile.position_levels + 1))
-    ):
-        yield f"line {move.line}: PL must be 0 to {profile.position_levels}, got {level}"
 
 
 def _listed(counts: tuple[int, ...]) -> str:

@@ -6,21 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
-import numpy as np
-from numpy.typing import NDArray
-
 from opl.cell.robot import Robot, forward_kinematics
+from opl.geometry.frames import Array
 from opl.motion.motion import VerifiedMotion
-from opl.program.actions import Action
 from opl.program.cycle import cycle_time
 from opl.program.lines import with_straight_moves
-from opl.program.moves import START_SPEED, Kind, Move, Program, plan_moves
+from opl.program.moves import START_SPEED, Move, Program, Purpose, plan_moves
 from opl.program.posts import find_post
 from opl.program.pulses import PulseScale
 from opl.program.settings import MotionForm, ProgramSettings
 from opl.program.table import render_table
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +31,7 @@ class StraightLimit:
     tolerance: float
 
 
-def write_program(
+def export_program(
     verified: VerifiedMotion,
     name: str,
     robot: Robot,
@@ -57,7 +52,7 @@ def write_program(
         comments: Lines at the top.
 
     Raises:
-        OplError: If the controller does not take the program as the job asks for it.
+        OplError: If the controller does not take the program with the settings of the job.
     """
     post = find_post(settings.controller)
     program = plan_moves(
@@ -76,9 +71,9 @@ def write_program(
 
 
 def try_out(name: str, home: Array, robot: Robot, settings: ProgramSettings) -> None:
-    """Write a program that goes home only, with all that is asked for around the passes.
+    """Write a program that goes home only, with all actions around the passes.
 
-    Whatever the controller or the template does not take is so told before the long work of
+    What the controller or the template does not take is so refused before the long work of
     planning.
 
     Args:
@@ -90,17 +85,10 @@ def try_out(name: str, home: Array, robot: Robot, settings: ProgramSettings) -> 
     Raises:
         OplError: If the post refuses it.
     """
-    asked = settings.actions
-    actions: tuple[Action, ...] = (
-        *asked.at_start,
-        *asked.before_pass,
-        *asked.after_pass,
-        *asked.at_end,
-    )
     moves = tuple(
         Move(home, START_SPEED, exact_stop=True, on_wheel=False, motion_index=k, kind=kind)
-        for k, kind in enumerate(Kind)
+        for k, kind in enumerate(Purpose)
     )
-    last = replace(moves[-1], actions=actions)
+    last = replace(moves[-1], actions=settings.actions.every)
     program = Program(name, moves=(*moves[:-1], last))
     find_post(settings.controller).write(program, robot, settings, datetime(2000, 1, 1))

@@ -29,7 +29,7 @@ VARIABLES = {
     "step.word": "MOVJ or MOVL",
     "step.speed": "of the move, e.g. VJ=5.00, V=20.0 or VR=3.0",
     "step.level": "position level (PL)",
-    "step.ramps": "ACC and DEC with a space before each, empty where not asked for",
+    "step.ramps": "ACC and DEC with a space before each, empty where the job sets none",
     "step.comment": "line before the move, or none",
     "step.actions": "instructions after the move: outputs, waits, calls, comments",
     "calls": "names of the jobs a master job runs, in order",
@@ -37,7 +37,7 @@ VARIABLES = {
 
 
 @dataclass(frozen=True)
-class Step:
+class JobStep:
     """A position and the move to it, as texts; see `VARIABLES`."""
 
     label: str
@@ -70,7 +70,7 @@ class JobLayout:
     date: str
     title: str | None
     comments: tuple[str, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[JobStep, ...]
     calls: tuple[str, ...]
 
     def values(self) -> dict[str, object]:
@@ -86,14 +86,14 @@ class JobLayout:
 
 
 def differences(job: InformJob, layout: JobLayout) -> Iterator[str]:
-    """Say where a job does not do what was asked; a template may add, but not to the motion."""
+    """Say where a job is not what it shall be; a template may add, but not to the motion."""
     if job.name != layout.name:
         yield f"the name is {job.name}, must be {layout.name}"
     yield from _first_difference("position", _positions_read(job), _positions_wanted(layout))
-    asks_ramps = any(step.ramps for step in layout.steps)
+    with_ramps = any(step.ramps for step in layout.steps)
     yield from _first_difference(
         "move",
-        [_motion_of(move, asks_ramps) for move in job.moves],
+        [_motion_of(move, with_ramps) for move in job.moves],
         [step.move for step in layout.steps],
     )
     yield from _first_difference(
@@ -119,28 +119,29 @@ def differences(job: InformJob, layout: JobLayout) -> Iterator[str]:
 def _positions_read(job: InformJob) -> list[str]:
     rows = []
     for position in job.positions:
-        of = [position.frame if position.coordinates != "PULSE" else "PULSE"]
-        of += [f"tool {position.tool}"]
-        if position.frame == "USER":
-            of += [f"user frame {position.user}"]
-        if position.coordinates != "PULSE":
-            of += [f"RCONF {','.join(map(str, position.rconf))}"]
-        rows.append(f"{job.lines[position.line - 1]} ({', '.join(of)})")
+        pulses = position.coordinates == "PULSE"
+        frame = "PULSE" if pulses else position.frame
+        user = position.user if position.frame == "USER" else None
+        rconf = None if pulses else ",".join(map(str, position.rconf))
+        text = job.lines[position.line - 1]
+        rows.append(_position(text, frame, position.tool, user, rconf))
     return rows
 
 
 def _positions_wanted(layout: JobLayout) -> list[str]:
-    rows = []
-    rconf = None
+    rows, rconf = [], None
     for step in layout.steps:
         rconf = step.rconf or rconf
-        of = [layout.postype, f"tool {layout.tool}"]
-        if layout.user:
-            of += [f"user frame {layout.user}"]
-        if rconf:
-            of += [f"RCONF {rconf}"]
-        rows.append(f"{step.label}={step.values} ({', '.join(of)})")
+        text = f"{step.label}={step.values}"
+        rows.append(_position(text, layout.postype, layout.tool, layout.user, rconf))
     return rows
+
+
+def _position(text: str, frame: str, tool: object, user: object | None, rconf: str | None) -> str:
+    of = [frame, f"tool {tool}"]
+    of += [f"user frame {user}"] if user is not None else []
+    of += [f"RCONF {rconf}"] if rconf is not None else []
+    return f"{text} ({', '.join(of)})"
 
 
 def _motion_of(move: Instruction, with_ramps: bool) -> str:

@@ -1,22 +1,20 @@
-"""Positions, move words and speeds of an INFORM job, as written."""
+"""Positions, move words and speeds of an INFORM job, as its digits can express them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.cell.robot import Robot, forward_kinematics
-from opl.geometry.frames import inverse, rotation_angle
+from opl.geometry.frames import Array, inverse, rotation_angle
 from opl.program.controller import ControllerProfile
 from opl.program.inform.cartesian import frame_pose, rconf_of, rectan, require_read_back
-from opl.program.moves import Program
+from opl.program.moves import Move, Program
 from opl.program.pulses import PulseScale
 from opl.program.settings import PositionForm, ProgramSettings
 from opl.program.speeds import SpeedRange, speeds_keeping_time
-
-Array = NDArray[np.float64]
 
 # Below so many last digits V is too coarse for a move in which the tool point hardly moves.
 _FINE_ENOUGH = 10.0
@@ -46,8 +44,7 @@ def write_positions(
     Raises:
         UnsafeError: If one is beyond the soft limits, or RCONF does not name its configuration.
     """
-    q = np.array([move.q for move in program.moves]).reshape(-1, 6)
-    scale = PulseScale.of(robot)
+    q, scale = program.q, PulseScale.of(robot)
     if scale.complete or settings.positions is PositionForm.PULSES:
         pulses = scale.to_pulses(q)  # checks the soft limits, however positions are written
     if settings.positions is PositionForm.PULSES:
@@ -63,6 +60,25 @@ def write_positions(
     unused = (0,) * (profile.rconf_fields - 6)
     written = (",".join(map(str, (*number, *unused))) for number in numbers)
     return WrittenPositions(tuple(values), tuple(written), np.array(read_back).reshape(-1, 6))
+
+
+def rounded_to_job(
+    q: Array, robot: Robot, settings: ProgramSettings, profile: ControllerProfile
+) -> Array:
+    """Return the configurations nearest to some that a job can express, shape (n, 6) in [rad].
+
+    Pulses are whole, poses have few digits. A joint at its limit is rounded inwards.
+
+    Raises:
+        UnsafeError: If one is beyond the limits, or no Cartesian position names it.
+    """
+    if settings.positions is PositionForm.PULSES:
+        scale = PulseScale.of(robot)
+        return scale.to_angles(scale.to_pulses(q, inwards=True))
+    moves = tuple(
+        Move(p, 1.0, exact_stop=True, on_wheel=False, motion_index=k) for k, p in enumerate(q)
+    )
+    return write_positions(Program("ROUNDED", moves=moves), robot, settings, profile).q
 
 
 def write_speeds(
@@ -83,44 +99,35 @@ def write_speeds(
     percent = 100.0 * (np.abs(np.diff(q, axis=0)) / robot.max_speed).max(axis=1)
     lengths = np.linalg.norm(np.diff(Ts_base_tool[:, :3, 3], axis=0), axis=1) * 1e3
     turns = np.rad2deg(rotation_angle(Ts_base_tool[:-1], Ts_base_tool[1:]))
-    kinds, ways, times, ranges, chained = [], [], [], [], []
-    before = program.moves[0]
+    ranges = _ranges(profile)
+    kinds, distances, times = [], [], []
     for move, *figures in zip(program.moves[1:], percent, lengths, turns, strict=True):
         duration = move.duration if move.duration is not None else _UNTIMED
-        kind = _speed_kind(move.straight, duration, figures[1], figures[2], profile)
-        kinds.append(kind)
-        ways.append(dict(zip(_RANGES, figures, strict=True))[kind])
+        by_kind = dict(zip(ranges, figures, strict=True))
+        kinds.append(_speed_kind(move.straight, duration, by_kind, ranges))
+        distances.append(by_kind[kinds[-1]])
         times.append(duration)
-        ranges.append(_range(kind, profile))
-        chained.append(move.ground_pass is not None and move.ground_pass == before.ground_pass)
-        before = move
-    speeds = speeds_keeping_time(ways, times, ranges, chained)
-    told = [("VJ", "")] + [
-        (kind, allowed.text(speed))
-        for kind, allowed, speed in zip(kinds, ranges, speeds, strict=True)
-    ]
+    allowed = [ranges[kind] for kind in kinds]
+    speeds = speeds_keeping_time(distances, times, allowed, program.chained)
+    texts = [one.text(speed) for one, speed in zip(allowed, speeds, strict=True)]
+    found = list(zip(["VJ", *kinds], ["", *texts], strict=True))
     for k, move in enumerate(program.moves):
         if move.duration is None:
-            told[k] = ("VJ", profile.joint_speed.text(100.0 * move.speed))
-    return [("MOVJ" if kind == "VJ" else "MOVL", f"{kind}={text}") for kind, text in told]
+            found[k] = ("VJ", profile.joint_speed.text(100.0 * move.speed))
+    return [("MOVJ" if kind == "VJ" else "MOVL", f"{kind}={text}") for kind, text in found]
 
 
-_RANGES = ("VJ", "V", "VR")
-
-
-def _range(kind: str, profile: ControllerProfile) -> SpeedRange:
-    ranges = (profile.joint_speed, profile.linear_speed, profile.angular_speed)
-    return dict(zip(_RANGES, ranges, strict=True))[kind]
+def _ranges(profile: ControllerProfile) -> dict[str, SpeedRange]:
+    return {"VJ": profile.joint_speed, "V": profile.linear_speed, "VR": profile.angular_speed}
 
 
 def _speed_kind(
-    straight: bool, time: float, length: float, turn: float, profile: ControllerProfile
+    straight: bool, time: float, distances: Mapping[str, float], ranges: Mapping[str, SpeedRange]
 ) -> str:
     """Choose V for a straight move, VR where the tool point hardly moves, VJ where neither does."""
     if straight and time > 0.0:
-        for kind, way in (("V", length), ("VR", turn)):
-            allowed = _range(kind, profile)
-            fine = _FINE_ENOUGH * 10.0**-allowed.decimals
-            if fine <= way / time <= allowed.highest:
+        for kind in ("V", "VR"):
+            fine = _FINE_ENOUGH * 10.0 ** -ranges[kind].decimals
+            if fine <= distances[kind] / time <= ranges[kind].highest:
                 return kind
     return "VJ"
