@@ -1,4 +1,4 @@
-"""The wheel as job and cell files give it: its size, and where it is by one of four ways."""
+"""The wheel as job and cell files give it: its size, and where it is, in one of four forms."""
 
 from __future__ import annotations
 
@@ -36,7 +36,10 @@ class PendantSection(Document):
         description="Frame of the values: `robot`, the controller's own robot frame, or `cell`.",
     )
     xyz_mm: Triple = Field(description="X, Y and Z as the pendant shows them.")
-    rx_ry_rz_deg: Triple = Field(description="Rx, Ry and Rz as the pendant shows them.")
+    rx_ry_rz_deg: Triple = Field(
+        description="Rx, Ry and Rz as the pendant shows them; of Universal Robots its RPY values, "
+        "not the rotation vector."
+    )
 
 
 class TouchedSection(Document):
@@ -127,18 +130,17 @@ class WheelSection(Document):
             InputError: If its points do not tell where it is.
         """
         T_base_cell = inverse(T_cell_base)
-        above = robot.controller_base_height - robot.base_height
-        T_base_seen = {"cell": T_base_cell, "robot": pose(np.eye(3), np.array([0.0, 0.0, above]))}
+        T_base_shown = {"cell": T_base_cell, "robot": inverse(robot.T_controller_base)}
         fit = None
         if self.touched is not None:
             fit = self._fit(self.touched, source.at(f"{key}.touched"))
             belt = self.radius_mm - (self.touched.radius_mm or self.radius_mm)
             T_bare_contact0 = pose(np.eye(3), np.array([0.0, 0.0, -belt * MM]))
-            T = T_base_seen[self.touched.frame] @ fit.T_base_contact0 @ T_bare_contact0
+            T = T_base_shown[self.touched.frame] @ fit.T_base_contact0 @ T_bare_contact0
         elif self.pendant is not None:
             shown = self.pendant
             angles, origin = np.deg2rad(shown.rx_ry_rz_deg), np.array(shown.xyz_mm) * MM
-            T = T_base_seen[shown.frame] @ from_roll_pitch_yaw(angles, origin)
+            T = T_base_shown[shown.frame] @ from_roll_pitch_yaw(angles, origin)
         else:
             T = self._matrix(T_base_cell)
         return PlacedWheel(

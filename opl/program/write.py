@@ -9,7 +9,7 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.cell.robot import Robot, forward_kinematics
+from opl.cell.robot import Robot, controller_poses
 from opl.motion.motion import VerifiedMotion
 from opl.program.actions import Action
 from opl.program.cycle import cycle_time
@@ -68,8 +68,8 @@ def write_program(
             program, robot, settings.T_flange_tool, limit.corners, limit.tolerance
         )
     written = post.write(program, robot, settings, date)
-    Ts_base_flange = forward_kinematics(robot, verified.motion.q)
-    table = render_table(verified, written, PulseScale.of(robot), Ts_base_flange)
+    Ts_controller_flange = controller_poses(robot, verified.motion.q)
+    table = render_table(verified, written, PulseScale.of(robot), Ts_controller_flange)
     files = {**written.files, f"{name}.csv": table}
     cycle = cycle_time(program, written.times, robot, settings)
     return replace(program, pass_times=written.pass_times, cycle=cycle), files

@@ -81,7 +81,7 @@ def _wheel_lines(robot: Robot, placed: PlacedWheel) -> Iterator[str]:
     wheel = placed.wheel
     yield (
         f"{placed.name}: {MM * wheel.width:g} mm wide, radius {MM * wheel.radius:g} mm, "
-        f"contact frame 0 on the pendant: {_pose(seen_by(robot, wheel.T_base_contact0))}"
+        f"contact frame 0 on the pendant: {_pose(robot.T_controller_base @ wheel.T_base_contact0)}"
     )
     yield from _fit_lines(placed)
 
@@ -137,7 +137,7 @@ def cell_figures(cell: Cell) -> dict[str, Any]:
 
 def _wheel_figures(robot: Robot, placed: PlacedWheel) -> dict[str, Any]:
     wheel, fit = placed.wheel, placed.fit
-    shown = pendant_figures(seen_by(robot, wheel.T_base_contact0))
+    shown = pendant_figures(robot.T_controller_base @ wheel.T_base_contact0)
     return {
         "name": placed.name,
         "width_mm": MM * wheel.width,
@@ -152,13 +152,6 @@ def _wheel_figures(robot: Robot, placed: PlacedWheel) -> dict[str, Any]:
         },
         "spare_equations": None if fit is None else fit.spare,
     }
-
-
-def seen_by(robot: Robot, T_base_frame: Array) -> Array:
-    """Return a pose from the frame that the robot's own controller counts from, shape (4, 4)."""
-    seen: Array = T_base_frame.copy()
-    seen[2, 3] += robot.base_height - robot.controller_base_height
-    return seen
 
 
 def pendant_figures(T: Array) -> tuple[float, ...]:
