@@ -53,11 +53,6 @@ class Job:
     process: ProcessSettings
     program: ProgramSettings
 
-    @property
-    def path(self) -> Path:
-        """The file as the user named it; ``job`` if a program has made the mapping."""
-        return Path(self.source.label)
-
 
 def load_job(
     source: Path | str | Mapping[str, Any],

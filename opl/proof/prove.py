@@ -11,6 +11,7 @@ import numpy as np
 from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
+from opl.job import keys
 from opl.job.load import Job
 from opl.motion.motion import TimedMotion
 from opl.program.posts import Reader, find_post, suffixes_read
@@ -100,7 +101,7 @@ def reader_of(job: Job) -> Reader:
     Raises:
         InputError: If programs of its controller cannot be read.
     """
-    where = f"{job.path}: program.controller"
+    where = job.source.at(keys.PROGRAM_CONTROLLER)
     post = find_post(job.program.controller, where)
     if post.reader is None:
         raise InputError(where, f"programs for {post.title} are written, not read back")
@@ -113,6 +114,6 @@ def _require_language(job: Job, files: Mapping[str, bytes], reader: Reader) -> N
         suffix = Path(name).suffix.upper()
         if suffix in suffixes_read() and suffix != reader.suffix.upper():
             raise InputError(
-                f"{job.path}: program.controller",
+                job.source.at(keys.PROGRAM_CONTROLLER),
                 f"{job.program.controller} takes {reader.suffix} files, got {name}",
             )
