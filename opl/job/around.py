@@ -109,7 +109,7 @@ def _from_cell(source: Source, file: JobFile) -> Surroundings:
     placed = cell.pick(file.wheel_name, source.at("wheel_name"))
     held = tuple(body.name for body in file.fixture.bodies)
     for place, name in enumerate(held):
-        if name in cell.said.names.known or name in held[:place]:
+        if name in cell.pairs.names.known or name in held[:place]:
             where = source.at(f"fixture.bodies.{place}.name")
             raise InputError(where, f"{name!r} is something else in {cell_path} or here")
     return Surroundings(
@@ -119,7 +119,7 @@ def _from_cell(source: Source, file: JobFile) -> Surroundings:
         obstacles=cell.around(placed),
         gripper=cell.gripper,
         clearance=cell.clearance,
-        pairs=cell.said.rules(placed.name, held),
+        pairs=cell.pairs.rules(placed.name, held),
         limits=cell.limits,
         home=np.deg2rad(of_job) if of_job is not None else _given(cell.home),
         home_key=(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from opl.errors import NoFreeMoveError, NoPathError
+from opl.job import keys
 from opl.job.load import Job
-from opl.job.refusals import dwell_refusal
-from opl.motion.feed import slow_stretches
+from opl.motion.feed import SlowStretch, slow_stretches
+from opl.motion.process import ProcessSettings
 from opl.motion.timing import time_motion
 from opl.proof.read_back import in_file_digits, read_back
 from opl.run.exporting import draw_charts, job_date, render_program
@@ -131,6 +132,29 @@ def write_program(proven: Proven, watch: Watch | None = None) -> Run:
     if found is not None and not found.proven:
         return Refused(proven, found, (), watch.seconds)
     return Written(proven, program, files, found, watch.seconds)
+
+
+def dwell_refusal(
+    stretches: tuple[SlowStretch, ...], process: ProcessSettings
+) -> NoPathError | None:
+    """Return why a path is refused on which the belt would dwell too long, None if it is not.
+
+    Args:
+        stretches: Where the path is slower than the feed.
+        process: For the longest dwell allowed.
+    """
+    too_long = [one for one in stretches if one.dwell > process.max_dwell]
+    if not too_long:
+        return None
+    return NoPathError(
+        f"the belt would dwell on one spot for more than {process.max_dwell:g} s beyond the time "
+        f"at the feed ({keys.PROCESS_MAX_DWELL}); raise {keys.PROCESS_CONTACT_SPEED} or lower "
+        f"{keys.PROCESS_FEED}, or let the contact move less ({keys.SEARCH_CONTACT_WEIGHT})",
+        [
+            f"pass {one.pass_index + 1}, cutter point {one.dwell_at:.2f}: {one.dwell:.2f} s"
+            for one in too_long
+        ],
+    )
 
 
 def _without_path(prepared: Prepared, error: NoPathError, watch: Watch) -> Refused:

@@ -9,13 +9,13 @@ import pytest
 
 from opl.files.resources import folder
 from opl.job.load import load_job
-from opl.job.refusals import dwell_refusal
 from opl.motion.feed import HARDLY_MOVES, slow_stretches
 from opl.motion.motion import Motion, MoveKind
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, fastest_law
 from opl.motion.timing import Cause, time_motion
 from opl.planning.starts import plan_recursive
+from opl.run.stages import dwell_refusal
 from tests.support.jobs import opl, write_job
 from tests.support.planned import problem_of, v_plan, v_problem, with_positions
 
