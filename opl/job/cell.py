@@ -31,7 +31,7 @@ class Cell:
     """What a cell file says, validated, in SI, in the base frame of its robot.
 
     Attributes:
-        path: The file.
+        path: The file, None if a job gives all this itself.
         robot: The arm.
         T_cell_base: Where its base frame is in the frame of the cell, shape (4, 4).
         wheels: The wheels.
@@ -43,7 +43,7 @@ class Cell:
         home: Joint positions in [rad], shape (6,); None if the job says them.
     """
 
-    path: Path
+    path: Path | None
     robot: Robot
     T_cell_base: Array
     wheels: tuple[PlacedWheel, ...]

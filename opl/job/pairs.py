@@ -91,6 +91,9 @@ class GivenPairs:
         )
 
 
+NO_PAIRS = GivenPairs(PairNames((), (), (), ()), ())
+
+
 def is_single(pair: Names) -> bool:
     """Return whether both names stand for one body each."""
     return not {ROBOT, FIXTURE} & set(pair)

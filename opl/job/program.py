@@ -12,6 +12,7 @@ from opl.cell.spherical_wrist import SphericalWristArm
 from opl.errors import InputError, OplError
 from opl.files.documents import Document
 from opl.geometry.frames import Array
+from opl.job import keys
 from opl.job.actions import ActionSection
 from opl.job.bodies import Matrix, pose_of
 from opl.job.source import Source
@@ -23,6 +24,10 @@ from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettin
 from opl.program.write import try_out
 
 _MAY_COUNT_PULSES = ("Yaskawa", "unknown")  # makers
+_YASKAWA_ONLY = (
+    *("positions", "user_frame"),
+    *("position_levels", "acceleration_percent", "deceleration_percent"),
+)
 
 _Level = Annotated[int, Field(ge=0, le=8)]
 _Percent = Annotated[int, Field(ge=1, le=100, json_schema_extra={"unit": "%"})]
@@ -67,6 +72,9 @@ class _UserFrame(Document):
     T_base_user_mm: Matrix = Field(
         description="Pose of the user frame in the robot's base frame, 4x4 with its origin in mm."
     )
+
+    def in_si(self) -> UserFrame:
+        return UserFrame(self.number, pose_of(self.T_base_user_mm))
 
 
 class ProgramSection(Document):
@@ -161,7 +169,7 @@ class ProgramSection(Document):
         try:
             return with_ratios(robot, source.file(self.pulse_ratios))
         except InputError as error:
-            raise InputError(source.at("program.pulse_ratios"), str(error)) from error
+            raise InputError(source.at(keys.PROGRAM_PULSE_RATIOS), str(error)) from error
 
     def in_si(self, source: Source, name: str, robot: Robot, home: Array) -> ProgramSettings:
         """Return the settings, tried out on a program that only goes home.
@@ -175,15 +183,15 @@ class ProgramSection(Document):
         Raises:
             InputError: If something in it is unknown, or the controller does not take it.
         """
-        post = find_post(self.controller, source.at("program.controller"))
+        post = find_post(self.controller, source.at(keys.PROGRAM_CONTROLLER))
         self._require_possible(source, post, robot)
-        where = source.at("program.accept_unverified_pulses")
+        where = source.at(keys.PROGRAM_ACCEPT_UNVERIFIED_PULSES)
         for joint in self.accept_unverified_pulses:
             if joint not in robot.joint_names:
                 known = ", ".join(robot.joint_names)
                 raise InputError(where, f"no such joint {joint!r}; have: {known}")
         if post.counts_pulses and self.positions == "pulses":
-            require_known(robot, source.at("program.pulse_ratios"))
+            require_known(robot, source.at(keys.PROGRAM_PULSE_RATIOS))
             require_accepted(robot.unverified_pulses, self.accept_unverified_pulses, where)
         settings = self._settings(source)
         try:
@@ -193,28 +201,19 @@ class ProgramSection(Document):
         return settings
 
     def _settings(self, source: Source) -> ProgramSettings:
-        levels = self.position_levels
-        frame = self.user_frame
+        levels, frame, tool = self.position_levels, self.user_frame, self.T_flange_tool_mm
+        actions = (self.at_start, self.before_pass, self.after_pass, self.at_end)
         return ProgramSettings(
             controller=self.controller,
             tool=self.tool,
-            T_flange_tool=np.eye(4)
-            if self.T_flange_tool_mm is None
-            else pose_of(self.T_flange_tool_mm),
+            T_flange_tool=np.eye(4) if tool is None else pose_of(tool),
             motion=MotionForm(self.motion),
             positions=PositionForm(self.positions),
-            user_frame=None
-            if frame is None
-            else UserFrame(frame.number, pose_of(frame.T_base_user_mm)),
+            user_frame=None if frame is None else frame.in_si(),
             levels=ByKind(levels.on_wheel, levels.lead, levels.free_move),
             acceleration=self.acceleration_percent.in_si(),
             deceleration=self.deceleration_percent.in_si(),
-            actions=Actions(
-                *(
-                    tuple(action.in_si() for action in some)
-                    for some in (self.at_start, self.before_pass, self.after_pass, self.at_end)
-                )
-            ),
+            actions=Actions(*(tuple(action.in_si() for action in some) for some in actions)),
             accepted_pulses=tuple(self.accept_unverified_pulses),
             title=self.comment,
             template=None if self.template is None else source.file(self.template),
@@ -224,11 +223,12 @@ class ProgramSection(Document):
         """Refuse another maker's arm, and keys that the post would pass over in silence."""
         if post.counts_pulses:
             if robot.missing_pulses and robot.maker not in _MAY_COUNT_PULSES:
+                others = [name for name in known_posts() if not find_post(name).counts_pulses]
                 raise InputError(
-                    source.at("program.controller"),
+                    source.at(keys.PROGRAM_CONTROLLER),
                     f"{self.controller} counts pulses, of which {robot.title} (robot: "
                     f"{robot.name}, made by {robot.maker}) has none; name the controller of that "
-                    f"arm: {', '.join(_without_pulses())}",
+                    f"arm: {', '.join(others)}",
                 )
             if self.positions != "pulses" and not isinstance(robot.arm, SphericalWristArm):
                 raise InputError(
@@ -237,19 +237,8 @@ class ProgramSection(Document):
                     f"an arm with a spherical wrist, which {robot.title} has not",
                 )
             return
-        own = (
-            "positions",
-            "user_frame",
-            "position_levels",
-            "acceleration_percent",
-            "deceleration_percent",
-        )
-        for key in own:
+        for key in _YASKAWA_ONLY:
             if key in self.model_fields_set:
                 raise InputError(
                     source.at(f"program.{key}"), f"is for Yaskawa controllers, not for {post.title}"
                 )
-
-
-def _without_pulses() -> list[str]:
-    return [name for name in known_posts() if not find_post(name).counts_pulses]

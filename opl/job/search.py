@@ -199,7 +199,7 @@ class SearchSection(Document):
 
 @dataclass(frozen=True)
 class Search:
-    """How the path is sought.
+    """How the path is searched.
 
     Attributes:
         method: The search.
@@ -222,6 +222,6 @@ class Search:
     optimal: OptimalSettings
 
     @property
-    def weights_asked(self) -> ObjectiveWeights | None:
+    def requested_weights(self) -> ObjectiveWeights | None:
         """The weights of the objective, if it is a weighted sum."""
         return self.objective_weights if self.objective is Objective.WEIGHTED else None

@@ -78,7 +78,7 @@ class TouchedSection(Document):
 
 
 class WheelSection(Document):
-    """A contact wheel: its size, and exactly one way to say where its contact frame 0 is.
+    """A contact wheel: its size, and where its contact frame 0 is, given in exactly one form.
 
     Contact frame 0 lies where the part touches in the middle of the wheel: z into the wheel, x
     along the axle to the left as seen from the front, y up.
@@ -177,7 +177,7 @@ class WheelSection(Document):
 
 
 class CellWheelSection(WheelSection):
-    """A contact wheel of the cell: its size, and exactly one way to say where it is."""
+    """A contact wheel of the cell: its size, and where it is, given in exactly one form."""
 
     model_config = ConfigDict(title="Wheel of a cell")
 

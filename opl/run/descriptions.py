@@ -21,11 +21,7 @@ TOUCHING = 1e-4  # [m] an error of touching that people can think of
 
 
 def describe_job(surfaced: Surfaced) -> list[str]:
-    """Return in words what a run of a job would do, one line each.
-
-    Args:
-        surfaced: The cutter points of the job.
-    """
+    """Return in words what a run of a job would do, one line each."""
     job, points = surfaced.job, surfaced.points
     cell, wheel, search = job.cell, job.cell.wheel, job.search
     lines = [
@@ -38,7 +34,7 @@ def describe_job(surfaced: Surfaced) -> list[str]:
         f"{search.method.value} for the least {search.objective.value}",
     ]
     around = job.around
-    if around.cell is not None:
+    if around.cell.path is not None:
         lines.append(f"cell {around.cell.path}:")
         lines += [f"  {line}" for line in describe_cell(around.cell)]
     else:
@@ -50,11 +46,7 @@ def describe_job(surfaced: Surfaced) -> list[str]:
 
 
 def describe_cell(cell: Cell) -> list[str]:
-    """Return what a cell holds in words, one line each.
-
-    Args:
-        cell: The cell.
-    """
+    """Return what a cell holds in words, one line each."""
     figures = cell_figures(cell)
     x, y, z, *turned = pendant_figures(cell.T_cell_base)
     turn = f", turned {_numbers(turned)} deg about x, y, z" if any(turned) else ""
@@ -106,11 +98,7 @@ def _fit_lines(placed: PlacedWheel) -> Iterator[str]:
 
 
 def cell_figures(cell: Cell) -> dict[str, Any]:
-    """Return what a cell holds in plain numbers, in mm and degrees.
-
-    Args:
-        cell: The cell.
-    """
+    """Return what a cell holds in plain numbers, in mm and degrees."""
     return {
         "cell": str(cell.path),
         "robot": cell.robot.name,

@@ -21,11 +21,7 @@ MM = 1e3
 
 
 def make_report(run: Written | Refused) -> Report:
-    """Return what is reported of a finished run.
-
-    Args:
-        run: The run.
-    """
+    """Return what is reported of a finished run."""
     surfaced, robot = run.surfaced, run.surfaced.job.cell.robot
     written = run if isinstance(run, Written) else None
     refused = run if isinstance(run, Refused) else None
@@ -73,7 +69,7 @@ def _fixed(prepared: Prepared) -> result.FixedReport:
 
 
 def _compared(planned: Planned) -> dict[str, result.FiguresReport]:
-    weights = planned.surfaced.job.search.weights_asked
+    weights = planned.surfaced.job.search.requested_weights
     return {
         name: result.FiguresReport(
             _rounded(figures.joint_ranges),
