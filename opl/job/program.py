@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -40,7 +41,7 @@ class _PositionLevels(Document):
     """
 
     model_config = ConfigDict(title="Position levels")
-    renamed: ClassVar = {"air": "free_move"}
+    renamed: ClassVar[Mapping[str, str]] = {"air": "free_move"}
 
     on_wheel: _Level = Field(default=1, description="While grinding.")
     lead: _Level = Field(default=1, description="Approach and retract.")
@@ -51,7 +52,7 @@ class _Percents(Document):
     """A ramp for each kind of move, in percent of the controller's own; else the controller's."""
 
     model_config = ConfigDict(title="Ramp percents")
-    renamed: ClassVar = {"air": "free_move"}
+    renamed: ClassVar[Mapping[str, str]] = {"air": "free_move"}
 
     on_wheel: _Percent | None = Field(default=None, description="While grinding.")
     lead: _Percent | None = Field(default=None, description="Approach and retract.")
@@ -81,7 +82,7 @@ class ProgramSection(Document):
     """The controller, and how the program is written."""
 
     model_config = ConfigDict(title="Program")
-    renamed: ClassVar = {"levels": "position_levels"}
+    renamed: ClassVar[Mapping[str, str]] = {"levels": "position_levels"}
 
     controller: str = Field(
         default="DX200",

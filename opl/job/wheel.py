@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -50,7 +51,7 @@ class TouchedSection(Document):
     """
 
     model_config = ConfigDict(title="Wheel by touched points")
-    renamed: ClassVar = {"largest_residual_mm": "max_residual_mm"}
+    renamed: ClassVar[Mapping[str, str]] = {"largest_residual_mm": "max_residual_mm"}
 
     frame: Frame = Field(
         default="robot",
@@ -85,7 +86,7 @@ class WheelSection(Document):
     """
 
     model_config = ConfigDict(title="Wheel")
-    renamed: ClassVar = {"contact_allowance_mm": "max_belt_penetration_mm"}
+    renamed: ClassVar[Mapping[str, str]] = {"contact_allowance_mm": "max_belt_penetration_mm"}
 
     T_base_contact0_mm: Matrix | None = Field(
         default=None,

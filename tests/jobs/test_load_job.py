@@ -1,7 +1,6 @@
 """A job from a mapping, and from values that a program has made."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
