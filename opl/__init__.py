@@ -20,34 +20,55 @@ A run that cannot go on ends as `Refused`, which holds the reason and never a pr
 
 Inside, lengths are in metres and angles in radians; keys of job files and fields of reports carry
 their units in their names. Whatever opl refuses is an `OplError`. Names are loaded when they are
-first used, so ``import opl`` costs next to nothing. The folder ``examples`` shows more.
+first used, so ``import opl`` costs next to nothing. The folder ``examples`` shows more;
+``help(opl.load_job)`` explains a name.
 
 Jobs
-    `load_job` makes a `Job` of a file or a mapping; surface and part may be made by a program, as
-    `NurbsSurface` and `TriangleMesh`. `start_job` copies an example. `json_schema` is for editors,
-    `keys_page` for people; `keys` are the key paths that messages name. `describe_job` says what a
-    run would do.
+    `load_job`          a file or a mapping -> `Job`
+    `NurbsSurface`      a surface made by a program, instead of one from a file
+    `TriangleMesh`      a solid made by a program
+    `start_job`         copies the V-shaped example, to be changed
+
 Runs
-    `run_job`, or its stages `cut_surface`, `plan_path`, `verify_motion` and `write_program`, which
-    make `Surfaced`, `Prepared` and `Planned`, `Proven`, and a `Run`: `Written` or `Refused`.
-    A `Watch` reports every `Stage` and cancels. `find_jobs` and `run_batch` run many jobs, each a
-    `BatchRow`.
+    `run_job`           `Job` -> `Run`, which is `Written` or `Refused`
+    `cut_surface`       `Job` -> `Surfaced`: cutter points, with warnings
+    `plan_path`         `Surfaced` -> `Planned`; `Prepared` is what its search is given
+    `verify_motion`     `Planned` -> `Proven`
+    `write_program`     `Proven` -> `Written`: the program as texts, read back and proven
+    `Watch`             reports each `Stage` of a run while it goes on, and cancels it
+    `run_batch`         many jobs in processes, each a `BatchRow`; `find_jobs` finds them
+
 Results
-    `make_report` gives the `Report` of a run, `report_points` and `points_files` are for cutter
-    points, `to_json` for all of them. `deliver` writes the files of a run; `check_folder`,
-    `write_files` and `write_file` write others.
-Programs
-    `prove_program` proves files against a job, as a `ProgramProof`. `describe_program` and
-    `compare_programs` read them. `find_post` and `known_posts`: the controllers.
+    `make_report`       `Run` -> `Report`: the content of ``result.json``
+    `deliver`           `Run` -> program, table, pictures and ``result.json`` in a folder
+    `report_points`     `Surfaced` -> figures of its cutter points
+    `points_files`      `Surfaced` -> table and picture of its cutter points, as texts
+    `to_json`           any of these figures -> JSON text
+
+Programs of a controller
+    `prove_program`     program files and their `Job` -> `ProgramProof`
+    `describe_program`  a program file in words
+    `compare_programs`  how two program files differ in what they do
+
 Cells and robots
-    `load_cell` makes a `Cell`; `describe_cell`, `cell_figures`. `known_robots`, `load_robot`, a
-    `Robot`; `robot_path` and `read_robot_file`, its numbers with sources; `arm_view` draws it.
-    `import_urdf` makes one, `import_pulse_ratios` and `with_ratios` let it count as its controller.
-Part files
-    `list_faces` lists each face as a `FaceSummary`, `preview_face` draws it in text.
+    `load_cell`         a cell file -> `Cell`
+    `load_robot`        a name or a folder -> `Robot`; `known_robots` lists the names
+    `import_urdf`       a URDF -> the folder of a robot of your own
+    `import_pulse_ratios`  parameters of a controller -> file of pulse ratios
+    `with_ratios`       a `Robot` with the ratios of such a file
+
 Errors
-    `OplError`: `InputError`, `NoPathError` (`NoFreeMoveError`: not on the wheel, but around it),
-    `UnsafeError`, `Cancelled`. A `Finding` is what a check found.
+    `OplError`          root of all; `InputError`, `UnsafeError` and `Cancelled` are below it
+    `NoPathError`       no path over the wheel; `NoFreeMoveError`: over it, but not to or from it
+    `Finding`           one thing that a check found: kind, place, message
+
+For command lines and editors, which show what is in files
+    `describe_job`, `describe_cell`, `cell_figures`      jobs and cells in words and figures
+    `list_faces`, `preview_face`, `FaceSummary`          the faces of a part file
+    `robot_path`, `read_robot_file`, `arm_view`          a robot: its data with sources; a picture
+    `known_posts`, `find_post`                           controllers, and what their templates get
+    `json_schema`, `keys_page`, `keys`                   keys of job and cell files
+    `check_folder`, `write_files`, `write_file`          files written whole or not at all
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 
 class OplError(Exception):
-    """Root of all errors that a user can cause or has to be told of."""
+    """Root of all errors that a user can cause or has to know of."""
 
     exit_status = 1
 

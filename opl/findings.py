@@ -9,7 +9,7 @@ from enum import Enum
 class Level(str, Enum):
     """How bad it is."""
 
-    WARNING = "warning"  # told, and the work goes on
+    WARNING = "warning"  # reported, and the work goes on
     ERROR = "error"  # no program is written
 
 

@@ -10,13 +10,11 @@ from typing import Any
 import click
 
 import opl
-from opl.cli.cell import cell
-from opl.cli.options import FILE
+from opl.cli.inputs import FILE, cell, faces, points
 from opl.cli.programs import show, templates, verify
 from opl.cli.progress import progress_bar
 from opl.cli.robots import robots
 from opl.cli.run_text import show_batch, show_run
-from opl.cli.surfaces import faces, points
 
 METHODS = ("recursive", "optimal")
 
@@ -98,9 +96,7 @@ def check(job: Path, as_json: bool) -> None:
         }
         click.echo(opl.to_json(figures))
         return
-    click.echo(f"{job} is a valid job")
-    for line in opl.describe_job(surfaced):
-        click.echo(line)
+    click.echo("\n".join([f"{job} is a valid job", *opl.describe_job(surfaced)]))
 
 
 @main.command()

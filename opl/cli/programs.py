@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 import opl
-from opl.cli.options import FILE
+from opl.cli.inputs import FILE
 from opl.cli.run_text import show_proof
 
 EXISTING = click.Path(dir_okay=False, path_type=Path)

@@ -66,7 +66,7 @@ def read(path: Path, model: type[Model]) -> Model:
 
     Raises:
         InputError: If the file cannot be read, is not YAML, or does not fit the model. All the
-            faults of a file are told at once, one a line.
+            faults of a file are reported at once, one a line.
     """
     return check(content_of(path), model, str(path))
 
@@ -132,8 +132,8 @@ def content_of(path: Path) -> Any:
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-        told = [getattr(error, name, None) for name in ("context", "problem")]
-        problem = ", ".join(text for text in told if text) or "is not YAML"
+        found = [getattr(error, name, None) for name in ("context", "problem")]
+        problem = ", ".join(text for text in found if text) or "is not YAML"
         raise InputError(str(path), f"{place}{problem}") from error
     except (ValueError, RecursionError) as error:  # a date such as 2024-13-01, a list in itself
         raise InputError(str(path), f"is not YAML: {error}") from error

@@ -22,9 +22,6 @@ def folder(name: str) -> Path:
 def start_job(directory: Path) -> Path:
     """Start a job: copy the V-shaped example to a new folder, to be changed.
 
-    Args:
-        directory: The folder, which is made.
-
     Returns:
         The job file.
 

@@ -28,12 +28,7 @@ def check_folder(folder: Path) -> None:
 def write_files(folder: Path, texts: Mapping[str, str]) -> list[Path]:
     """Write texts by file name into a folder, which is made if needed; all of them or none.
 
-    Args:
-        folder: The folder.
-        texts: Content by file name; line ends stay as they are.
-
-    Returns:
-        The files.
+    Line ends stay as they are.
 
     Raises:
         InputError: If the folder cannot be written to.

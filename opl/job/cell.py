@@ -21,7 +21,7 @@ from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, pose
 from opl.geometry.shapes import Body
 from opl.job.bodies import MM, bodies_in_si
 from opl.job.cell_file import CellFile, MountingFace, Range
-from opl.job.pairs import FIXTURE, ROBOT, PairNames, SaidOfPairs, said_of_pairs
+from opl.job.pairs import FIXTURE, ROBOT, GivenPairs, PairNames, given_pairs
 from opl.job.source import Source
 from opl.job.wheel import PlacedWheel
 
@@ -31,26 +31,26 @@ class Cell:
     """What a cell file says, validated, in SI, in the base frame of its robot.
 
     Attributes:
-        path: The file.
+        path: The file, None if a job gives all this itself.
         robot: The arm.
         T_cell_base: Where its base frame is in the frame of the cell, shape (4, 4).
         wheels: The wheels.
         obstacles: What stands around, in the base frame.
         gripper: Bodies fixed to the flange, in the flange frame.
-        clearance: Distance to keep where nothing else is said, in [m].
-        said: What is said of single pairs.
+        clearance: Distance to keep where no pair says otherwise, in [m].
+        pairs: The pairs that may touch or keep another distance.
         limits: Limits of joints and sums of joints beside the robot's own.
         home: Joint positions in [rad], shape (6,); None if the job says them.
     """
 
-    path: Path
+    path: Path | None
     robot: Robot
     T_cell_base: Array
     wheels: tuple[PlacedWheel, ...]
     obstacles: tuple[Body, ...]
     gripper: tuple[Body, ...]
     clearance: float
-    said: SaidOfPairs
+    pairs: GivenPairs
     limits: tuple[JointLimit, ...]
     home: Array | None
 
@@ -107,7 +107,7 @@ def load_cell(path: Path) -> Cell:
         wheels=tuple(wheel.name for wheel in wheels),
         obstacles=tuple(body.name for body in obstacles),
     )
-    said = said_of_pairs(
+    pairs = given_pairs(
         source,
         names,
         [tuple(pair) for pair in file.allowed_contacts],
@@ -121,7 +121,7 @@ def load_cell(path: Path) -> Cell:
         obstacles=obstacles,
         gripper=gripper,
         clearance=file.clearance_mm * MM,
-        said=said,
+        pairs=pairs,
         limits=_limits(source, file, robot),
         home=None if file.home_deg is None else np.deg2rad(file.home_deg),
     )
@@ -136,7 +136,7 @@ def robot_of(source: Source, name: str) -> Robot:
     try:
         return load_robot(name, source.folder)
     except InputError as error:
-        # what is wrong with a robot's own file is told with that file's name
+        # a fault in a robot's own file is reported with that file's name
         where = source.at("robot") if error.where == "robot" else error.where
         raise InputError(where, error.message) from error
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
 from pydantic import ConfigDict, Field, model_validator
@@ -83,7 +84,10 @@ class CellFile(Document):
     """
 
     model_config = ConfigDict(title="Cell file")
-    renamed: ClassVar = {"stands": "mounting_face", "clearances": "pair_clearances"}
+    renamed: ClassVar[Mapping[str, str]] = {
+        "stands": "mounting_face",
+        "clearances": "pair_clearances",
+    }
 
     robot: str = Field(
         description="Name of the robot as listed by `opl robots`, or the folder of your own one."

@@ -33,6 +33,7 @@ OF_PASSES = {
 
 SEARCH_CONTACT_WEIGHT = "search.weights.contact"
 
+PROCESS_HOME = "process.home_deg"
 PROCESS_FEED = "process.feed_mm_s"
 PROCESS_CONTACT_SPEED = "process.max_contact_speed"
 PROCESS_MAX_DWELL = "process.max_dwell_s"

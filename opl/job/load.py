@@ -38,7 +38,7 @@ class Job:
         around: Where the surroundings come from.
         surface: The surface to be ground, in the workpiece frame.
         passes: How the surface is cut.
-        search: How the path is sought.
+        search: How the path is searched.
         process: Speeds, approach and home.
         program: How the program is written.
     """
@@ -52,11 +52,6 @@ class Job:
     search: Search
     process: ProcessSettings
     program: ProgramSettings
-
-    @property
-    def path(self) -> Path:
-        """The file as the user named it; ``job`` if a program has made the mapping."""
-        return Path(self.source.label)
 
 
 def load_job(
@@ -98,18 +93,12 @@ def load_job(
     return _in_si(file, origin, method, surface, part)
 
 
-def _in_si(
-    file: JobFile,
-    source: Source,
-    method: str | None,
-    surface: MachinedSurface | None,
-    part: TriangleMesh | None,
-) -> Job:
-    """Return the values of a job in SI; arguments and errors as of `load_job`."""
+def _in_si(file: JobFile, source: Source, method: str | None,
+           surface: MachinedSurface | None, part: TriangleMesh | None) -> Job:  # fmt: skip
     around = surroundings(source, file)
-    robot = file.program.robot_as_counted(source, around.robot)
+    robot = file.program.robot_as_counted(source, around.cell.robot)
     robot = file.process.robot_as_limited(robot)
-    fixture = (*around.gripper, *bodies_in_si(source, "fixture.bodies", file.fixture.bodies))
+    fixture = (*around.cell.gripper, *bodies_in_si(source, "fixture.bodies", file.fixture.bodies))
     if file.search.max_contact_error_mm <= file.passes.max_chord_error_mm:
         raise InputError(
             source.at("search.max_contact_error_mm"),
@@ -123,14 +112,14 @@ def _in_si(
     cell = WorkCell(
         robot=robot,
         wheel=around.placed.wheel,
-        obstacles=around.obstacles,
+        obstacles=around.cell.around(around.placed),
         part=part,
         fixture=fixture,
         T_flange_workpiece=pose_of(file.fixture.T_flange_workpiece_mm),
         max_belt_penetration=around.placed.max_belt_penetration,
-        required_clearance=around.clearance,
+        required_clearance=around.cell.clearance,
         pairs=around.pairs,
-        limits=around.limits,
+        limits=around.cell.limits,
     )
     check_home(around.home_key, cell, around.home)
     search = file.search.in_si(file.passes.max_chord_error_mm)

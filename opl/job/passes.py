@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -22,7 +23,7 @@ class PassesSection(Document):
     """
 
     model_config = ConfigDict(title="Passes")
-    renamed: ClassVar = {
+    renamed: ClassVar[Mapping[str, str]] = {
         "scallop_mm": "scallop_height_mm",
         "bow_height_mm": "max_chord_error_mm",
         "largest_step_mm": "max_step_mm",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, ClassVar
 
@@ -21,7 +22,7 @@ class ProcessSection(Document):
     """How fast the robot moves, and where it starts and ends."""
 
     model_config = ConfigDict(title="Process")
-    renamed: ClassVar = {
+    renamed: ClassVar[Mapping[str, str]] = {
         "air_speed_percent": "free_move_speed_percent",
         "contact_speed": "max_contact_speed",
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -12,6 +13,7 @@ from opl.cell.spherical_wrist import SphericalWristArm
 from opl.errors import InputError, OplError, SettingError
 from opl.files.documents import Document
 from opl.geometry.frames import Array
+from opl.job import keys
 from opl.job.actions import ActionSection
 from opl.job.bodies import Matrix, pose_of
 from opl.job.refusals import keys_named
@@ -23,6 +25,10 @@ from opl.program.ratios import with_ratios
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
 
 _MAY_COUNT_PULSES = ("Yaskawa", "unknown")  # makers
+_YASKAWA_ONLY = (
+    *("positions", "user_frame"),
+    *("position_levels", "acceleration_percent", "deceleration_percent"),
+)
 
 _Level = Annotated[int, Field(ge=0, le=8)]
 _Percent = Annotated[int, Field(ge=1, le=100, json_schema_extra={"unit": "%"})]
@@ -35,7 +41,7 @@ class _PositionLevels(Document):
     """
 
     model_config = ConfigDict(title="Position levels")
-    renamed: ClassVar = {"air": "free_move"}
+    renamed: ClassVar[Mapping[str, str]] = {"air": "free_move"}
 
     on_wheel: _Level = Field(default=1, description="While grinding.")
     lead: _Level = Field(default=1, description="Approach and retract.")
@@ -46,7 +52,7 @@ class _Percents(Document):
     """A ramp for each kind of move, in percent of the controller's own; else the controller's."""
 
     model_config = ConfigDict(title="Ramp percents")
-    renamed: ClassVar = {"air": "free_move"}
+    renamed: ClassVar[Mapping[str, str]] = {"air": "free_move"}
 
     on_wheel: _Percent | None = Field(default=None, description="While grinding.")
     lead: _Percent | None = Field(default=None, description="Approach and retract.")
@@ -68,12 +74,15 @@ class _UserFrame(Document):
         description="Pose of the user frame in the robot's base frame, 4x4 with its origin in mm."
     )
 
+    def in_si(self) -> UserFrame:
+        return UserFrame(self.number, pose_of(self.T_base_user_mm))
+
 
 class ProgramSection(Document):
     """The controller, and how the program is written."""
 
     model_config = ConfigDict(title="Program")
-    renamed: ClassVar = {"levels": "position_levels"}
+    renamed: ClassVar[Mapping[str, str]] = {"levels": "position_levels"}
 
     controller: str = Field(
         default="DX200",
@@ -161,7 +170,7 @@ class ProgramSection(Document):
         try:
             return with_ratios(robot, source.file(self.pulse_ratios))
         except InputError as error:
-            raise InputError(source.at("program.pulse_ratios"), str(error)) from error
+            raise InputError(source.at(keys.PROGRAM_PULSE_RATIOS), str(error)) from error
 
     def in_si(self, source: Source, name: str, robot: Robot, home: Array) -> ProgramSettings:
         """Return the settings, tried out on a program that only goes home.
@@ -191,28 +200,19 @@ class ProgramSection(Document):
         return settings
 
     def _settings(self, source: Source) -> ProgramSettings:
-        levels = self.position_levels
-        frame = self.user_frame
+        levels, frame, tool = self.position_levels, self.user_frame, self.T_flange_tool_mm
+        actions = (self.at_start, self.before_pass, self.after_pass, self.at_end)
         return ProgramSettings(
             controller=self.controller,
             tool=self.tool,
-            T_flange_tool=np.eye(4)
-            if self.T_flange_tool_mm is None
-            else pose_of(self.T_flange_tool_mm),
+            T_flange_tool=np.eye(4) if tool is None else pose_of(tool),
             motion=MotionForm(self.motion),
             positions=PositionForm(self.positions),
-            user_frame=None
-            if frame is None
-            else UserFrame(frame.number, pose_of(frame.T_base_user_mm)),
+            user_frame=None if frame is None else frame.in_si(),
             levels=ByKind(levels.on_wheel, levels.lead, levels.free_move),
             acceleration=self.acceleration_percent.in_si(),
             deceleration=self.deceleration_percent.in_si(),
-            actions=Actions(
-                *(
-                    tuple(action.in_si() for action in some)
-                    for some in (self.at_start, self.before_pass, self.after_pass, self.at_end)
-                )
-            ),
+            actions=Actions(*(tuple(action.in_si() for action in some) for some in actions)),
             accepted_pulses=tuple(self.accept_unverified_pulses),
             title=self.comment,
             template=None if self.template is None else source.file(self.template),
@@ -222,11 +222,12 @@ class ProgramSection(Document):
         """Refuse another maker's arm, and keys that the post would pass over in silence."""
         if post.counts_pulses:
             if robot.missing_pulses and robot.maker not in _MAY_COUNT_PULSES:
+                others = [name for name in known_posts() if not find_post(name).counts_pulses]
                 raise InputError(
-                    source.at("program.controller"),
+                    source.at(keys.PROGRAM_CONTROLLER),
                     f"{self.controller} counts pulses, of which {robot.title} (robot: "
                     f"{robot.name}, made by {robot.maker}) has none; name the controller of that "
-                    f"arm: {', '.join(_without_pulses())}",
+                    f"arm: {', '.join(others)}",
                 )
             if self.positions != "pulses" and not isinstance(robot.arm, SphericalWristArm):
                 raise InputError(
@@ -235,19 +236,8 @@ class ProgramSection(Document):
                     f"an arm with a spherical wrist, which {robot.title} has not",
                 )
             return
-        own = (
-            "positions",
-            "user_frame",
-            "position_levels",
-            "acceleration_percent",
-            "deceleration_percent",
-        )
-        for key in own:
+        for key in _YASKAWA_ONLY:
             if key in self.model_fields_set:
                 raise InputError(
                     source.at(f"program.{key}"), f"is for Yaskawa controllers, not for {post.title}"
                 )
-
-
-def _without_pulses() -> list[str]:
-    return [name for name in known_posts() if not find_post(name).counts_pulses]

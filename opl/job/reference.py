@@ -34,9 +34,15 @@ _TYPES = {
 _REF = "#/$defs/"
 
 
-def schema(model: type[Document]) -> Schema:
-    """Return the JSON schema of a file; each description ends with unit, default and range."""
-    made = model.model_json_schema()
+def json_schema(kind: Literal["job", "cell"] = "job") -> Schema:
+    """Return the JSON schema of job files or of cell files, for editors.
+
+    Each description ends with unit, default and range.
+
+    Args:
+        kind: Which of them.
+    """
+    made = (CellFile if kind == "cell" else JobFile).model_json_schema()
     definitions = made["$defs"]
     for one in (made, *definitions.values()):
         for key, value in one["properties"].items():
@@ -47,15 +53,6 @@ def schema(model: type[Document]) -> Schema:
             facts += [f"Allowed: {allowed}."] if allowed else []
             value["description"] = " ".join([_meaning(value, definitions), *facts]).replace("`", "")
     return made
-
-
-def json_schema(kind: Literal["job", "cell"] = "job") -> Schema:
-    """Return the JSON schema of job files or of cell files, for editors.
-
-    Args:
-        kind: Which of them.
-    """
-    return schema(CellFile if kind == "cell" else JobFile)
 
 
 def keys_page() -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, ClassVar, Literal
@@ -43,7 +44,7 @@ class WeightsSection(Document):
     """Costs of a path inside the box of least joint range sum, in radians of joint travel."""
 
     model_config = ConfigDict(title="Cost weights")
-    renamed: ClassVar = {
+    renamed: ClassVar[Mapping[str, str]] = {
         "push_away_mm": "extra_clearance_mm",
         "push_away": "extra_clearance",
     }
@@ -100,7 +101,7 @@ class SearchSection(Document):
     """
 
     model_config = ConfigDict(title="Search")
-    renamed: ClassVar = {
+    renamed: ClassVar[Mapping[str, str]] = {
         "widen_percent": "range_tolerance_percent",
         "seconds": "time_limit_s",
     }
@@ -199,7 +200,7 @@ class SearchSection(Document):
 
 @dataclass(frozen=True)
 class Search:
-    """How the path is sought.
+    """How the path is searched.
 
     Attributes:
         method: The search.
@@ -222,6 +223,6 @@ class Search:
     optimal: OptimalSettings
 
     @property
-    def weights_asked(self) -> ObjectiveWeights | None:
+    def requested_weights(self) -> ObjectiveWeights | None:
         """The weights of the objective, if it is a weighted sum."""
         return self.objective_weights if self.objective is Objective.WEIGHTED else None

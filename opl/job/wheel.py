@@ -1,7 +1,8 @@
-"""The wheel as job and cell files give it: its size, and where it is by one of four ways."""
+"""The wheel as job and cell files give it: its size, and where it is, in one of four forms."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -36,7 +37,10 @@ class PendantSection(Document):
         description="Frame of the values: `robot`, the controller's own robot frame, or `cell`.",
     )
     xyz_mm: Triple = Field(description="X, Y and Z as the pendant shows them.")
-    rx_ry_rz_deg: Triple = Field(description="Rx, Ry and Rz as the pendant shows them.")
+    rx_ry_rz_deg: Triple = Field(
+        description="Rx, Ry and Rz as the pendant shows them; of Universal Robots its RPY values, "
+        "not the rotation vector."
+    )
 
 
 class TouchedSection(Document):
@@ -47,7 +51,7 @@ class TouchedSection(Document):
     """
 
     model_config = ConfigDict(title="Wheel by touched points")
-    renamed: ClassVar = {"largest_residual_mm": "max_residual_mm"}
+    renamed: ClassVar[Mapping[str, str]] = {"largest_residual_mm": "max_residual_mm"}
 
     frame: Frame = Field(
         default="robot",
@@ -75,14 +79,14 @@ class TouchedSection(Document):
 
 
 class WheelSection(Document):
-    """A contact wheel: its size, and exactly one way to say where its contact frame 0 is.
+    """A contact wheel: its size, and where its contact frame 0 is, given in exactly one form.
 
     Contact frame 0 lies where the part touches in the middle of the wheel: z into the wheel, x
     along the axle to the left as seen from the front, y up.
     """
 
     model_config = ConfigDict(title="Wheel")
-    renamed: ClassVar = {"contact_allowance_mm": "max_belt_penetration_mm"}
+    renamed: ClassVar[Mapping[str, str]] = {"contact_allowance_mm": "max_belt_penetration_mm"}
 
     T_base_contact0_mm: Matrix | None = Field(
         default=None,
@@ -127,18 +131,17 @@ class WheelSection(Document):
             InputError: If its points do not tell where it is.
         """
         T_base_cell = inverse(T_cell_base)
-        above = robot.controller_base_height - robot.base_height
-        T_base_seen = {"cell": T_base_cell, "robot": pose(np.eye(3), np.array([0.0, 0.0, above]))}
+        T_base_shown = {"cell": T_base_cell, "robot": inverse(robot.T_controller_base)}
         fit = None
         if self.touched is not None:
             fit = self._fit(self.touched, source.at(f"{key}.touched"))
             belt = self.radius_mm - (self.touched.radius_mm or self.radius_mm)
             T_bare_contact0 = pose(np.eye(3), np.array([0.0, 0.0, -belt * MM]))
-            T = T_base_seen[self.touched.frame] @ fit.T_base_contact0 @ T_bare_contact0
+            T = T_base_shown[self.touched.frame] @ fit.T_base_contact0 @ T_bare_contact0
         elif self.pendant is not None:
             shown = self.pendant
             angles, origin = np.deg2rad(shown.rx_ry_rz_deg), np.array(shown.xyz_mm) * MM
-            T = T_base_seen[shown.frame] @ from_roll_pitch_yaw(angles, origin)
+            T = T_base_shown[shown.frame] @ from_roll_pitch_yaw(angles, origin)
         else:
             T = self._matrix(T_base_cell)
         return PlacedWheel(
@@ -175,7 +178,7 @@ class WheelSection(Document):
 
 
 class CellWheelSection(WheelSection):
-    """A contact wheel of the cell: its size, and exactly one way to say where it is."""
+    """A contact wheel of the cell: its size, and where it is, given in exactly one form."""
 
     model_config = ConfigDict(title="Wheel of a cell")
 

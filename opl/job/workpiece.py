@@ -106,9 +106,6 @@ class WorkpieceSection(Document):
     def load_surface(self, source: Source) -> MachinedSurface:
         """Return the surface to be ground.
 
-        Args:
-            source: The job file or mapping.
-
         Raises:
             InputError: If its file or a face of it cannot be used.
         """
@@ -128,9 +125,6 @@ class WorkpieceSection(Document):
 
     def load_part(self, source: Source) -> TriangleMesh:
         """Return the solid for collisions.
-
-        Args:
-            source: The job file or mapping.
 
         Raises:
             InputError: If its file holds no solid.
@@ -165,15 +159,15 @@ class WorkpieceSection(Document):
         """
         inward = facing_inward(surface, part)
         if inward > MOST_INWARD:
-            told = f"normals point into the solid at {100.0 * inward:.0f} % of the surface"
+            fault = f"normals point into the solid at {100.0 * inward:.0f} % of the surface"
             if self.surface is None:
-                raise InputError(source.at("surface"), f"{told}; turn its outside round")
+                raise InputError(source.at("surface"), f"{fault}; turn its outside round")
             if self._suffix in MESHES:
                 raise InputError(
-                    source.at("workpiece.surface"), f"{told}; export it with its triangles turned"
+                    source.at("workpiece.surface"), f"{fault}; export it with its triangles turned"
                 )
             raise InputError(
                 source.at("workpiece.reversed_normal"),
-                f"{told}; set it to {str(not self.reversed_normal).lower()}"
+                f"{fault}; set it to {str(not self.reversed_normal).lower()}"
                 + ("" if inward > 0.9 else ", or let all faces of the file point outward"),
             )

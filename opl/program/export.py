@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
-from opl.cell.robot import Robot, forward_kinematics
+from opl.cell.robot import Robot, controller_poses
 from opl.geometry.frames import Array
 from opl.motion.motion import VerifiedMotion
 from opl.program.cycle import cycle_time
@@ -63,8 +63,8 @@ def export_program(
             program, robot, settings.T_flange_tool, limit.corners, limit.tolerance
         )
     written = post.write(program, robot, settings, date)
-    Ts_base_flange = forward_kinematics(robot, verified.motion.q)
-    table = render_table(verified, written, PulseScale.of(robot), Ts_base_flange)
+    Ts_controller_flange = controller_poses(robot, verified.motion.q)
+    table = render_table(verified, written, PulseScale.of(robot), Ts_controller_flange)
     files = {**written.files, f"{name}.csv": table}
     cycle = cycle_time(program, written.times, robot, settings)
     return replace(program, pass_times=written.pass_times, cycle=cycle), files

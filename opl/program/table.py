@@ -22,7 +22,7 @@ def render_table(
     verified: VerifiedMotion,
     written: Written,
     scale: PulseScale,
-    Ts_base_flange: Array,
+    Ts_controller_flange: Array,
     *,
     template: Path | None = None,
 ) -> str:
@@ -39,7 +39,8 @@ def render_table(
         verified: The motion.
         written: The program written from it.
         scale: Pulses of the robot.
-        Ts_base_flange: Pose of the flange at each configuration, origin in [m], shape (n, 4, 4).
+        Ts_controller_flange: Pose of the flange at each configuration, as the pendant of the robot
+            shows it, origin in [m], shape (n, 4, 4).
         template: Layout of the table; None for the one that comes with opl.
 
     Raises:
@@ -49,8 +50,8 @@ def render_table(
     motion = verified.motion
     pulses = scale.to_pulses(motion.q).tolist() if scale.complete else [()] * len(motion)
     angles = np.rad2deg(motion.q)
-    positions = Ts_base_flange[:, :3, 3] * 1e3
-    rotations = np.rad2deg(roll_pitch_yaw(Ts_base_flange))
+    positions = Ts_controller_flange[:, :3, 3] * 1e3
+    rotations = np.rad2deg(roll_pitch_yaw(Ts_controller_flange))
     columns = _columns(scale.joint_names, scale.complete)
     rows = [
         (

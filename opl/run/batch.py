@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from opl.cell.wheel_distance import use_threads
@@ -84,7 +85,7 @@ def run_batch(
     jobs: Sequence[Path],
     out: Path,
     workers: int,
-    done: Callable[[BatchRow], None] = lambda row: None,
+    done: Callable[[BatchRow], None] | None = None,
 ) -> list[BatchRow]:
     """Run jobs in worker processes.
 
@@ -97,12 +98,13 @@ def run_batch(
     Returns:
         One row per job, in the order of ``jobs``.
     """
-    rows = _clashes(jobs)
-    for row in rows.values():
-        done(row)
-    for row in _rows([job for job in jobs if job not in rows], out, workers):
+    rows = {}
+    clashes = _clashes(jobs)
+    others = [job for job in jobs if job not in clashes]
+    for row in chain(clashes.values(), _rows(others, out, workers)):
         rows[row.job] = row
-        done(row)
+        if done is not None:
+            done(row)
     return [rows[job] for job in jobs]
 
 

@@ -21,10 +21,6 @@ def deliver(run: Written | Refused, folder: Path) -> list[Path]:
     folder never holds a program that its ``result.json`` does not describe. A refused run leaves
     its ``result.json`` only.
 
-    Args:
-        run: A finished run.
-        folder: The folder.
-
     Returns:
         The files, ``result.json`` last.
 

@@ -8,24 +8,19 @@ from typing import Any
 import numpy as np
 
 from opl.cell.robot import Robot
-from opl.cell.workcell import JointLimit
 from opl.geometry.frames import Array, roll_pitch_yaw
 from opl.geometry.shapes import Body, Box, Cylinder
 from opl.job.cell import Cell
-from opl.job.pairs import Names
 from opl.job.wheel import PlacedWheel
 from opl.run.values import Surfaced
 
 MM = 1e3
+PENDANT = ("X", "Y", "Z", "Rx", "Ry", "Rz")
 TOUCHING = 1e-4  # [m] an error of touching that people can think of
 
 
 def describe_job(surfaced: Surfaced) -> list[str]:
-    """Return in words what a run of a job would do, one line each.
-
-    Args:
-        surfaced: The cutter points of the job.
-    """
+    """Return in words what a run of a job would do, one line each."""
     job, points = surfaced.job, surfaced.points
     cell, wheel, search = job.cell, job.cell.wheel, job.search
     lines = [
@@ -38,7 +33,7 @@ def describe_job(surfaced: Surfaced) -> list[str]:
         f"{search.method.value} for the least {search.objective.value}",
     ]
     around = job.around
-    if around.cell is not None:
+    if around.cell.path is not None:
         lines.append(f"cell {around.cell.path}:")
         lines += [f"  {line}" for line in describe_cell(around.cell)]
     else:
@@ -50,40 +45,39 @@ def describe_job(surfaced: Surfaced) -> list[str]:
 
 
 def describe_cell(cell: Cell) -> list[str]:
-    """Return what a cell holds in words, one line each.
-
-    Args:
-        cell: The cell.
-    """
-    return list(_cell_lines(cell))
-
-
-def _cell_lines(cell: Cell) -> Iterator[str]:
-    robot = cell.robot
+    """Return what a cell holds in words, one line each."""
+    figures = cell_figures(cell)
     x, y, z, *turned = pendant_figures(cell.T_cell_base)
     turn = f", turned {_numbers(turned)} deg about x, y, z" if any(turned) else ""
-    yield f"robot {robot.title}, its base frame at {_numbers((x, y, z))} mm in the cell{turn}"
-    for wheel in cell.wheels:
-        yield from _wheel_lines(robot, wheel)
-    yield f"obstacles: {_bodies(cell.obstacles)}"
-    yield f"gripper: {_bodies(cell.gripper)}"
-    kept = [(pair, distance) for pair, distance in cell.said.said if distance is not None]
-    other = "".join(f", {_pair(pair)} {MM * distance:g} mm" for pair, distance in kept)
-    yield f"clearance {MM * cell.clearance:g} mm{other}"
-    touching = [_pair(pair) for pair, distance in cell.said.said if distance is None]
-    yield f"may touch: {', '.join(touching) or 'nothing'}"
-    yield f"limits beside the robot's own: {', '.join(map(_limit, cell.limits)) or 'none'}"
-    if cell.home is not None:
-        yield f"home {_numbers(np.rad2deg(cell.home))} deg"
-
-
-def _wheel_lines(robot: Robot, placed: PlacedWheel) -> Iterator[str]:
-    wheel = placed.wheel
-    yield (
-        f"{placed.name}: {MM * wheel.width:g} mm wide, radius {MM * wheel.radius:g} mm, "
-        f"contact frame 0 on the pendant: {_pose(seen_by(robot, wheel.T_base_contact0))}"
+    lines = [
+        f"robot {cell.robot.title}, its base frame at {_numbers((x, y, z))} mm in the cell{turn}"
+    ]
+    for placed, wheel in zip(cell.wheels, figures["wheels"], strict=True):
+        shown = [*wheel["pendant"]["xyz_mm"], *wheel["pendant"]["rx_ry_rz_deg"]]
+        place = " ".join(f"{name} {value:.3f}" for name, value in zip(PENDANT, shown, strict=True))
+        lines.append(
+            f"{placed.name}: {wheel['width_mm']:g} mm wide, radius {wheel['radius_mm']:g} mm, "
+            f"contact frame 0 on the pendant: {place}"
+        )
+        lines += _fit_lines(placed)
+    kept = "".join(
+        f", {' and '.join(one['pair'])} {one['clearance_mm']:g} mm" for one in figures["clearances"]
     )
-    yield from _fit_lines(placed)
+    touching = ", ".join(" and ".join(pair) for pair in figures["allowed_contacts"])
+    limits = ", ".join(
+        f"{one['name']} {one['lower_deg']:g} to {one['upper_deg']:g} deg"
+        for one in figures["limits"]
+    )
+    lines += [
+        f"obstacles: {_bodies(cell.obstacles)}",
+        f"gripper: {_bodies(cell.gripper)}",
+        f"clearance {figures['clearance_mm']:g} mm{kept}",
+        f"may touch: {touching or 'nothing'}",
+        f"limits beside the robot's own: {limits or 'none'}",
+    ]
+    if cell.home is not None:
+        lines.append(f"home {_numbers(figures['home_deg'])} deg")
+    return lines
 
 
 def _fit_lines(placed: PlacedWheel) -> Iterator[str]:
@@ -103,11 +97,7 @@ def _fit_lines(placed: PlacedWheel) -> Iterator[str]:
 
 
 def cell_figures(cell: Cell) -> dict[str, Any]:
-    """Return what a cell holds in plain numbers, in mm and degrees.
-
-    Args:
-        cell: The cell.
-    """
+    """Return what a cell holds in plain numbers, in mm and degrees."""
     return {
         "cell": str(cell.path),
         "robot": cell.robot.name,
@@ -118,10 +108,10 @@ def cell_figures(cell: Cell) -> dict[str, Any]:
         "clearance_mm": MM * cell.clearance,
         "clearances": [
             {"pair": list(pair), "clearance_mm": MM * distance}
-            for pair, distance in cell.said.said
+            for pair, distance in cell.pairs.given
             if distance is not None
         ],
-        "allowed_contacts": [list(pair) for pair, distance in cell.said.said if distance is None],
+        "allowed_contacts": [list(pair) for pair, distance in cell.pairs.given if distance is None],
         "limits": [
             {
                 "name": limit.name,
@@ -137,7 +127,7 @@ def cell_figures(cell: Cell) -> dict[str, Any]:
 
 def _wheel_figures(robot: Robot, placed: PlacedWheel) -> dict[str, Any]:
     wheel, fit = placed.wheel, placed.fit
-    shown = pendant_figures(seen_by(robot, wheel.T_base_contact0))
+    shown = pendant_figures(robot.T_controller_base @ wheel.T_base_contact0)
     return {
         "name": placed.name,
         "width_mm": MM * wheel.width,
@@ -154,13 +144,6 @@ def _wheel_figures(robot: Robot, placed: PlacedWheel) -> dict[str, Any]:
     }
 
 
-def seen_by(robot: Robot, T_base_frame: Array) -> Array:
-    """Return a pose from the frame that the robot's own controller counts from, shape (4, 4)."""
-    seen: Array = T_base_frame.copy()
-    seen[2, 3] += robot.base_height - robot.controller_base_height
-    return seen
-
-
 def pendant_figures(T: Array) -> tuple[float, ...]:
     """Return X Y Z in mm and Rx Ry Rz in degrees."""
     figures = np.concatenate([MM * T[:3, 3], np.rad2deg(roll_pitch_yaw(T))])
@@ -172,12 +155,6 @@ def _matrix(T: Array) -> list[list[float]]:
     in_mm[:3, 3] *= MM
     rows: list[list[float]] = (np.round(in_mm, 9) + 0.0).tolist()
     return rows
-
-
-def _pose(T: Array) -> str:
-    names = ("X", "Y", "Z", "Rx", "Ry", "Rz")
-    figures = zip(names, pendant_figures(T), strict=True)
-    return " ".join(f"{name} {value:.3f}" for name, value in figures)
 
 
 def _numbers(values: Any) -> str:
@@ -195,11 +172,3 @@ def _shape(body: Body) -> str:
         return "cylinder"
     size = " x ".join(f"{MM * edge:.0f}" for edge in np.ptp(body.shape.vertices, axis=0))
     return f"mesh of {len(body.shape.faces)} triangles, {size} mm"
-
-
-def _pair(pair: Names) -> str:
-    return " and ".join(pair)
-
-
-def _limit(limit: JointLimit) -> str:
-    return f"{limit.name} {np.rad2deg(limit.lower):g} to {np.rad2deg(limit.upper):g} deg"

@@ -54,11 +54,7 @@ class PointsReport:
 
 
 def report_points(surfaced: Surfaced) -> PointsReport:
-    """Return the figures of cutter points.
-
-    Args:
-        surfaced: The cutter points of a job.
-    """
+    """Return the figures of cutter points."""
     job, points = surfaced.job, surfaced.points
     last = np.append(np.diff(points.pass_index) != 0, True)
     return PointsReport(
@@ -74,11 +70,7 @@ def report_points(surfaced: Surfaced) -> PointsReport:
 
 
 def points_files(surfaced: Surfaced) -> dict[str, str]:
-    """Return a table of cutter points and a picture of part, passes and frames, by file name.
-
-    Args:
-        surfaced: The cutter points of a job.
-    """
+    """Return a table of cutter points and a picture of part, passes and frames, by file name."""
     job = surfaced.job
     picture = part_view(
         title=f"{job.name}: what will be ground",

@@ -21,10 +21,6 @@ from opl.run.watch import Stage, Watch
 def prepare(surfaced: Surfaced, watch: Watch | None = None) -> Prepared:
     """Build the node matrix and the clearance layer, and keep the contact at t = 0 for comparison.
 
-    Args:
-        surfaced: The cutter points.
-        watch: Follows the run.
-
     Raises:
         InputError: If the arm reaches some cutter point at no contact position, or collides at
             home.

@@ -78,7 +78,7 @@ def _report(
     found, timed = proof.verification, proof.timed
     replayed = dict.fromkeys(field.name for field in fields(VerificationReport))
     if found is not None:
-        replayed = vars(replay_report(found)).copy()
+        replayed = vars(replay_report(found, None)).copy()
     del replayed["file"]
     return {
         "proven": proof.proven,

@@ -119,13 +119,13 @@ def _other_side(cell: WorkCell) -> Iterator[Change]:
         yield change, replace(cell, wheel=replace(cell.wheel, T_base_contact0=T_base_contact0))
 
 
-def _fed_the_other_way(cell: WorkCell) -> Iterator[Change]:
-    """Hold the part the other way round against the belt: the frame turned about its normal."""
+def _fed_in_reverse(cell: WorkCell) -> Iterator[Change]:
+    """Hold the part turned half round against the belt: the frame turned about its normal."""
     T_contact0_turned = from_roll_pitch_yaw(np.array([0.0, 0.0, np.pi]), np.zeros(3))
     T_base_contact0 = cell.wheel.T_base_contact0 @ T_contact0_turned
     change = (
-        f"the part fed the other way across the wheel ({keys.WHEEL_POSE} turned 180 degrees about "
-        "its z)"
+        f"the part fed in the opposite direction across the wheel ({keys.WHEEL_POSE} turned 180 "
+        "degrees about its z)"
     )
     yield change, replace(cell, wheel=replace(cell.wheel, T_base_contact0=T_base_contact0))
 
@@ -144,7 +144,7 @@ KINDS: tuple[Callable[[WorkCell], Iterator[Change]], ...] = (
     _other_width,
     _more_penetration,
     _other_side,
-    _fed_the_other_way,
+    _fed_in_reverse,
     _turned_fixture,
 )
 

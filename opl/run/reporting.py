@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,31 +9,33 @@ import numpy as np
 from opl.cell.inverse_kinematics import ik_branch_name
 from opl.cell.robot import Robot
 from opl.motion.feed import SlowStretch
-from opl.planning.plan import Plan
 from opl.program.moves import CycleTime
 from opl.proof.digest import digest
 from opl.proof.read_back import FileProof
 from opl.run import result
 from opl.run.result import Report
 from opl.run.values import Planned, Prepared, Proven, Refused, Written
-from opl.run.watch import Stage
 from opl.verification.replay import Verification
 
 MM = 1e3
 
 
 def make_report(run: Written | Refused) -> Report:
-    """Return what is reported of a finished run.
-
-    Args:
-        run: The run.
-    """
+    """Return what is reported of a finished run."""
     surfaced, robot = run.surfaced, run.surfaced.job.cell.robot
     written = run if isinstance(run, Written) else None
     refused = run if isinstance(run, Refused) else None
     reached = run.proven if isinstance(run, Written) else run.reached
-    planned = reached.planned if isinstance(reached, Proven) else reached
-    found = planned if isinstance(planned, Planned) else None
+    outcome = run.read_back if isinstance(run, Written) else run.cause
+    planned: Planned | None
+    found: Verification | None
+    if isinstance(reached, Proven):
+        planned, found = reached.planned, reached.verification
+    else:
+        planned = reached if isinstance(reached, Planned) else None
+        found = outcome if isinstance(outcome, Verification) else None
+    proof = outcome if isinstance(outcome, FileProof) else None
+    seconds = {stage.value: round(time, 4) for stage, time in run.seconds.items()}
     return Report(
         status=run.status,
         job=surfaced.job.name,
@@ -44,20 +45,15 @@ def make_report(run: Written | Refused) -> Report:
         warnings=[str(finding) for finding in surfaced.warnings],
         reasons=() if refused is None else refused.reasons,
         remedies=() if refused is None else refused.remedies,
-        fixed=_fixed(planned if isinstance(planned, Prepared) else planned.prepared),
-        path=None if found is None else _path(found),
-        compared={} if found is None else _compared(found),
-        feed=None if found is None else _feed(found),
+        fixed=_fixed(reached if isinstance(reached, Prepared) else reached.prepared),
+        path=None if planned is None else _path(planned),
+        compared={} if planned is None else _compared(planned),
+        feed=None if planned is None else _feed(planned),
         cycle=None if written is None else _cycle(written.program.cycle, robot),
-        verification=_verification(run),
+        verification=None if found is None else replay_report(found, proof),
         program=None if written is None else _program(written),
-        seconds=_seconds(run.seconds),
+        seconds={**seconds, "total": round(sum(run.seconds.values()), 4)},
     )
-
-
-def _seconds(seconds: Mapping[Stage, float]) -> dict[str, float]:
-    spent = {stage.value: round(time, 4) for stage, time in seconds.items()}
-    return {**spent, "total": round(sum(seconds.values()), 4)}
 
 
 def _fixed(prepared: Prepared) -> result.FixedReport:
@@ -73,7 +69,7 @@ def _fixed(prepared: Prepared) -> result.FixedReport:
 
 
 def _compared(planned: Planned) -> dict[str, result.FiguresReport]:
-    weights = planned.surfaced.job.search.weights_asked
+    weights = planned.surfaced.job.search.requested_weights
     return {
         name: result.FiguresReport(
             _rounded(figures.joint_ranges),
@@ -89,7 +85,7 @@ def _compared(planned: Planned) -> dict[str, result.FiguresReport]:
 
 def _path(planned: Planned) -> result.PathReport:
     plan, search = planned.plan, planned.surfaced.job.search
-    path = plan.path
+    path, refined, weighted = plan.path, plan.refinement, plan.weighted
     return result.PathReport(
         method=search.method.value,
         objective=search.objective.value,
@@ -102,30 +98,21 @@ def _path(planned: Planned) -> result.PathReport:
         intermediate_nodes=path.n_intermediate,
         lower_bound_rad=_rounded(plan.lower_bound),
         gap=_rounded(plan.gap),
-        refinement=_refinement(plan),
-        weighted=_weighted(plan),
+        refinement=None
+        if refined is None
+        else result.RefinementReport(
+            _rounded(refined.joint_range_sum),
+            _rounded(refined.lower_bound),
+            _rounded(refined.gain),
+            refined.rounds,
+            refined.bound_positions,
+        ),
+        weighted=None
+        if weighted is None
+        else result.WeightedReport(
+            *map(_rounded, (weighted.value, weighted.lower_bound, weighted.gap))
+        ),
     )
-
-
-def _refinement(plan: Plan) -> result.RefinementReport | None:
-    refined = plan.refinement
-    if refined is None:
-        return None
-    return result.RefinementReport(
-        _rounded(refined.joint_range_sum),
-        _rounded(refined.lower_bound),
-        _rounded(refined.gain),
-        refined.rounds,
-        refined.bound_positions,
-    )
-
-
-def _weighted(plan: Plan) -> result.WeightedReport | None:
-    weighted = plan.weighted
-    if weighted is None:
-        return None
-    values = (weighted.value, weighted.lower_bound, weighted.gap)
-    return result.WeightedReport(*map(_rounded, values))
 
 
 def _feed(planned: Planned) -> result.FeedReport:
@@ -176,22 +163,7 @@ def _cycle(cycle: CycleTime | None, robot: Robot) -> result.CycleReport | None:
     )
 
 
-def _verification(run: Written | Refused) -> result.VerificationReport | None:
-    proof = None
-    if isinstance(run, Written):
-        found, proof = run.proven.verification, run.read_back
-    elif isinstance(run.cause, Verification):
-        found = run.cause
-    elif isinstance(run.cause, FileProof) and isinstance(run.reached, Proven):
-        found, proof = run.reached.verification, run.cause
-    else:
-        return None
-    return replay_report(found, None if proof is None else _file(proof))
-
-
-def replay_report(
-    found: Verification, file: result.FileReport | None = None
-) -> result.VerificationReport:
+def replay_report(found: Verification, proof: FileProof | None) -> result.VerificationReport:
     """Return what is reported of a replay, and of the files of its motion if they were read."""
     return result.VerificationReport(
         found.engine,
@@ -200,18 +172,16 @@ def replay_report(
         round(found.min_clearance * MM, 3),
         round(found.max_contact_error * MM, 4),
         found.limit_violations,
-        file,
-    )
-
-
-def _file(proof: FileProof) -> result.FileReport:
-    return result.FileReport(
-        proof.proven,
-        proof.files,
-        proof.configurations,
-        round(proof.largest_rounding * MM, 4),
-        round(proof.largest_difference * MM, 4),
-        proof.replayed,
+        None
+        if proof is None
+        else result.FileReport(
+            proof.proven,
+            proof.files,
+            proof.configurations,
+            round(proof.largest_rounding * MM, 4),
+            round(proof.largest_difference * MM, 4),
+            proof.replayed,
+        ),
     )
 
 

@@ -94,7 +94,7 @@ class SlowLimitReport:
 
 @dataclass(frozen=True)
 class SlowReport:
-    """A stretch of a pass that is slower than the feed; passes count from 1."""
+    """A part of a pass that is slower than the feed; passes count from 1."""
 
     pass_: int
     from_cutter_point: float

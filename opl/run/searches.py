@@ -16,7 +16,7 @@ from opl.planning.problem import GrindingProblem
 from opl.planning.weighted import plan_weighted
 from opl.run.values import Prepared
 
-# of motions from the paper's start node, which are sought for comparison only
+# of motions from the paper's start node, which are searched for comparison only
 MOST_CHECKS = 20
 
 
@@ -60,7 +60,7 @@ def _search_best(search: Search, problem: GrindingProblem, recursive: Plan) -> P
     travel, time = (0.0, 1.0) if search.objective is Objective.TIME else (1.0, 0.0)
     joint_weights = travel * settings.costs.joint_weights
     costs = replace(settings.costs, joint_weights=joint_weights, time_weight=time)
-    # the cheapest at the cutter points need not be so on the way between them
+    # the cheapest at the cutter points need not be so between them
     alone = ObjectiveWeights(0.0, travel, time)
     plans = (plan_cheapest(problem, costs, change), recursive)
     return min(plans, key=lambda plan: alone.value(_figures(problem, plan)))

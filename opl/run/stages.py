@@ -23,7 +23,7 @@ def run_job(job: Job, watch: Watch | None = None) -> Run:
 
     Args:
         job: The job.
-        watch: Follows the run, and can cancel it; one for each run.
+        watch: Follows the run, and can cancel it; one for each run, here and in each stage.
 
     Returns:
         `Written` with a proven program, or `Refused` with the reason why there is none.
@@ -45,10 +45,6 @@ def run_job(job: Job, watch: Watch | None = None) -> Run:
 
 def plan_path(surfaced: Surfaced, watch: Watch | None = None) -> Planned | Refused:
     """Plan a path over the wheel and the motion around it, collision-free for the planner.
-
-    Args:
-        surfaced: The cutter points of a job.
-        watch: Follows the run.
 
     Returns:
         The plan; `Refused` if there is no path, or if the belt would dwell on one spot too long.
@@ -84,10 +80,6 @@ def _plan(surfaced: Surfaced, watch: Watch) -> Planned | Refused:
 def verify_motion(planned: Planned, watch: Watch | None = None) -> Proven | Refused:
     """Replay a planned motion in PyBullet, which shares no code with the planner.
 
-    Args:
-        planned: The plan.
-        watch: Follows the run.
-
     Returns:
         The verified motion; `Refused` if the replay finds anything wrong.
 
@@ -114,10 +106,6 @@ def write_program(proven: Proven, watch: Watch | None = None) -> Run:
     """Write the program of a verified motion, and prove what its files say.
 
     The files are texts yet; `deliver` puts them into a folder.
-
-    Args:
-        proven: The verified motion.
-        watch: Follows the run.
 
     Returns:
         The program and its files; `Refused` if they do not say what was proven.

@@ -15,10 +15,6 @@ from opl.run.watch import Stage, Watch
 def cut_surface(job: Job, watch: Watch | None = None) -> Surfaced:
     """Cut the surface of a job into passes of cutter points and inspect them.
 
-    Args:
-        job: The job.
-        watch: Follows the run.
-
     Raises:
         InputError: If that cannot be done; names the key that is to blame.
         Cancelled: If the run was cancelled.

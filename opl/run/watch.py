@@ -1,4 +1,4 @@
-"""Progress of a run, the time of its stages, and a way to cancel it."""
+"""Progress of a run, the time of its stages, and its cancellation."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Watch:
             of the run. A stage may come twice. What it raises ends the run.
     """
 
-    def __init__(self, progress: Progress = lambda stage, fraction: None) -> None:
+    def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
         self._seconds: dict[Stage, float] = {}
         self._cancelled = Event()
@@ -64,7 +64,8 @@ class Watch:
         """
 
         def report(fraction: float) -> None:
-            self._progress(stage, fraction)
+            if self._progress is not None:
+                self._progress(stage, fraction)
             if self._cancelled.is_set():
                 raise Cancelled(f"cancelled during stage {stage.value}")
 

@@ -94,7 +94,7 @@ def test_the_cell_that_comes_with_opl_is_in_the_base_frame():
     np.testing.assert_allclose(corners.max(axis=0), [1.9, 0.4825, 0.695], atol=1e-6)
     assert [limit.name for limit in cell.limits] == ["R", "R+T"]
     assert cell.limits[1].coefficients.tolist() == [0, 0, 0, 1, 0, 1]
-    rules = cell.said.rules("belt grinder", ())
+    rules = cell.pairs.rules("belt grinder", ())
     assert rules.required[frozenset(["B_link", "machine frame"])] == pytest.approx(0.02)
     assert rules.required[frozenset(["T_link", "fence left"])] == pytest.approx(0.05)
     assert rules.allowed == {frozenset(["gripper", "part"])}

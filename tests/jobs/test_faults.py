@@ -148,7 +148,7 @@ def refuses(proof, *words):
 
 
 def test_the_unharmed_program_is_proven(written):
-    ended = opl("verify", written.job.path, written.file, "--json")
+    ended = opl("verify", written.job.source.label, written.file, "--json")
     assert ended.status == 0, ended.err
     told = json.loads(ended.out)
     assert told["proven"] is True and told["as_written"] is True
@@ -167,7 +167,7 @@ def test_one_pulse_more_is_found_beside_the_result_of_the_run(written, tmp_path)
     pulses = text.pulses(number)
     pulses[4] += 1
     (tmp_path / written.file.name).write_bytes(text.put(number, pulses).text.encode("ascii"))
-    ended = opl("verify", written.job.path, tmp_path / written.file.name)
+    ended = opl("verify", written.job.source.label, tmp_path / written.file.name)
     assert ended.status == 4
     assert "file at" in ended.err and written.file.name in ended.err
     assert "not the bytes that opl run proved" in ended.err

@@ -80,7 +80,7 @@ def test_a_robot_of_ones_own_lies_beside_the_job(tmp_path):
 
 def test_every_job_that_comes_with_opl_is_valid():
     for path in V_SHAPE.parent.glob("*/job.yaml"):
-        assert load_job(path).path == path
+        assert load_job(path).source.label == str(path)
     assert V_JOB.is_file()
 
 

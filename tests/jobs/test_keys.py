@@ -17,7 +17,7 @@ from opl.job.bodies import BodySection
 from opl.job.cell_file import CellFile
 from opl.job.file import JobFile
 from opl.job.process import ProcessSection
-from opl.job.reference import keys_page, schema, unit_of
+from opl.job.reference import json_schema, keys_page, unit_of
 from opl.job.search import ObjectiveWeightsSection, SearchSection, WeightsSection
 from tests.support.jobs import document, opl
 
@@ -101,11 +101,11 @@ def test_every_key_has_a_row_on_the_page(path, model):
         assert any(row[-1] == f"{field.description} |" for row in found), f"{path}{key}"
 
 
-@pytest.mark.parametrize("model", [JobFile, CellFile])
-def test_descriptions_of_the_schema_end_with_unit_default_and_range(model):
-    made = schema(model)
+@pytest.mark.parametrize("kind", ["job", "cell"])
+def test_descriptions_of_the_schema_end_with_unit_default_and_range(kind):
+    made = json_schema(kind)
     assert json.loads(json.dumps(made)) == made
-    wheel = made["$defs"]["WheelSection" if model is JobFile else "CellWheelSection"]["properties"]
+    wheel = made["$defs"]["WheelSection" if kind == "job" else "CellWheelSection"]["properties"]
     assert wheel["max_belt_penetration_mm"]["description"] == (
         "How deep the part may sink into the belt. [mm] Default: 0.5. Allowed: >= 0."
     )

@@ -185,10 +185,11 @@ def written(request, tmp_path_factory):
         "process.home_deg": list(language.home),
         "program.controller": request.param,
     }
-    job = load_job(write_job(home, changes))
+    path = write_job(home, changes)
+    job = load_job(path)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
-        ended = opl("run", job.path, "--out", home / "out")
+        ended = opl("run", path, "--out", home / "out")
     assert ended.status == 0, ended.err
     file = home / "out" / (job.name + find_post(request.param).reader.suffix)
     points = cut_surface(job).points
@@ -223,7 +224,7 @@ def test_what_is_read_back_is_what_was_proven(written):
     assert file["proven"] is True and file["replayed"] is False
     assert file["largest_difference_mm"] == 0.0 and 0.0 < file["largest_rounding_mm"] < 0.05
     assert file["postures"] == result["program"]["moves"]
-    ended = opl("verify", written.job.path, written.file, "--json")
+    ended = opl("verify", written.job.source.label, written.file, "--json")
     assert ended.status == 0, ended.err
     proof = json.loads(ended.out)
     assert proof["proven"] is True and proof["as_written"] is True
@@ -249,7 +250,7 @@ def test_the_last_digit_is_found_beside_the_result_of_the_run(written, tmp_path)
     file = tmp_path / written.file.name
     text = written.with_target(written.move, digit_changed(target, at, by))
     file.write_bytes(text.encode("ascii"))
-    ended = opl("verify", written.job.path, file)
+    ended = opl("verify", written.job.source.label, file)
     assert ended.status == 4
     assert "not the bytes that opl run proved" in ended.err
     assert len(ended.err.splitlines()) == 2  # nothing else is wrong
@@ -330,7 +331,7 @@ def test_it_is_shown_in_words_and_compared_by_meaning(written, tmp_path):
 def test_a_file_of_another_language_is_refused(written, tmp_path):
     other = tmp_path / "V_SHAPE.JBI"
     other.write_bytes(written.file.read_bytes())
-    ended = opl("verify", written.job.path, other)
+    ended = opl("verify", written.job.source.label, other)
     assert ended.status == 2 and "program.controller" in ended.err
     ended = opl("show", written.file, "--diff", other)
     assert ended.status == 2 and "is not of the language" in ended.err

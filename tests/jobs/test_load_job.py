@@ -1,7 +1,6 @@
 """A job from a mapping, and from values that a program has made."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,7 +37,7 @@ def test_a_mapping_gives_the_job_of_its_file(tmp_path):
     np.testing.assert_array_equal(of_mapping.cell.part.vertices, of_file.cell.part.vertices)
     np.testing.assert_array_equal(of_mapping.process.home, of_file.process.home)
     assert of_mapping.search.interpolation == of_file.search.interpolation
-    assert of_mapping.path == Path("job")
+    assert of_mapping.source.label == "job"
 
 
 def test_names_in_a_mapping_are_those_of_the_current_folder(tmp_path, monkeypatch):

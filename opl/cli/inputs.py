@@ -1,4 +1,4 @@
-"""Commands around surfaces: the cutter points of a job, the faces of a file."""
+"""Commands around what a job is made of: cells, cutter points, the faces of a part."""
 
 from __future__ import annotations
 
@@ -8,7 +8,26 @@ from pathlib import Path
 import click
 
 import opl
-from opl.cli.options import FILE
+
+FILE = click.Path(path_type=Path, readable=False)  # whoever reads it refuses what cannot be read
+
+
+@click.command()
+@click.argument("file", type=FILE, metavar="CELL.yaml")
+@click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
+def cell(file: Path, as_json: bool) -> None:
+    """Validate a cell file and print what stands in it.
+
+    Where each wheel is, as matrix and as the pendant shows it, and for a wheel that was found by
+    touching it how far each point is from its place.
+
+    Example: opl cell workpieces/cells/belt_cell.yaml
+    """
+    loaded = opl.load_cell(file)
+    if as_json:
+        click.echo(opl.to_json(opl.cell_figures(loaded)))
+        return
+    click.echo("\n".join([f"{file} is a valid cell", *opl.describe_cell(loaded)]))
 
 
 @click.command()
@@ -29,11 +48,8 @@ def points(job: Path, out: Path | None, as_json: bool) -> None:
     if as_json:
         click.echo(opl.to_json({**vars(report), "files": written}))
         return
-    click.echo(str(report))
-    for warning in report.warnings:
-        click.echo(f"warning: {warning}")
-    for path in written:
-        click.echo(f"wrote {path}")
+    warnings = [f"warning: {warning}" for warning in report.warnings]
+    click.echo("\n".join([str(report), *warnings, *(f"wrote {path}" for path in written)]))
 
 
 @click.command()
