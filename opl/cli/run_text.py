@@ -104,6 +104,10 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
         )
 
 
+# what the searches, and so their bounds, are limited to
+ONE_BRANCH = ", all passes on one IK branch and count of full turns,"
+
+
 def _certified(report: opl.Report, n_positions: int) -> Iterator[str]:
     """Yield what the lower bounds say of the path; ``n_positions`` are those of the job."""
     path = report.path
@@ -112,9 +116,9 @@ def _certified(report: opl.Report, n_positions: int) -> Iterator[str]:
     weighted, refined = path.weighted, path.refinement
     if weighted is not None:
         yield (
-            f"no path through these points at {n_positions} contact positions has a weighted sum "
-            f"below {weighted.lower_bound:.4f}: the one found has {weighted.value:.4f}, "
-            f"{100.0 * weighted.gap:.1f} % of which may be too much"
+            f"no path through these points at {n_positions} contact positions{ONE_BRANCH} has a "
+            f"weighted sum below {weighted.lower_bound:.4f}: the one found has "
+            f"{weighted.value:.4f}, {100.0 * weighted.gap:.1f} % of which may be too much"
         )
     bound, gap, found = path.lower_bound_rad, path.gap, "the one found"
     if bound is None or gap is None:
@@ -135,8 +139,8 @@ def _certified(report: opl.Report, n_positions: int) -> Iterator[str]:
             bound, found = refined.field_lower_bound_rad, "the one found at these"
             gap = 1.0 - bound / at_positions
     yield (
-        f"no path through these points at {held} contact positions has a joint range sum below "
-        f"{bound:.4f} rad: {found} is within {100.0 * gap:.3f} % of the least there is"
+        f"no path through these points at {held} contact positions{ONE_BRANCH} has a joint range "
+        f"sum below {bound:.4f} rad: {found} is within {100.0 * gap:.3f} % of the least of these"
     )
 
 
