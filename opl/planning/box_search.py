@@ -3,7 +3,7 @@
 The certificate says how small a box of joint space that holds a connected track can be, and names
 such a box. Inside it, widened a little, the smoothest track is sought. Between two of its nodes a
 track may still bulge out of the box; where it does, places between the cutter points are taken in
-as columns, and certificate and track are found anew. The lower bound that is told is that of the
+as columns, and certificate and track are found anew. The lower bound reported is that of the
 field: it holds for every path through the cutter points at its contact positions.
 """
 
@@ -32,8 +32,8 @@ SMALLEST_STEP = 1.0 / 16.0  # of a step between cutter points that is still give
 # fractions to which boxes are solved: what remains of the gap of a path is then that of its track
 PROOF_GAP = 1e-6
 REFINED_GAP = 1e-5
-CONTENT = 1.8  # times the widening asked for: a gap that calls for no further proof
-WIDENINGS = 2.0 ** np.arange(12)  # times the widening asked for, until a track fits
+CONTENT = 1.8  # times the requested widening: a gap that calls for no further proof
+WIDENINGS = 2.0 ** np.arange(12)  # times the requested widening, until a track fits
 LEAST_WIDENING = 1e-4  # fraction of the size of a box
 
 
@@ -123,7 +123,7 @@ class BoxSearch:
         """Return the least joint range sum of any track through the cutter points, in [rad].
 
         Nodes at cutter points that were found to collide are left out. Where the bound of the nodes
-        stays below what was found, the ways between the cutter points are asked too.
+        stays below what was found, what happens between the cutter points is looked at too.
 
         Args:
             found: The joint range sum of the best path, in [rad].

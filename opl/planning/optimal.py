@@ -22,7 +22,7 @@ from opl.planning.tube import halved, tube
 from opl.search.smooth import Travel
 
 MOST_ROUNDS = 3  # of halving the contact positions: eight times as many
-FINER_PROOF = 10.0  # [s] the bound of a finer field may take; what it is by then is told
+FINER_PROOF = 10.0  # [s] the bound of a finer field may take; what it is by then is reported
 
 
 def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: Plan) -> Plan:
