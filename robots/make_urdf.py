@@ -30,8 +30,7 @@ HEAD = """<?xml version="1.0"?>
   Written by robots/make_urdf.py from robot.yaml and shapes.yaml; do not edit.
 
   At the zero configuration all link frames are parallel to the base frame: x forward, y left, z up.
-      Each
-  lies on its joint's axis. Joint axes point so that a positive angle is positive for the maker.
+  Each lies on its joint's axis. Joint axes point so that positive is positive for the maker.
 
   Shapes: {source} (certainty {certainty}).
   Masses and inertias are placeholders, because simulators ask for them; efforts are unknown.
