@@ -50,7 +50,7 @@ def test_every_key_has_a_description(key, field):
     assert field.description.endswith(".")
 
 
-@pytest.mark.parametrize("model", {model for _, model in MODELS})
+@pytest.mark.parametrize("model", dict.fromkeys(model for _, model in MODELS))
 def test_an_old_name_leads_to_a_key(model):
     for old, new in model.renamed.items():
         assert old not in model.model_fields
