@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from opl.geometry.frames import from_axes
+from opl.geometry.machined import load_faces
 from opl.geometry.passes import Passes, lay_passes
 from opl.geometry.patchwork import Patchwork
-from opl.geometry.surface_file import load_faces
 
 WORKPIECES = Path(__file__).resolve().parent.parent / "workpieces"
 

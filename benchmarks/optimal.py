@@ -1,6 +1,6 @@
 """How long the optimal method takes and how much it needs. By hand: python benchmarks/optimal.py.
 
-Processor time is told beside wall-clock time: on a machine that has other work the latter says
+Processor time is printed beside wall-clock time: on a machine that has other work the latter says
 little.
 """
 
@@ -17,12 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
-from opl.job.load import load
-from opl.outcome import Outcome
-from opl.pipeline import cutter_points, pose_problem
+from opl.job.load import load_job
+from opl.run.preparing import build_problem
+from opl.run.searches import search_path
+from opl.run.surfacing import cut_surface
+from opl.run.watch import Stage, Watch
 from opl.search.ladder import Ladder
-from opl.search.smooth import Roughness, smoothest
-from opl.searches import search_path
+from opl.search.smooth import TrackCost, smoothest
 
 WORKPIECES = Path(__file__).resolve().parent.parent / "workpieces"
 FINE_PITCH = 1.25e-3  # [m] 17 rows fit on the V part
@@ -44,7 +45,22 @@ class Clock:
         self.wall[stage] = time.perf_counter() - wall
         self.processor[stage] = time.process_time() - processor
 
-    def told(self, *stages: str) -> str:
+    def watch(self) -> Watch:
+        """Return what measures the stages of a run, each by the ends it reports."""
+        started: dict[str, tuple[float, float]] = {}
+
+        def progress(stage: Stage, fraction: float) -> None:
+            now = time.perf_counter(), time.process_time()
+            if fraction == 0.0:
+                started[stage.value] = now
+            elif fraction == 1.0:
+                wall, processor = started[stage.value]
+                self.wall[stage.value] = now[0] - wall
+                self.processor[stage.value] = now[1] - processor
+
+        return Watch(progress)
+
+    def text(self, *stages: str) -> str:
         """Return the times of some stages together."""
         wall = sum(self.wall[stage] for stage in stages)
         processor = sum(self.processor[stage] for stage in stages)
@@ -73,11 +89,11 @@ def smooth_stage(n_columns: int = 1000, n_rows: int = 140, n_branches: int = 2) 
             max_joint_step=np.deg2rad(15.0),
             max_contact_change=100.0,
         )
-        costs = Roughness(
+        costs = TrackCost(
             joint_weights=np.ones(6),
             contact_weight=0.01,
             time_weight=0.0,
-            step_seconds=feed,
+            edge_seconds=feed,
             max_speed=np.full(6, 3.0),
             contact_speed=40.0,
             node_cost=np.zeros((n_columns, n_rows)),
@@ -88,28 +104,27 @@ def smooth_stage(n_columns: int = 1000, n_rows: int = 140, n_branches: int = 2) 
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6  # kilobytes on Linux
     print(
         f"smoothest track of {n_columns} x {n_rows} nodes on {n_branches} branches: "
-        f"{clock.told(*clock.wall)}; the process held {most:.2f} GB at the most"
+        f"{clock.text(*clock.wall)}; the process held {most:.2f} GB at the most"
     )
 
 
 def search(part: str, rows: int) -> None:
     """Print time, value and bound of one search with its collision checks."""
-    job = load(WORKPIECES / part / "job.yaml")
+    job = load_job(WORKPIECES / part / "job.yaml")
     passes = replace(job.passes, rows=rows)
     job = replace(job, passes=replace(passes, pitch=FINE_PITCH) if rows > 5 else passes)
-    points = cutter_points(job)
-    outcome = Outcome(job)
+    points = cut_surface(job).points
     clock = Clock()
-    problem = pose_problem(job, points, clock)
+    problem = build_problem(job, job.cell, points, clock.watch())
     with clock("search"):
-        plan = search_path(outcome, problem)
-    recursive = outcome.recursive
-    assert recursive is not None and plan.lower_bound is not None
-    path, other = plan.path, recursive.path
+        found = search_path(job.search, problem)
+    plan = found.plan
+    assert plan.lower_bound is not None
+    path, other = plan.path, found.recursive.path
     refinement = plan.refinement
     assert refinement is not None and plan.gap is not None
     print(
-        f"{part}, {rows} rows, {len(points)} points: {clock.told('clearance', 'search')}; sum "
+        f"{part}, {rows} rows, {len(points)} points: {clock.text('clearance', 'search')}; sum "
         f"{path.joint_range_sum:.5f} rad, bound {plan.lower_bound:.5f} at "
         f"{refinement.bound_positions} positions, gap {100 * plan.gap:.3f} %; in the field "
         f"{refinement.joint_range_sum:.5f}, bound {refinement.lower_bound:.5f}; "

@@ -22,7 +22,7 @@ SWING_EVERY, SWING_NODES, NODE_STEP = 100, 40, 0.025
 
 
 def motion() -> tuple[np.ndarray, np.ndarray]:
-    """Return postures and wanted times of a pass."""
+    """Return configurations and wanted times of a pass."""
     times, slide = [], []
     for point in range(1, N_POINTS):
         if point % SWING_EVERY == 0:

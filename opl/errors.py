@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 
 class OplError(Exception):
-    """Root of all errors that a user can cause or has to be told of."""
+    """Root of all errors that a user can cause or has to know of."""
 
     exit_status = 1
 
@@ -29,6 +29,15 @@ class InputError(OplError):
         super().__init__(f"{where}: {message}" if where else message)
         self.where = where
         self.message = message
+
+
+class SettingError(InputError):
+    """A setting of a job is unusable; the room that finds it knows its name, not its key.
+
+    Args:
+        where: The setting by its name in Python, e.g. ``user_frame``.
+        message: The value seen and the values allowed.
+    """
 
 
 class NoPathError(OplError):
@@ -55,3 +64,15 @@ class UnsafeError(OplError):
     """A motion was planned but could not be proven safe, so no program was written."""
 
     exit_status = 4
+
+
+class TimeLawError(UnsafeError):
+    """No time law keeps the speeds and accelerations of the joints."""
+
+
+class PassTimeError(OplError):
+    """A pass cannot be written so that it keeps its time."""
+
+
+class Cancelled(OplError):
+    """A run was cancelled by the program that started it; nothing was written."""

@@ -9,7 +9,7 @@ from enum import Enum
 class Level(str, Enum):
     """How bad it is."""
 
-    WARNING = "warning"  # told, and the work goes on
+    WARNING = "warning"  # reported, and the work goes on
     ERROR = "error"  # no program is written
 
 
@@ -20,7 +20,7 @@ class Finding:
     Attributes:
         level: How bad it is.
         kind: A short fixed word, e.g. ``collision``, ``limit``, ``speed``, ``contact``.
-        where: The place: cutter point, pass, stretch of the motion.
+        where: The place: cutter point, pass, move of the motion.
         message: The bodies or the joint, and the amount.
     """
 

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field
 
 from opl.cell.robot_file import Joint, RobotFile, read_robot_file
-from opl.documents import Document, read
+from opl.files.documents import Document, read
 
 HERE = Path(__file__).parent
 
@@ -29,8 +29,8 @@ HEAD = """<?xml version="1.0"?>
   {title} in primitive shapes, lengths in [m], angles in [rad].
   Written by robots/make_urdf.py from robot.yaml and shapes.yaml; do not edit.
 
-  At the zero posture all link frames are parallel to the base frame: x forward, y left, z up. Each
-  lies on its joint's axis. Joint axes point so that a positive angle is positive for the maker.
+  At the zero configuration all link frames are parallel to the base frame: x forward, y left, z up.
+  Each lies on its joint's axis. Joint axes point so that positive is positive for the maker.
 
   Shapes: {source} (certainty {certainty}).
   Masses and inertias are placeholders, because simulators ask for them; efforts are unknown.

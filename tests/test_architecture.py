@@ -2,7 +2,9 @@
 
 import ast
 import importlib
+import inspect
 import re
+import subprocess
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -16,25 +18,20 @@ PACKAGE = Path(opl.__file__).parent
 # Lowest first. A module may import from floors below its own, and from its own room. Rooms on one
 # floor do not know each other. A room is a folder, or a module that lies in the package itself.
 FLOORS = [
-    {"__init__", "errors", "findings", "resources"},
-    {"documents"},
+    {"errors", "findings"},
+    {"files"},
     {"geometry"},
     {"cell", "search"},
     {"motion"},
-    {"planning"},
-    {"verification", "program", "report"},
+    {"planning", "verification", "program", "report"},
     {"job"},
-    {"surfacing", "surfacing_table"},
     {"proof"},
-    {"outcome"},
-    {"searches", "export", "remedies"},
-    {"pipeline"},
-    {"result"},
-    {"deliver"},
-    {"batch"},
-    {"console"},
+    {"run"},
+    {"__init__"},
     {"cli"},
 ]
+
+ROOMS = set().union(*FLOORS)
 
 # where a library may be imported: rooms, or single modules
 HOMES = {
@@ -46,9 +43,9 @@ HOMES = {
     "pybullet_utils": {"verification"},
     "pybullet_data": set(),
     "jinja2": {"program"},
-    "yaml": {"documents"},
+    "yaml": {"files/documents"},
     "click": {"cli"},
-    "rich": {"console"},
+    "rich": {"cli"},
     "matplotlib": {"report"},
     "trimesh": {"geometry/mesh"},
     "contourpy": {"geometry/section_curves"},
@@ -123,9 +120,9 @@ def wrong_imports(package):
             below = floor_of(other) is not None and floor_of(other) < floor_of(name)
             if room_of(other) != room_of(name) and not below:
                 found.append(f"{name} imports {other}")
-        # the model of a document stands beside what is made from it, on the rules of documents.py
-        if "pydantic" in others and name != "documents" and "documents" not in own:
-            found.append(f"{name} imports pydantic, but not documents")
+        # the model of a document stands beside what is made from it, on the rules of one module
+        if "pydantic" in others and name != "files.documents" and "files.documents" not in own:
+            found.append(f"{name} imports pydantic, not files.documents")
         for library in sorted(others & HOMES.keys()):
             if not {room_of(name), name.replace(".", "/")} & HOMES[library]:
                 found.append(f"{name} imports {library}")
@@ -199,6 +196,19 @@ def test_nothing_is_left_to_be_done():
     assert with_leftovers(PACKAGE) == []
 
 
+def test_the_map_has_the_same_floors_and_every_module():
+    text = (PACKAGE.parent / "ARCHITECTURE.md").read_text()
+    rows = re.findall(r"^\| (\d+) \| (.*?) \|", text, re.MULTILINE)
+    mapped = [set() for _ in FLOORS]
+    for number, rooms in rows:
+        names = re.findall(r"`([a-z_]+)(?:/|\.py)`", rooms)
+        mapped[int(number) - 1] |= {name for name in names if name in ROOMS}
+    assert mapped == FLOORS
+    named = set(re.findall(r"`([a-z_]+)\.py`", text))
+    in_rooms = {n.split(".")[-1] for n in modules_of(PACKAGE) if n.count(".") == 1}
+    assert in_rooms - named - {"__init__"} == set()
+
+
 def test_every_room_is_there():
     rooms = {room_of(name) for name in modules_of(PACKAGE)}
     assert {"geometry", "cell", "search", "planning", "verification", "program", "job"} <= rooms
@@ -228,10 +238,64 @@ def test_the_search_knows_arrays_and_no_robot():
         assert others <= {*sys.stdlib_module_names, "numpy", "numba"}, name
 
 
+def test_the_command_line_uses_nothing_but_the_front_door():
+    commands = [name for name in modules_of(PACKAGE) if room_of(name) == "cli"]
+    assert "cli.commands" in commands
+    for name in commands:
+        own, others = imports_of(PACKAGE, name, modules_of(PACKAGE)[name])
+        assert {other for other in own if room_of(other) != "cli"} <= {"__init__"}, name
+        assert others <= {*sys.stdlib_module_names, "click", "rich"}, name
+
+
+def test_every_name_of_the_front_door_exists_and_is_described():
+    assert opl.__all__ == sorted(opl.__all__) and len(set(opl.__all__)) == len(opl.__all__)
+    for name in opl.__all__:
+        assert inspect.getdoc(getattr(opl, name)), name
+        assert f"`{name}`" in opl.__doc__, f"{name} is not in the text of the front door"
+    assert set(opl.__all__) <= set(dir(opl))
+
+
+def test_names_of_the_front_door_are_not_those_of_rooms():
+    # a room that is imported would take the place of the name
+    rooms = {room_of(name) for name in modules_of(PACKAGE)}
+    assert not rooms & set(opl.__all__)
+
+
+def test_type_checkers_see_the_front_door_as_it_is():
+    tree = ast.parse((PACKAGE / "__init__.py").read_text())
+    (block,) = [
+        node
+        for node in tree.body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    ]
+    seen = {}
+    for node in block.body:
+        seen.update({alias.asname: (node.module, alias.name) for alias in node.names})
+    assert sorted(seen) == opl.__all__
+    for name, (home, original) in seen.items():
+        assert name == original
+        module = importlib.import_module(home)
+        assert getattr(opl, name) is getattr(module, name), name
+
+
+@pytest.mark.parametrize("module", ["opl", "opl.cli.commands"])
+def test_what_is_cheap_imports_nothing_heavy(module):
+    script = f"import sys, {module}; print(*sys.modules)"
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    loaded = {name.split(".")[0] for name in ended.stdout.split()}
+    assert "opl" in loaded
+    assert not loaded & {"numpy", "pydantic", "yaml", *HOMES.keys() - {"click", "rich"}}
+
+
+def test_an_unknown_name_is_not_in_the_front_door():
+    with pytest.raises(AttributeError, match="module 'opl' has no attribute 'plan'"):
+        opl.plan  # noqa: B018
+
+
 def test_libraries_do_not_set_up_logging_or_print():
-    # only the console and the command line speak
+    # only the command line prints
     for name, path in modules_of(PACKAGE).items():
-        if room_of(name) in ("cli", "console"):
+        if room_of(name) == "cli":
             continue
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
@@ -296,7 +360,11 @@ def test_a_good_tree_passes(made_up):
         ("planning/a.py", "import pinocchio as pin", "planning.a imports pinocchio"),
         ("planning/a.py", "if True:\n    from coal import Box", "planning.a imports coal"),
         ("cell/a.py", "import yaml", "cell.a imports yaml"),
-        ("cell/a.py", "from pydantic import Field", "cell.a imports pydantic, but not documents"),
+        (
+            "cell/a.py",
+            "from pydantic import Field",
+            "cell.a imports pydantic, not files.documents",
+        ),
         ("cell/a.py", "import numba", "cell.a imports numba"),
         ("geometry/a.py", "import trimesh.creation", "geometry.a imports trimesh"),
         ("job.py", "import click", "job imports click"),

@@ -1,6 +1,6 @@
-"""Whether robot, held part or fixture touch anything at a posture, by pinocchio and coal.
+"""Whether robot, held part or fixture touch anything at a configuration, by pinocchio and coal.
 
-Part against wheel is not asked here: that pair may touch, and has a closed form in
+Part against wheel is not checked here: that pair may touch, and has a closed form in
 `opl.cell.wheel_distance`. A collision is a yes or a no, never a cost.
 """
 
@@ -13,7 +13,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.robot import forward_kinematics
+from opl.cell.robot import collision_shapes, forward_kinematics
 from opl.cell.workcell import (
     PART,
     SECOND_OPINION,
@@ -25,42 +25,35 @@ from opl.geometry.frames import Array, inverse, transform
 from opl.geometry.mesh import TriangleMesh, winding_number
 from opl.geometry.shapes import Body, Box, Cylinder
 
-Pair = tuple[str, str]
+BodyPair = tuple[str, str]
 
 
 class CollisionScene:
-    """The cell as geometry, ready to be asked.
+    """The cell as geometry, ready for collision checks.
 
-    Asked for collision is every pair that could meet: links that are not neighbours, held bodies
-    against all links but the flange's, and links and held bodies against wheel and obstacles. Pairs
-    with something that is not the robot must stay apart by the clearance of the cell; links of the
-    robot must not touch each other (their primitives already enclose the real castings). Meshes of
-    links count as their convex hulls.
-    The cell may say otherwise of single pairs.
+    Checked is every pair that could meet: links that are not neighbours, held bodies against all
+    links but the flange's, and links and held bodies against wheel and obstacles. Pairs with
+    something that is not the robot must keep the required clearance of the cell; links of the robot
+    must not touch each other (their primitives already enclose the real castings). Meshes of links
+    count as their convex hulls. The cell may have other rules for single pairs.
     """
 
     def __init__(self, cell: WorkCell) -> None:
-        self._model = pin.buildModelFromUrdf(str(cell.robot.urdf))
-        self._geometry = pin.buildGeomFromUrdf(
-            self._model,
-            str(cell.robot.urdf),
-            pin.GeometryType.COLLISION,
-            package_dirs=[str(cell.robot.urdf.parent)],  # where relative names of meshes start
-        )
+        self._model, self._geometry = collision_shapes(cell.robot)
         for link in self._geometry.geometryObjects:
             if isinstance(link.geometry, coal.BVHModelBase):
-                # as the replay takes it, which else would refuse what is planned
+                # as in the replay, which otherwise would refuse what is planned
                 link.geometry.buildConvexHull(False, "Qt")
                 link.geometry = link.geometry.convex
         self._n_links = self._geometry.ngeoms
         self._add_bodies(cell)
-        self._pairs: list[Pair] = []
+        self._pairs: list[BodyPair] = []
         margins = self._choose_pairs(cell)
         self._margins = np.array(margins)
         self._prepare(self._margins, range(0))
 
-    def _prepare(self, margins: Array, unasked: Iterable[int]) -> None:
-        """Make ready to ask with these margins in [m], but not about some of the pairs."""
+    def _prepare(self, margins: Array, unchecked: Iterable[int]) -> None:
+        """Make ready for checks with these margins in [m], without some of the pairs."""
         self._data = self._model.createData()
         self._geometry_data = self._geometry.createData()
         for request, margin in zip(self._geometry_data.collisionRequests, margins, strict=True):
@@ -68,16 +61,16 @@ class CollisionScene:
             request.enable_contact = False
             # the default of 1 mm goes on to measure distances of pairs nearly in contact
             request.break_distance = 0.0
-        for index in unasked:
+        for index in unchecked:
             self._geometry_data.deactivateCollisionPair(index)
-        # asks a pair only where the bounding boxes, widened by its margin, overlap; measured
+        # checks a pair only where the bounding boxes, widened by its margin, overlap; measured
         # faster here than the managers that sort or nest the boxes
         self._manager = pin.BroadPhaseManager_NaiveCollisionManager(
             self._model, self._geometry, self._geometry_data
         )
 
     def for_second_opinion(self) -> CollisionScene:
-        """Return the scene with as much more clearance as a second opinion may take away.
+        """Return the scene with as much more clearance as the replay may find less.
 
         What this scene calls free, the replay of the verification calls free too.
         """
@@ -92,11 +85,7 @@ class CollisionScene:
         return scene
 
     def against_surroundings(self, reserve: float) -> CollisionScene:
-        """Return the scene with more clearance, asked only about what does not move.
-
-        Args:
-            reserve: Distance in [m] to keep beyond the margin of each pair.
-        """
+        """Return the scene with more clearance [m], only for pairs with what does not move."""
         scene = copy(self)
         joints = [geometry.parentJoint for geometry in self._geometry.geometryObjects]
         both_move = (
@@ -108,9 +97,9 @@ class CollisionScene:
         return scene
 
     def levers(self) -> Array:
-        """Return how far from each joint's axis anything it moves can be, in [m], shape (6,).
+        """Return how far from each joint's axis anything it moves can ever be, in [m], shape (6,).
 
-        In any posture: when joint k turns by d [rad], no point moves farther than d times lever k.
+        When joint k turns by d [rad], no point moves farther than d times lever k.
         """
         model = self._model
         data = model.createData()
@@ -136,26 +125,19 @@ class CollisionScene:
         return levers
 
     def collides(self, q: Array) -> np.ndarray:
-        """Return which postures collide.
+        """Return which configurations in [rad], shape (n, 6), collide; shape (n,) of bool."""
+        return np.array([self._compute(configuration, True) for configuration in q], dtype=bool)
 
-        Args:
-            q: Joint positions in [rad], shape (n, 6).
-
-        Returns:
-            Shape (n,) of bool.
-        """
-        return np.array([self._ask(posture, True) for posture in q], dtype=bool)
-
-    def colliding_pairs(self, q: Array) -> list[Pair]:
-        """Return the names of every pair in collision at one posture, shape (6,)."""
+    def colliding_pairs(self, q: Array) -> list[BodyPair]:
+        """Return the names of every pair in collision at one configuration, shape (6,)."""
         results = self._geometry_data.collisionResults
         for result in results:
             result.clear()  # the broad phase leaves those of the pairs it passes over as they were
-        self._ask(q, False)
+        self._compute(q, False)
         hits = [pair for pair, hit in zip(self._pairs, results, strict=True) if hit.isCollision()]
         return list(dict.fromkeys(hits))
 
-    def _ask(self, q: Array, stop_at_first: bool) -> bool:
+    def _compute(self, q: Array, stop_at_first: bool) -> bool:
         return bool(pin.computeCollisions(self._model, self._data, self._manager, q, stop_at_first))
 
     def _add_bodies(self, cell: WorkCell) -> None:
@@ -177,7 +159,7 @@ class CollisionScene:
         )
 
     def _choose_pairs(self, cell: WorkCell) -> list[float]:
-        """Enter the pairs to be asked and return the margin of each in [m]."""
+        """Enter the pairs to be checked and return the margin of each in [m]."""
         joints = [geometry.parentJoint for geometry in self._geometry.geometryObjects]
         margins = []
         for second in range(len(joints)):
@@ -207,12 +189,12 @@ class CollisionScene:
         return str(geometry.name)
 
 
-def enclosing_bodies(cell: WorkCell, q: Array) -> list[tuple[str, str]]:
-    """Return flange or part with each obstacle they are inside of, at one posture, shape (6,).
+def enclosing_bodies(cell: WorkCell, q: Array) -> list[BodyPair]:
+    """Return flange or part with each obstacle they are inside of, at ``q``, shape (6,).
 
     Collisions with a mesh are collisions with its triangles: whoever is wholly inside touches none
     of them. A motion that starts outside of a mesh and never meets its surface stays outside, so it
-    is enough to look at one posture.
+    is enough to look at one configuration.
     """
     T_base_flange = forward_kinematics(cell.robot, q)
     p_base_part = transform(T_base_flange @ cell.T_flange_workpiece, cell.part.vertices[0])

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from opl.cell.full_turns import full_turns, principal
 from opl.cell.parallel_axes import ParallelAxesArm
-from opl.cell.robot import Robot
+from opl.cell.robot import Robot, collision_shapes
 from opl.cell.triangle import bend_to
 from opl.geometry.frames import Array, transform
 
@@ -20,7 +20,7 @@ _CIRCLE = 48  # corners of a drawn circle
 
 @dataclass(frozen=True, eq=False)
 class DrawnArm:
-    """An arm at its zero posture, in the base frame.
+    """An arm at its zero configuration, in the base frame.
 
     Attributes:
         outlines: Of each collision shape the joint that moves it, 0 for the foot, and points whose
@@ -38,14 +38,8 @@ class DrawnArm:
 
 
 def drawn_arm(robot: Robot) -> DrawnArm:
-    """Return what there is to draw of a robot at its zero posture."""
-    model = pin.buildModelFromUrdf(str(robot.urdf))
-    geometry = pin.buildGeomFromUrdf(
-        model,
-        str(robot.urdf),
-        pin.GeometryType.COLLISION,
-        package_dirs=[str(robot.urdf.parent)],
-    )
+    """Return what there is to draw of a robot at its zero configuration."""
+    model, geometry = collision_shapes(robot)
     data, shapes = model.createData(), geometry.createData()
     pin.computeJointJacobians(model, data, np.zeros(6))
     pin.updateGeometryPlacements(model, data, geometry, shapes)
@@ -104,11 +98,11 @@ def wrist_reach(robot: Robot, ahead: Array, up: Array) -> Array:
 def _corners(shape: coal.CollisionGeometry) -> Array:
     """Return points whose convex hull is a shape, in its own frame in [m], shape (n, 3)."""
     if isinstance(shape, coal.Box):
-        return np.array(list(product((-1.0, 1.0), repeat=3))) * shape.halfSide
+        return np.asarray(np.array(list(product((-1.0, 1.0), repeat=3))) * shape.halfSide)
     if isinstance(shape, coal.Sphere):
         around, over = np.meshgrid(*[np.linspace(0.0, 2.0 * np.pi, _CIRCLE)] * 2)
         sides = [np.cos(around) * np.sin(over), np.sin(around) * np.sin(over), np.cos(over)]
-        return shape.radius * np.stack(sides, axis=-1).reshape(-1, 3)
+        return np.asarray(shape.radius * np.stack(sides, axis=-1).reshape(-1, 3))
     if isinstance(shape, coal.Cylinder):
         angle = np.linspace(0.0, 2.0 * np.pi, _CIRCLE, endpoint=False)
         circle = shape.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)

@@ -24,11 +24,9 @@ def angular_distance(q: Array, other: Array) -> Array:
 
 
 def nearest_turn(q: Array, reference: Array) -> Array:
-    """Return joint positions with the full turns that bring each nearest to a reference, in [rad].
+    """Return joint positions with the full turns that bring each nearest to a reference.
 
-    Args:
-        q: Joint positions in [rad], any shape.
-        reference: Where they shall be near in [rad]; shapes must broadcast.
+    All in [rad]; the shapes must broadcast.
     """
     return q + FULL_TURN * np.round((reference - q) / FULL_TURN)
 
@@ -37,11 +35,7 @@ def full_turns(lower: Array, upper: Array) -> Array:
     """Return the full turns after which a principal angle can lie within the limits.
 
     A joint whose range only touches the end of a further turn (S at exactly +-180 degrees) does not
-    get that turn.
-
-    Args:
-        lower: Smallest joint positions in [rad], shape (6,).
-        upper: Largest joint positions in [rad], shape (6,).
+    get that turn. The limits are in [rad], shape (6,).
 
     Returns:
         Multiples of 2 pi to add to q, in [rad], shape (k, 6): fewest turns first, so zero leads,

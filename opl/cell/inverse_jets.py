@@ -1,4 +1,4 @@
-"""How fast the inverse solutions turn: enclosures of their derivatives along a motion of the flange.
+"""How fast the inverse solutions turn: their derivatives along a motion of the flange, enclosed.
 
 The closed forms of `spherical_wrist` and `parallel_axes` are square roots and quotients up to the
 last step, the arc tangent. So their derivatives can be enclosed over a whole piece of a motion,
@@ -149,9 +149,7 @@ def _turned(v: Axes, cos1: Jet, sin1: Jet) -> tuple[Jet, Jet]:
     return cos1 * v[0] + sin1 * v[1], cos1 * v[1] - sin1 * v[0]
 
 
-def _heading(
-    p: Axes, lateral: float, back: int
-) -> tuple[Jet, Jet, Jet, Turning, np.ndarray]:
+def _heading(p: Axes, lateral: float, back: int) -> tuple[Jet, Jet, Jet, Turning, np.ndarray]:
     """Return cosine and sine of theta1, how far ahead of axis 1 the point lies, and theta1.
 
     And where it is nearer to axis 1 than the plane of the arm passes by.

@@ -16,8 +16,8 @@ So, with w where axes 5 and 6 meet,
 
 That w lies b to the left of axis 1 fixes theta1; how far z_flange leaves the plane of the three
 parallel axes fixes theta5, and its direction in that plane how the wrist is tilted. What is left is
-the triangle of axes 2, 3 and 4. Two answers each at shoulder, wrist and elbow make eight postures.
-The derivation is our own; EAIK is the second opinion of the tests.
+the triangle of axes 2, 3 and 4. Two answers each at shoulder, wrist and elbow make eight
+configurations. The derivation is our own; EAIK is the second opinion of the tests.
 """
 
 from __future__ import annotations
@@ -68,23 +68,15 @@ class ParallelAxesArm:
     def angles(self, x: Array, y: Array, z: Array, p: Array, near: Array) -> tuple[Array, ...]:
         """Return theta1 to theta6 that put the flange at poses.
 
-        Args:
-            x: Axes of the flange in the base frame, shape (3, n).
-            y: As x.
-            z: As x.
-            p: Its origins in [m], shape (3, n).
-            near: Angles of a posture nearby in [rad], shape (6, n): theta6 where axis 6 is parallel
-                to axes 2 to 4, which then share what the pose leaves free.
-
-        Returns:
-            Six arrays that broadcast to (2 flip, 2 back, 2 elbow, n), in [rad]; NaN out of reach.
+        Arguments and result are those of `SphericalWristArm.angles`, but ``near`` gives theta6
+        where axis 6 is parallel to axes 2 to 4, which then share what the pose leaves free.
         """
         w = p - self.c5 * z
         theta1, ahead = heading_to(w, self.b)
         cos1, sin1 = np.cos(theta1), np.sin(theta1)
 
         def in_plane(v: Array) -> Array:
-            return cos1 * v[0] + sin1 * v[1]  # along the heading of the arm
+            return np.asarray(cos1 * v[0] + sin1 * v[1])  # along the heading of the arm
 
         # z_flange is -sin5 e1 + cos5 y, with e1 = (cos tilt, -sin tilt) ahead and up
         z_ahead, z_up, z_left = in_plane(z), z[2], cos1 * z[1] - sin1 * z[0]
@@ -94,7 +86,7 @@ class ParallelAxesArm:
         flip = np.array([1.0, -1.0])[:, None, None, None]
         theta5 = flip * np.arctan2(np.where(straight, 0.0, sin5), z_left)
         cos_tilt, sin_tilt = -flip * z_ahead / length, flip * z_up / length
-        # where z_flange says nothing of the tilt: e3, along the last link, is -sin6 x - cos6 y
+        # where z_flange leaves the tilt open: e3, along the last link, is -sin6 x - cos6 y
         e3 = -np.sin(near[5]) * x - np.cos(near[5]) * y
         cos_tilt = np.where(straight, e3[2], cos_tilt)
         sin_tilt = np.where(straight, in_plane(e3), sin_tilt)

@@ -25,8 +25,8 @@ from opl.cell.robot_file import N_JOINTS, RobotFile, read_robot_file
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.cell.urdf_tree import UrdfTree
 from opl.errors import InputError
-from opl.geometry.frames import Array, pose
-from opl.resources import folder
+from opl.files.resources import folder
+from opl.geometry.frames import Array, pose, read_only
 
 # In which a joint is taken to reach its top speed where nobody knows its acceleration, in [s].
 # Integrators guess 0.1 s for arms of this kind; slower is the safe side.
@@ -78,10 +78,9 @@ class Robot:
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper", "max_speed", "max_acceleration", "pulses_per_radian"):
-            copy = np.array(getattr(self, name), dtype=float)
+            copy = read_only(getattr(self, name))
             if copy.shape != (N_JOINTS,):
                 raise ValueError(f"{name} has shape {copy.shape}, must have ({N_JOINTS},)")
-            copy.setflags(write=False)
             object.__setattr__(self, name, copy)
 
     @property
@@ -146,31 +145,20 @@ def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
 
 
 def forward_kinematics(robot: Robot, q: Array) -> Array:
-    """Return the flange poses Ts_base_flange of postures.
-
-    Args:
-        robot: Whose postures.
-        q: Joint positions in [rad], shape (..., 6).
-
-    Returns:
-        Shape (..., 4, 4).
-    """
+    """Return the flange poses Ts_base_flange, (..., 4, 4), of configurations in [rad], (..., 6)."""
     model = _model(robot.urdf)
     data = model.createData()
     base, flange = model.getFrameId("base"), model.getFrameId("tool0")
-    postures = np.asarray(q, dtype=float).reshape(-1, N_JOINTS)
-    Ts_base_flange = np.empty((len(postures), 4, 4))
-    for T_base_flange, posture in zip(Ts_base_flange, postures, strict=True):
-        pin.framesForwardKinematics(model, data, posture)
+    configurations = np.asarray(q, dtype=float).reshape(-1, N_JOINTS)
+    Ts_base_flange = np.empty((len(configurations), 4, 4))
+    for T_base_flange, configuration in zip(Ts_base_flange, configurations, strict=True):
+        pin.framesForwardKinematics(model, data, configuration)
         T_base_flange[:] = data.oMf[base].actInv(data.oMf[flange]).homogeneous
     return Ts_base_flange.reshape(*np.shape(q)[:-1], 4, 4)
 
 
 def controller_poses(robot: Robot, q: Array) -> Array:
-    """Return the flange poses of postures as the maker's controller counts them.
-
-    As `forward_kinematics`, from the controller's own base frame instead of opl's.
-    """
+    """Return the poses of `forward_kinematics` from the controller's own base frame."""
     return robot.T_controller_base @ forward_kinematics(robot, q)
 
 
@@ -184,13 +172,25 @@ def link_names(robot: Robot) -> tuple[str, ...]:
     )
 
 
+def collision_shapes(robot: Robot) -> tuple[pin.Model, pin.GeometryModel]:
+    """Return the joints of a robot and the shapes they move, new ones at each call."""
+    model = pin.buildModelFromUrdf(str(robot.urdf))
+    shapes = pin.buildGeomFromUrdf(
+        model,
+        str(robot.urdf),
+        pin.GeometryType.COLLISION,
+        package_dirs=[str(robot.urdf.parent)],  # where relative names of meshes start
+    )
+    return model, shapes
+
+
 @cache
 def _model(urdf: Path) -> pin.Model:
     return pin.buildModelFromUrdf(str(urdf))
 
 
 def _check_urdf(robot: Robot) -> None:
-    """Refuse a URDF that speaks of other joints, lacks a frame, or hides shapes from the replay."""
+    """Refuse a URDF that has other joints, lacks a frame, or hides shapes from the replay."""
     try:
         model = _model(robot.urdf)
     except ValueError as error:
@@ -207,7 +207,7 @@ def _check_urdf(robot: Robot) -> None:
 
 
 def _arm_fits_urdf(robot: Robot) -> bool:
-    """Return whether the closed form finds postures again that the URDF was put in."""
+    """Return whether the closed form finds configurations again that the URDF was put in."""
     fractions = np.array([[0.3, 0.6, 0.4, 0.7, 0.2, 0.6], [0.8, 0.3, 0.7, 0.4, 0.6, 0.3]])
     q = robot.lower + fractions * (robot.upper - robot.lower)  # any two
     found = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)

@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from opl.documents import Document, read
+from opl.files.documents import Document, read
 
 N_JOINTS = 6
 FROM_URDF = "from the URDF"
 
-Positive = Annotated[float, Field(gt=0)]
+_Positive = Annotated[float, Field(gt=0)]
 
 
 class Sourced(Document):
@@ -30,7 +30,7 @@ class Base(Sourced):
     """Where the base frame is: on axis 1, so far above the mounting face.
 
     The maker's controller may count from elsewhere on axis 1, or from a frame turned about it;
-    ``controller_height_mm`` and ``controller_turn_deg`` say so.
+    see ``controller_height_mm`` and ``controller_turn_deg``.
     """
 
     height_mm: float
@@ -38,7 +38,7 @@ class Base(Sourced):
     controller_turn_deg: float = 0.0
 
 
-class Arm(Sourced):
+class ArmNumbers(Sourced):
     """Link lengths, zero offsets and signs, as in `opl.cell.spherical_wrist` or `parallel_axes`."""
 
     family: Literal["spherical wrist", "parallel axes"] = "spherical wrist"
@@ -46,7 +46,7 @@ class Arm(Sourced):
     a2_mm: float | None = None  # spherical wrist only
     b_mm: float
     c1_mm: float
-    c2_mm: Positive
+    c2_mm: _Positive
     c3_mm: float
     c4_mm: float
     c5_mm: float | None = None  # parallel axes only
@@ -54,7 +54,7 @@ class Arm(Sourced):
     signs: Annotated[list[Literal[1, -1]], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
 
     @model_validator(mode="after")
-    def _one_family(self) -> Arm:
+    def _one_family(self) -> ArmNumbers:
         own, other = ("c5_mm", "a2_mm") if self.parallel_axes else ("a2_mm", "c5_mm")
         if getattr(self, own) is None:
             raise ValueError(f"an arm of family {self.family} needs {own}")
@@ -78,7 +78,7 @@ class Arm(Sourced):
 class Payload(Sourced):
     """What the flange may carry."""
 
-    max_kg: Positive
+    max_kg: _Positive
 
 
 class Limits(Sourced):
@@ -94,22 +94,22 @@ class Limits(Sourced):
         return self
 
 
-class Speed(Sourced):
+class TopSpeed(Sourced):
     """Top speed of a joint."""
 
-    max_deg_s: Positive
+    max_deg_s: _Positive
 
 
 class Acceleration(Sourced):
     """Largest acceleration of each joint, base first; makers hardly ever publish it."""
 
-    max_deg_s2: Annotated[list[Positive], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
+    max_deg_s2: Annotated[list[_Positive], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
 
 
-class Pulses(Sourced):
+class PulseCounts(Sourced):
     """Encoder counts of a joint, as Yaskawa programs give them."""
 
-    per_degree: Positive
+    per_degree: _Positive
     verified: bool
 
 
@@ -118,8 +118,8 @@ class Joint(Document):
 
     name: str
     limits: Limits
-    speed: Speed
-    pulses: Pulses | None = None
+    speed: TopSpeed
+    pulses: PulseCounts | None = None
 
 
 class RobotFile(Document):
@@ -130,7 +130,7 @@ class RobotFile(Document):
     maker: str
     urdf: str
     base: Base
-    arm: Arm
+    arm: ArmNumbers
     payload: Payload | None = None
     acceleration: Acceleration | None = None  # None: as `opl.cell.robot` assumes it
     shapes: Sourced | None = None  # of the shapes in the URDF

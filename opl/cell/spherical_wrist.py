@@ -15,7 +15,7 @@ So, with p the wrist centre,
     p = p_base_flange - c4 z_flange.
 
 The position of p fixes theta1 to theta3 in a triangle; the orientation left over fixes theta4 to
-theta6. Two answers each at shoulder, elbow and wrist make eight postures, in slots
+theta6. Two answers each at shoulder, elbow and wrist make eight configurations, in slots
 ``4 * flip + 2 * back + elbow`` that keep their meaning along a path. The parameters are those of
 Brandstoetter, Angerer and Hofbaur (2014); the derivation beside the code is our own.
 """
@@ -74,7 +74,8 @@ class SphericalWristArm:
             y: As x.
             z: As x.
             p: Its origins in [m], shape (3, n).
-            near: Angles of a posture nearby in [rad], shape (6, n): theta4 of the straight wrist.
+            near: Angles of a configuration nearby in [rad], shape (6, n): theta4 of the straight
+                wrist.
 
         Returns:
             Six arrays that broadcast to (2 flip, 2 back, 2 elbow, n), in [rad]; NaN out of reach.
@@ -123,8 +124,8 @@ def _orientation(
     Theta6 is measured against that axis 5, not found from z: near the straight wrist theta4 is
     hardly known, and their sum comes out right only if both rest on the same theta4.
 
-    Turning axis 4 by half a turn and bending the wrist the other way gives the same axes. A
-    straight wrist has no other way; both slots then keep theta4_free.
+    Turning axis 4 by half a turn and bending the wrist to the other side gives the same axes. A
+    straight wrist has no other side; both slots then keep theta4_free.
 
     Args:
         theta1: Angle of axis 1 in [rad], shape (2 back, 1, n).
@@ -132,7 +133,7 @@ def _orientation(
         x: Axes in the base frame, shape (3, n).
         y: As x.
         z: As x.
-        theta4_free: theta4 of the straight wrist in [rad], shape (n,).
+        theta4_free: Of the straight wrist in [rad], shape (n,).
 
     Returns:
         theta4, theta5 >= 0, theta6, and what to add to theta4 and theta6 where theta5 turns
@@ -141,16 +142,16 @@ def _orientation(
     cos1, sin1, cos_tilt, sin_tilt = np.cos(theta1), np.sin(theta1), np.cos(tilt), np.sin(tilt)
 
     def in_plane(v: Array) -> Array:
-        return cos1 * v[0] + sin1 * v[1]  # along the heading of the arm
+        return np.asarray(cos1 * v[0] + sin1 * v[1])  # along the heading of the arm
 
     def along_e1(v: Array) -> Array:
-        return cos_tilt * in_plane(v) - sin_tilt * v[2]
+        return np.asarray(cos_tilt * in_plane(v) - sin_tilt * v[2])
 
     def along_e2(v: Array) -> Array:
-        return cos1 * v[1] - sin1 * v[0]
+        return np.asarray(cos1 * v[1] - sin1 * v[0])
 
     def along_e3(v: Array) -> Array:
-        return sin_tilt * in_plane(v) + cos_tilt * v[2]
+        return np.asarray(sin_tilt * in_plane(v) + cos_tilt * v[2])
 
     z1, z2 = along_e1(z), along_e2(z)
     sin5 = np.sqrt(z1**2 + z2**2)

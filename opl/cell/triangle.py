@@ -1,4 +1,4 @@
-"""The triangle of an arm's two long links: the two postures that bring its far end to a place."""
+"""The triangle of an arm's two long links: both ways to bring its far end to a place."""
 
 from __future__ import annotations
 
@@ -35,11 +35,9 @@ def bend_to(forward: Array, up: Array, upper_arm: float, forearm: float) -> tupl
 
 
 def heading_to(p: Array, lateral: float) -> tuple[Array, Array]:
-    """Return the two angles of axis 1 with a point so far to the left of the plane of the arm.
+    """Return the two angles of axis 1 with points so far [m] to the left of the plane of the arm.
 
-    Args:
-        p: Points in the base frame in [m], shape (3, n).
-        lateral: How far to the left in [m].
+    The points are in the base frame in [m], shape (3, n).
 
     Returns:
         Angle of axis 1 in [rad], and how far ahead of axis 1 the point then lies in [m], not

@@ -1,6 +1,6 @@
 """From the joint axes of a URDF to the closed form of its arm.
 
-All is read off the zero posture, where every axis is a line in space. In the drawings of
+All is read off the zero configuration, where every axis is a line in space. In the drawings of
 `opl.cell.spherical_wrist` and `opl.cell.parallel_axes`: axis 1 gives z, axis 2 the side y of the
 arm, the line from axis 2 to axis 3 the tilt of the upper arm, axis 4 or the line to it that of the
 forearm, axes 5 and 6 the wrist. What a drawing leaves open (the same arm seen from behind, or with
@@ -53,7 +53,7 @@ def arm_of_urdf(urdf: Path, source: Path | None = None) -> UrdfArm:
 
     Raises:
         InputError: If the file is no URDF of six revolute joints in a row with a link tool0, or the
-            arm has another build than the closed forms; says which axes.
+            arm has another build than the closed forms; names the axes.
     """
     where = str(source or urdf)
     try:
@@ -90,17 +90,17 @@ def arm_of_urdf(urdf: Path, source: Path | None = None) -> UrdfArm:
 def _spherical_wrist(
     where: str, axes: Array, points: Array, T_root_flange: Array
 ) -> SphericalWristArm:
-    """Return the closed form.
-
-    Args:
-        where: The file, for messages.
-        axes: Directions of the joint axes at the zero posture, shape (6, 3).
-        points: A point on each in [m], shape (6, 3).
-        T_root_flange: The flange at the zero posture, shape (4, 4).
-    """
+    """Return the closed form, from directions of the joint axes and a point [m] on each, (6, 3)."""
     x_tool, z_tool = T_root_flange[:3, 0], T_root_flange[:3, 2]
     z = np.array([0.0, 0.0, 1.0])
-    wrist = _wrist_centre(where, axes, points)
+    wrist, miss = _meeting(axes[3:], points[3:])
+    if miss > _LENGTH:
+        raise InputError(
+            where,
+            f"axes 4, 5 and 6 do not meet in one point, they pass it by {miss * 1e3:.3g} mm: the "
+            "wrist is not spherical, nor are axes 2, 3 and 4 parallel; opl has no closed form for "
+            "such an arm",
+        )
     _require_build(where, axes, parallel=(2,))
     from_wrist = _from_wrist(where, axes, wrist, T_root_flange)
     sign2, x, y = _side(axes)
@@ -135,7 +135,6 @@ def _spherical_wrist(
 
 
 def _parallel_axes(where: str, axes: Array, points: Array, T_root_flange: Array) -> ParallelAxesArm:
-    """Return the closed form; arguments as of `_spherical_wrist`."""
     x_tool, y_tool, z_tool = T_root_flange[:3, :3].T
     z = np.array([0.0, 0.0, 1.0])
     _require_build(where, axes, parallel=(2, 3))
@@ -149,8 +148,8 @@ def _parallel_axes(where: str, axes: Array, points: Array, T_root_flange: Array)
     hand = _across(meeting - points[3], y)
     sideways = float(np.linalg.norm(np.cross(hand, axes[4])))
     if sideways > _LENGTH:
-        told = f"seen along axis 4, axis 5 must meet it, it passes by {1e3 * sideways:.3g} mm"
-        raise InputError(where, told)
+        message = f"seen along axis 4, axis 5 must meet it, it passes by {1e3 * sideways:.3g} mm"
+        raise InputError(where, message)
     # the meeting of axes 5 and 6 lies ahead along axis 5
     sign5 = _sign(axes[4] @ hand)
     e3 = sign5 * axes[4]
@@ -178,12 +177,13 @@ def _require_build(where: str, axes: Array, parallel: tuple[int, ...]) -> None:
     for first in range(1, N_JOINTS):
         one, other = axes[first - 1], axes[first]
         wanted = "parallel" if first in parallel else "at right angles"
-        if not (_parallel(one, other) if first in parallel else _square(one, other)):
+        square = abs(float(one @ other)) < _ANGLE
+        if not (_parallel(one, other) if first in parallel else square):
             raise InputError(where, f"axes {first} and {first + 1} must be {wanted}")
 
 
 def _from_wrist(where: str, axes: Array, wrist: Array, T_root_flange: Array) -> Array:
-    """Return the way from the wrist to the flange, which must lie on axis 6."""
+    """Return the vector from the wrist to the flange, which must lie on axis 6."""
     from_wrist, z_tool = T_root_flange[:3, 3] - wrist, T_root_flange[:3, 2]
     if not _parallel(z_tool, axes[5]) or np.linalg.norm(np.cross(from_wrist, z_tool)) > _LENGTH:
         raise InputError(where, f"{FLANGE} must lie on axis 6, its z along that axis")
@@ -201,19 +201,6 @@ def _across(v: Array, y: Array) -> Array:
     return v - (v @ y) * y
 
 
-def _wrist_centre(where: str, axes: Array, points: Array) -> Array:
-    """Return where axes 4, 5 and 6 meet."""
-    wrist, miss = _meeting(axes[3:], points[3:])
-    if miss > _LENGTH:
-        raise InputError(
-            where,
-            f"axes 4, 5 and 6 do not meet in one point, they pass it by {miss * 1e3:.3g} mm: the "
-            "wrist is not spherical, nor are axes 2, 3 and 4 parallel; opl has no closed form for "
-            "such an arm",
-        )
-    return wrist
-
-
 def _meeting(axes: Array, points: Array) -> tuple[Array, float]:
     """Return the point nearest to lines, shape (k, 3) each, and how far it is from the farthest."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
@@ -225,10 +212,6 @@ def _meeting(axes: Array, points: Array) -> tuple[Array, float]:
 
 def _parallel(one: Array, other: Array) -> bool:
     return float(np.linalg.norm(np.cross(one, other))) < _ANGLE
-
-
-def _square(one: Array, other: Array) -> bool:
-    return abs(float(one @ other)) < _ANGLE
 
 
 def _sign(value: float) -> int:

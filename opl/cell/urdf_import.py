@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from textwrap import indent
 
 import numpy as np
 
@@ -26,9 +27,9 @@ from opl.cell.xacro_file import SUFFIX, expand
 from opl.errors import InputError
 
 N_CHECKED = 500
-# Farthest that a posture found may be from the pose asked for: what rounded right angles cost.
+# Farthest that a configuration found may be from its pose: what rounded right angles cost.
 CLOSURE = 2e-5  # [m], and as much in the entries of the rotation matrix
-# Stands for a speed that the URDF does not give: slow, for programs ask for a share of it.
+# Stands for a speed that the URDF does not give: slow, for programs use a share of it.
 SLOW = np.deg2rad(10.0)
 # Height [m] and turn [rad] of the controller's own base frame, where the URDF has one.
 Controller = tuple[float, float] | None
@@ -42,7 +43,8 @@ class ImportedRobot:
     Attributes:
         robot: The robot, as a job would load it.
         files: What was written.
-        closure: Largest error of FK(IK) over random postures, in [m] and in entries of rotations.
+        closure: Largest error of FK(IK) over random configurations, in [m] and in entries of
+            rotations.
         cautions: What the user should put right in ``robot.yaml``, one line each.
     """
 
@@ -116,10 +118,10 @@ def _read(urdf: Path) -> tuple[UrdfTree, UrdfArm]:
 
 
 def closure_error(robot: Robot, n: int = N_CHECKED, seed: int = 0) -> float:
-    """Return the largest error of FK(IK) over random postures within the limits.
+    """Return the largest error of FK(IK) over random configurations within the limits.
 
-    Infinite if a posture is not found again at all, apart from full turns; next to singularities,
-    where rounded right angles move joints far, that is not asked.
+    Infinite if a configuration is not found again at all, apart from full turns; next to
+    singularities, where rounded right angles move joints far, that does not count.
     """
     q = np.random.default_rng(seed).uniform(robot.lower, robot.upper, (n, 6))
     Ts_base_flange = forward_kinematics(robot, q)
@@ -158,58 +160,61 @@ def _robot_yaml(
     found: UrdfArm, name: str, maker: str, height: float, controller: Controller, urdf: str
 ) -> str:
     """Return the text of ``robot.yaml``."""
-    origin = [f"source: {urdf}", f"certainty: {FROM_URDF}"]
-    counts = []
+    origin = f"source: {urdf}\n  certainty: {FROM_URDF}"
+    counts = ""
     if controller is not None:
-        counts = [f"controller_height_mm: {_mm(controller[0])}"]
+        counts = f"  controller_height_mm: {_mm(controller[0])}\n"
         if controller[1]:
-            counts.append(f"controller_turn_deg: {_deg(controller[1])}")
-    lines = [
-        f"# {name}, made by opl robots import-urdf from {urdf}.",
-        "# Check limits and speeds against the data sheet, and say so under source and certainty",
-        "# (high, medium, low).",
-        f"name: {name}",
-        f"title: {name}",
-        f"maker: {maker}",
-        f"urdf: {name}.urdf",
-        "",
-        "# The base frame lies on axis 1, so far above the mounting face; jobs are written in it.",
-        "base:",
-        *_indented(2, [f"height_mm: {_mm(height)}", *counts, *origin]),
-        "",
-        "arm:",
-        *_indented(2, [*_arm_lines(found.arm), *origin]),
-        "",
-        "shapes:",
-        *_indented(2, origin),
-        "",
-        "joints:",
-    ]
+            counts += f"  controller_turn_deg: {_deg(controller[1])}\n"
+    text = f"""\
+# {name}, made by opl robots import-urdf from {urdf}.
+# Check limits and speeds against the data sheet, and state it under source and certainty
+# (high, medium, low).
+name: {name}
+title: {name}
+maker: {maker}
+urdf: {name}.urdf
+
+# The base frame lies on axis 1, so far above the mounting face; jobs are written in it.
+base:
+  height_mm: {_mm(height)}
+{counts}  {origin}
+
+arm:
+{_arm_lines(found.arm)}
+  {origin}
+
+shapes:
+  {origin}
+
+joints:
+"""
+    deeper = origin.replace("\n", "\n    ")
     for k, joint in enumerate(found.joint_names):
-        speed, spoken = found.max_speed[k], origin
+        speed, speed_origin = found.max_speed[k], deeper
         if speed <= 0.0:
-            speed, spoken = SLOW, ["source: none, a slow placeholder", "certainty: low"]
-        limits = [
-            f"lower_deg: {_deg(found.lower[k])}",
-            f"upper_deg: {_deg(found.upper[k])}",
-            *origin,
-        ]
-        lines += [f"  - name: {joint}", "    limits:", *_indented(6, limits)]
-        lines += ["    speed:", *_indented(6, [f"max_deg_s: {_deg(speed)}", *spoken])]
-    return "\n".join([*lines, ""])
+            speed, speed_origin = SLOW, "source: none, a slow placeholder\n      certainty: low"
+        text += f"""\
+  - name: {joint}
+    limits:
+      lower_deg: {_deg(found.lower[k])}
+      upper_deg: {_deg(found.upper[k])}
+      {deeper}
+    speed:
+      max_deg_s: {_deg(speed)}
+      {speed_origin}
+"""
+    return text
 
 
-def _arm_lines(arm: Arm) -> list[str]:
+def _arm_lines(arm: Arm) -> str:
     keys = [field.name for field in fields(arm) if isinstance(getattr(arm, field.name), float)]
     lengths = [f"{key}_mm: {_mm(getattr(arm, key))}" for key in keys]
     offsets = ", ".join(_deg(offset) for offset in arm.offsets)
     signs = ", ".join(map(str, arm.signs))
     family = ["family: parallel axes"] if isinstance(arm, ParallelAxesArm) else []
-    return [*family, *lengths, f"offsets_deg: [{offsets}]", f"signs: [{signs}]"]
-
-
-def _indented(columns: int, lines: list[str]) -> list[str]:
-    return [" " * columns + line for line in lines]
+    lines = [*family, *lengths, f"offsets_deg: [{offsets}]", f"signs: [{signs}]"]
+    return indent("\n".join(lines), "  ")
 
 
 def _mm(length: float) -> str:

@@ -214,7 +214,7 @@ def _parent(joint: ET.Element) -> str:
 
 
 def _pose(origin: ET.Element | None) -> Array:
-    """Return the pose that an element says, shape (4, 4); that of no element is the identity."""
+    """Return the pose of an element, shape (4, 4); the identity if there is none."""
     if origin is None:
         return np.eye(4)
     xyz, rpy = (np.array(origin.get(key, _NOWHERE).split(), dtype=float) for key in ("xyz", "rpy"))

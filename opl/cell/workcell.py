@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from opl.cell.joint_limits import JointLimit
 from opl.cell.robot import Robot
-from opl.geometry.frames import Array, inverse, pose
+from opl.geometry.frames import Array, inverse, pose, read_only
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Body, Cylinder
 from opl.geometry.wheel import ContactWheel
@@ -20,13 +19,16 @@ PART = "part"
 # differ by 0.08 mm at the rim of the wheel, and it is held to rounding the edges of a link
 SECOND_OPINION = 1e-4
 SECOND_OPINION_OF_A_LINK = 1e-3
+# [rad] configurations are rounded to what a program can express before they are proven; pulses and
+# digits are finer than this, for each joint in the sum
+ROUNDING = np.deg2rad(0.01)
 
 PairOfNames = frozenset[str]
 
 
 @dataclass(frozen=True)
 class PairRules:
-    """What is said of single pairs, by the names of links and bodies.
+    """Rules for single pairs, by the names of links and bodies.
 
     Attributes:
         allowed: Pairs that may touch; they are not looked at.
@@ -37,19 +39,47 @@ class PairRules:
     required: Mapping[PairOfNames, float] = field(default_factory=dict)
 
     def between(self, first: str, second: str, otherwise: float) -> float | None:
-        """Return how far two bodies must stay apart in [m], None if they may touch.
+        """Return how far two named bodies must stay apart in [m], None if they may touch.
 
-        Args:
-            first: Name of one.
-            second: Name of the other.
-            otherwise: The distance if nothing is said of this pair, in [m].
+        Without a rule for this pair it is the distance ``otherwise`` in [m].
         """
         pair = frozenset((first, second))
         return None if pair in self.allowed else self.required.get(pair, otherwise)
 
     def widened(self, by: float) -> PairRules:
-        """Return rules that ask for so much more distance in [m]."""
+        """Return rules that require so much more distance in [m]."""
         return replace(self, required={pair: far + by for pair, far in self.required.items()})
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimit:
+    """A range that a joint, or a weighted sum of joints, must stay in, beside the robot's own.
+
+    The robot keeps its own ranges, because its controller distinguishes full turns by them. The
+    hose along the forearm, though, does not care which of two axes winds it up: R + T together may
+    turn only so far. Such a limit is linear in the joints, so where both ends of a linear joint
+    move keep it, the whole move does. The planner uses these; the replay computes its own sums.
+
+    Attributes:
+        name: What messages call it, such as ``R`` or ``R+T``.
+        coefficients: Weight of each joint, shape (6,).
+        lower: Smallest sum in [rad].
+        upper: Largest sum in [rad].
+    """
+
+    name: str
+    coefficients: Array
+    lower: float
+    upper: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coefficients", read_only(self.coefficients))
+
+    def holds(self, q: Array) -> np.ndarray:
+        """Return which ``q``, shape (..., 6) in [rad], keep it; none with NaN; shape (...)."""
+        total = q @ self.coefficients
+        margin = ROUNDING * np.abs(self.coefficients).sum()
+        return np.asarray((total >= self.lower + margin) & (total <= self.upper - margin))
 
 
 @dataclass(frozen=True)
@@ -63,7 +93,7 @@ class WorkCell:
         part: The held part, in the workpiece frame.
         fixture: Bodies between flange and part, given in the flange frame.
         T_flange_workpiece: How the fixture holds the part, shape (4, 4).
-        contact_allowance: How deep the part may sink into the belt in [m].
+        max_belt_penetration: How deep the part may sink into the belt in [m].
         required_clearance: Distance to keep from everything else in [m].
         pairs: The pairs that keep another distance, or none.
         limits: Limits of joints and sums of joints beside the robot's own.
@@ -75,44 +105,41 @@ class WorkCell:
     part: TriangleMesh
     fixture: tuple[Body, ...]
     T_flange_workpiece: Array
-    contact_allowance: float
+    max_belt_penetration: float
     required_clearance: float
     pairs: PairRules = field(default_factory=PairRules)
     limits: tuple[JointLimit, ...] = ()
 
     @property
-    def planned_allowance(self) -> float:
+    def planned_penetration(self) -> float:
         """How deep the planner lets the part sink into the belt in [m].
 
-        Less than the contact allowance, so that the second opinion, whose distances differ by up to
+        Less than the largest one, so that the second opinion, whose distances differ by up to
         `SECOND_OPINION`, agrees.
         """
-        return max(self.contact_allowance - SECOND_OPINION, self.contact_allowance / 2.0)
+        return max(self.max_belt_penetration - SECOND_OPINION, self.max_belt_penetration / 2.0)
 
     @property
     def part_from_wheel(self) -> float:
         """Distance that the part keeps from the wheel on free moves in [m]."""
         needed = self.pairs.between(PART, WHEEL, self.required_clearance)
-        assert needed is not None, "the belt has its own allowance"
+        assert needed is not None, "part and wheel may touch"
         return needed
 
     def widened(self, by: float) -> WorkCell:
         """Return a cell in which everything must stay so much farther apart, in [m]."""
-        return replace(
-            self,
-            required_clearance=self.required_clearance + by,
-            pairs=self.pairs.widened(by),
-        )
+        clearance = self.required_clearance + by
+        return replace(self, required_clearance=clearance, pairs=self.pairs.widened(by))
 
     def within_limits(self, q: Array) -> np.ndarray:
-        """Return which postures, shape (..., 6) in [rad], keep every limit, shape (...)."""
+        """Return which configurations, shape (..., 6) in [rad], keep every limit, shape (...)."""
         kept = ((q >= self.robot.lower) & (q <= self.robot.upper)).all(axis=-1)
         for limit in self.limits:
             kept &= limit.holds(q)
         return np.asarray(kept)
 
     def broken_limits(self, q: Array) -> list[str]:
-        """Return the names of the limits that any of the postures, shape (..., 6), breaks."""
+        """Return the names of the limits that any of the configurations, shape (..., 6), breaks."""
         q = q.reshape(-1, 6)
         beyond = ((q < self.robot.lower) | (q > self.robot.upper)).any(axis=0)
         names = [self.robot.joint_names[joint] for joint in np.flatnonzero(beyond)]
@@ -120,14 +147,10 @@ class WorkCell:
         return list(dict.fromkeys(names))
 
     def Ts_base_flange(self, t: Array | float, Ts_workpiece_cutter: Array) -> Array:
-        """Return the flange poses that bring cutter points onto contact positions.
+        """Return the flange poses that bring cutter points onto contact positions, shape (...).
 
         Cutter and contact coincide, so the neighbouring names cancel (equations 2 and 3 of the
         paper, in column-vector order).
-
-        Args:
-            t: Contact positions, shape (...).
-            Ts_workpiece_cutter: Cutter frames, shape (..., 4, 4).
         """
         Ts_base_contact = self.wheel.T_base_contact(t)
         return Ts_base_contact @ inverse(Ts_workpiece_cutter) @ inverse(self.T_flange_workpiece)

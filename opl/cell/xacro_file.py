@@ -17,7 +17,7 @@ def expand(path: Path) -> str:
 
     Raises:
         InputError: If the extra is missing, or xacro refuses the file; names the file to blame,
-            which may be an included one, and the line where that can be told.
+            which may be an included one, and the line where that can be found.
     """
     by_hand = _BY_HAND.format(name=path.name)
     try:
@@ -30,15 +30,15 @@ def expand(path: Path) -> str:
     except ExpatError as error:
         raise InputError(_blamed(xacro.filestack, path), f"is not XML: {error}") from error
     except Exception as error:  # whatever the expressions in the file raise
-        told = " ".join(str(error).split())
+        reason = " ".join(str(error).split())
         blamed = _blamed(xacro.filestack, path)
-        line = _line_of(Path(blamed), told)
+        line = _line_of(Path(blamed), reason)
         place = "" if line is None else f"line {line}: "
-        if "ament_index" in told:
-            told = f"$(find ...) asks for a ROS package, and there is no ROS here; {by_hand}"
-        elif told.startswith("Undefined substitution argument"):
-            told = f"{told}: give it a default, {by_hand}"
-        raise InputError(blamed, f"xacro refuses it: {place}{told}") from error
+        if "ament_index" in reason:
+            reason = f"$(find ...) needs a ROS package, and there is no ROS here; {by_hand}"
+        elif reason.startswith("Undefined substitution argument"):
+            reason = f"{reason}: give it a default, {by_hand}"
+        raise InputError(blamed, f"xacro refuses it: {place}{reason}") from error
 
 
 def _blamed(files: list[str] | None, path: Path) -> str:
@@ -46,8 +46,8 @@ def _blamed(files: list[str] | None, path: Path) -> str:
     return str(path) if not files or files[-1] is None else str(files[-1])
 
 
-def _line_of(path: Path, told: str) -> int | None:
-    """Return the line that an error speaks of: xacro says what it stumbled over, but not where."""
+def _line_of(path: Path, reason: str) -> int | None:
+    """Return the line that an error is about: xacro names what failed, but not where."""
     clues = [
         (r"evaluating expression '(.*)'$", r"\$\{{\s*{}\s*\}}"),
         (r"unknown macro name: (\S+)", r"<{}[\s/>]"),
@@ -57,7 +57,7 @@ def _line_of(path: Path, told: str) -> int | None:
     ]
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     for clue, pattern in clues:
-        found = re.search(clue, told)
+        found = re.search(clue, reason)
         if found is None:
             continue
         wanted = pattern.format(*map(re.escape, found.groups())) if found.groups() else pattern

@@ -2,37 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import os
-import shutil
 import sys
 from pathlib import Path
 from typing import Any
 
 import click
 
-from opl import __version__
-from opl import batch as batch_jobs
-from opl.cli.cell import cell
-from opl.cli.programs import show, templates
+import opl
+from opl.cli.inputs import FILE, cell, faces, points
+from opl.cli.programs import show, templates, verify
+from opl.cli.progress import progress_bar
 from opl.cli.robots import robots
-from opl.cli.surfaces import faces, points
-from opl.cli.verify import verify
-from opl.console.run import progress_bar, show_batch, show_check, show_outcome
-from opl.deliver import check_folder, deliver
-from opl.errors import InputError, NoPathError, OplError, UnsafeError
-from opl.job.cell import CellFile
-from opl.job.file import JobFile
-from opl.job.load import load
-from opl.job.search import Method
-from opl.outcome import Outcome
-from opl.pipeline import run
-from opl.resources import folder as resource
-from opl.result import reasons, render
-from opl.surfacing import cut_surface
+from opl.cli.run_text import show_batch, show_run
 
-# what cannot be read is told in one voice, by those who read it
-ANY = click.Path(path_type=Path, readable=False)
+METHODS = ("recursive", "optimal")
 
 
 class _Group(click.Group):
@@ -41,13 +25,13 @@ class _Group(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
-        except OplError as error:
+        except opl.OplError as error:
             click.echo("error: " + str(error).replace("\n", "\n  "), err=True)
             sys.exit(error.exit_status)
 
 
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="opl")
+@click.version_option(opl.__version__, prog_name="opl")
 def main() -> None:
     """Offline programming for robotic belt grinding.
 
@@ -59,11 +43,11 @@ def main() -> None:
 
 
 @main.command("run")
-@click.argument("job", type=ANY)
-@click.option("--out", type=ANY, help="Folder for the files; default ./out/<job name>.")
+@click.argument("job", type=FILE)
+@click.option("--out", type=FILE, help="Folder for the files; default ./out/<job name>.")
 @click.option(
     "--method",
-    type=click.Choice([method.value for method in Method]),
+    type=click.Choice(METHODS),
     help="Search; default as in the job.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
@@ -76,56 +60,48 @@ def run_job(
 
     Example: opl run workpieces/v_shape/job.yaml --out programs
     """
-    loaded = load(job, method)
+    loaded = opl.load_job(job, method=method)
     folder = out or Path("out") / loaded.name
-    check_folder(folder)
+    opl.check_folder(folder)
     with progress_bar(quiet or as_json) as watch:
-        outcome = run(loaded, watch)
-    written = deliver(outcome, folder)
+        run = opl.run_job(loaded, watch)
+    written = opl.deliver(run, folder)
+    report = opl.make_report(run)
     if as_json:
-        click.echo(render(outcome), nl=False)
+        click.echo(opl.to_json(report))
     elif not quiet:
-        show_outcome(outcome, written, verbose)
-    if outcome.status != "ok":
-        raise _refusal(outcome)
-
-
-def _refusal(outcome: Outcome) -> OplError:
-    """Return the error that a run without a program ends with."""
-    if outcome.refusal is not None:
-        refusal = outcome.refusal
-        return NoPathError(refusal.message, [*refusal.reasons, *outcome.remedies])
-    lines = ["planned, but not proven safe; no program was written", *reasons(outcome)]
-    return UnsafeError("\n".join(lines))
+        show_run(report, loaded, written, verbose)
+    if isinstance(run, opl.Refused):
+        raise run.error
 
 
 @main.command()
-@click.argument("job", type=ANY)
+@click.argument("job", type=FILE)
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def check(job: Path, as_json: bool) -> None:
     """Validate a job and print what would be done, without planning.
 
     Example: opl check workpieces/v_shape/job.yaml
     """
-    loaded = load(job)
-    surfacing = cut_surface(loaded)
+    loaded = opl.load_job(job)
+    surfaced = opl.cut_surface(loaded)
     if as_json:
         figures = {
             "job": loaded.name,
             "robot": loaded.cell.robot.name,
-            "cutter_points": len(surfacing.points),
-            "passes": surfacing.points.n_passes,
+            "cutter_points": len(surfaced.points),
+            "passes": surfaced.points.n_passes,
             "contact_positions": loaded.search.n_contact_positions,
-            "warnings": [str(finding) for finding in surfacing.warnings],
+            "warnings": [str(finding) for finding in surfaced.warnings],
         }
-        click.echo(json.dumps(figures, indent=2))
-    else:
-        show_check(loaded, surfacing)
+        click.echo(opl.to_json(figures))
+        return
+    click.echo("\n".join([f"{job} is a valid job", *opl.describe_job(surfaced)]))
 
 
 @main.command()
-@click.argument("paths", type=ANY, nargs=-1, required=True)
-@click.option("--out", type=ANY, default=Path("out"), help="Folder for the jobs' folders.")
+@click.argument("paths", type=FILE, nargs=-1, required=True)
+@click.option("--out", type=FILE, default=Path("out"), help="Folder for the jobs' folders.")
 @click.option("--workers", type=click.IntRange(min=1), help="Processes; default one per core.")
 @click.option("-q", "--quiet", is_flag=True, help="Print the last table only.")
 @click.option("--json", "as_json", is_flag=True, help="Print the results as JSON.")
@@ -138,58 +114,45 @@ def batch(
 
     Example: opl batch workpieces --out programs --workers 2
     """
-    jobs = batch_jobs.find_jobs(paths)
-    check_folder(out)
+    jobs = opl.find_jobs(paths)
+    opl.check_folder(out)
     count = min(workers or os.cpu_count() or 1, len(jobs))
 
-    def done(row: batch_jobs.Row) -> None:
+    def done(row: opl.BatchRow) -> None:
         if not (quiet or as_json):
             click.echo(f"{row.status}: {row.job}", err=True)
 
-    rows = batch_jobs.run_batch(jobs, out, count, done)
+    rows = opl.run_batch(jobs, out, count, done)
     if as_json:
-        told = [
-            {
-                "job": str(row.job),
-                "status": row.status,
-                "exit_status": row.exit_status,
-                "folder": None if row.folder is None else str(row.folder),
-                "message": row.message,
-                "result": row.result,
-            }
-            for row in rows
-        ]
-        click.echo(json.dumps(told, indent=2))
+        click.echo(opl.to_json(rows))
     else:
         show_batch(rows)
     sys.exit(max(row.exit_status for row in rows))
 
 
 @main.command()
-@click.argument("directory", type=ANY)
+@click.argument("directory", type=FILE)
 def init(directory: Path) -> None:
     """Start a job: copy the V-shaped example to a new folder, to be changed.
 
     Example: opl init my_part
     """
-    if directory.exists():
-        raise InputError(str(directory), "exists already; name a new folder")
-    check_folder(directory)
-    shutil.copytree(
-        resource("workpieces") / "v_shape", directory, ignore=shutil.ignore_patterns("__pycache__")
-    )
-    job = directory / "job.yaml"
+    job = opl.start_job(directory)
     click.echo(f"wrote {job} and the files it names; next: opl check {job}")
 
 
 @main.command()
 @click.option("--cell", "of_cells", is_flag=True, help="Of cell files instead.")
-def schema(of_cells: bool) -> None:
+@click.option("--markdown", is_flag=True, help="Print a page of all keys of both instead.")
+def schema(of_cells: bool, markdown: bool) -> None:
     """Print the JSON schema of job files, for editors that check YAML while one types.
 
     Example: opl schema > job.schema.json
     """
-    click.echo(json.dumps((CellFile if of_cells else JobFile).model_json_schema(), indent=2))
+    if markdown:
+        click.echo(opl.keys_page(), nl=False)
+    else:
+        click.echo(opl.to_json(opl.json_schema("cell" if of_cells else "job")))
 
 
 for _command in (cell, robots, show, templates, faces, points, verify):

@@ -1,4 +1,4 @@
-"""Commands around programs: show and compare them, templates."""
+"""Commands around programs: show, compare and prove them, templates."""
 
 from __future__ import annotations
 
@@ -7,55 +7,63 @@ from pathlib import Path
 
 import click
 
-from opl.cell.robot import load_robot
-from opl.program.inform import InformJob
-from opl.program.inform.compare import differences_in_meaning
-from opl.program.inform.files import load_jobs
-from opl.program.inform.summary import describe
-from opl.program.posts import find_post, known_posts
-from opl.program.ratios import with_ratios
+import opl
+from opl.cli.inputs import FILE
+from opl.cli.run_text import show_proof
 
-FILE = click.Path(dir_okay=False, path_type=Path)
+EXISTING = click.Path(dir_okay=False, path_type=Path)
 
 
 @click.command()
-@click.argument("program", type=FILE)
-@click.option("--diff", "other", type=FILE, help="Compare with this program by meaning.")
+@click.argument("program", type=EXISTING)
+@click.option("--diff", "other", type=EXISTING, help="Compare with this program by meaning.")
 @click.option("--robot", default="mh24", show_default=True, help="Whose program it is.")
-@click.option("--pulses", type=FILE, help="Pulse ratios of the robot's own controller.")
+@click.option("--pulses", type=EXISTING, help="Pulse ratios of the robot's own controller.")
 def show(program: Path, other: Path | None, robot: str, pulses: Path | None) -> None:
-    """Show a Yaskawa job in words: positions as angles and poses, moves, speeds, signals.
+    """Show a program in words: positions as angles and poses, moves, speeds, signals.
+
+    The suffix of the file names its language: .JBI, .mod, .src, .LS or .script.
 
     With --diff, ends with status 0 if both programs do the same, with 1 if not.
 
     Example: opl show programs/V_SHAPE.JBI --diff programs/V_SHAPE_OLD.JBI
     """
-    jobs = load_jobs(program)
     if other is not None:
-        lines = _differences(jobs, load_jobs(other))
+        lines = opl.compare_programs(program, other)
         click.echo("\n".join(lines) or "both do the same")
         sys.exit(1 if lines else 0)
-    owner = load_robot(robot)
+    owner = opl.load_robot(robot)
     if pulses is not None:
-        owner = with_ratios(owner, pulses)
-    unsure = ", ".join(owner.unverified_pulses)
-    click.echo(
-        f"read as a program of {owner.title}"
-        + (f", whose pulse ratios of {unsure} are not verified" if unsure else "")
-    )
-    for job in jobs:
-        click.echo("\n".join(describe(job, owner)))
+        owner = opl.with_ratios(owner, pulses)
+    click.echo("\n".join(opl.describe_program(program, owner)))
 
 
-def _differences(first: tuple[InformJob, ...], second: tuple[InformJob, ...]) -> list[str]:
-    lines = [
-        line
-        for one, two in zip(first, second, strict=False)
-        for line in differences_in_meaning(one, two)
-    ]
-    if len(first) != len(second):
-        lines.append(f"{len(first)} jobs against {len(second)}")
-    return lines
+@click.command()
+@click.argument("job", type=FILE)
+@click.argument("programs", type=FILE, nargs=-1, required=True, metavar="PROGRAM...")
+@click.option("--json", "as_json", is_flag=True, help="Print what was proven as JSON.")
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+def verify(job: Path, programs: tuple[Path, ...], as_json: bool, quiet: bool) -> None:
+    """Read a program back and prove it against the cell of a job.
+
+    It may be of any controller that opl reads: INFORM, RAPID, KRL, FANUC TP or UR script. Nothing
+    is known of how it was planned: its positions are turned back into joint angles, the moves made
+    as the controller makes them, and what is ground is recognised from where the part is. Give the
+    master and all parts of a program that is split. Beside the result.json of its run, a program
+    must be what was written then to the last byte.
+
+    Ends with status 0 if the program is proven, with 4 and the reasons if not.
+
+    Example: opl verify workpieces/v_shape/job.yaml out/V_SHAPE/V_SHAPE.JBI
+    """
+    loaded = opl.load_job(job)
+    proof = opl.prove_program(loaded, programs)
+    if as_json:
+        click.echo(opl.to_json(proof.report))
+    elif not quiet:
+        show_proof(proof.report, loaded.cell.robot.title)
+    if not proof.proven:
+        raise opl.UnsafeError("\n".join(["not proven", *map(str, proof.findings)]))
 
 
 @click.group()
@@ -70,8 +78,8 @@ def template_vars(controller: str | None) -> None:
 
     Example: opl templates vars DX200
     """
-    for name in known_posts() if controller is None else [controller]:
-        post = find_post(name, "controller")
+    for name in opl.known_posts() if controller is None else [controller]:
+        post = opl.find_post(name)
         click.echo(f"{name}: {post.title}, layout {post.template}")
         width = max(len(variable) for variable in post.variables)
         for variable, meaning in post.variables.items():

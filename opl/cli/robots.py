@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import click
 
-from opl.cell.robot import Robot, known_robots, load_robot, robot_path
-from opl.cell.robot_file import read_robot_file
-from opl.cell.urdf_import import import_urdf
-from opl.console.robots import show_robot, show_robots
-from opl.errors import InputError
-from opl.program.parameters import read_parameters
-from opl.program.ratios import mismatches, ratio_file
-from opl.report.arm_view import arm_view
+import opl
+from opl.cli.robot_text import show_robot, show_robots
 
 FILE = click.Path(dir_okay=False, path_type=Path)
 FOLDER = click.Path(file_okay=False, path_type=Path)
@@ -31,14 +24,14 @@ def robots(context: click.Context, as_json: bool) -> None:
     """
     if context.invoked_subcommand is not None:
         return
-    known = [load_robot(name) for name in known_robots()]
+    known = [opl.load_robot(name) for name in opl.known_robots()]
     if as_json:
-        click.echo(json.dumps([_figures(robot) for robot in known], indent=2))
+        click.echo(opl.to_json([_figures(robot) for robot in known]))
     else:
         show_robots(known)
 
 
-def _figures(robot: Robot) -> dict[str, Any]:
+def _figures(robot: opl.Robot) -> dict[str, Any]:
     return {
         "name": robot.name,
         "title": robot.title,
@@ -62,15 +55,12 @@ def show_data(name: str, as_json: bool, picture: Path | None) -> None:
 
     Example: opl robots show gp25 --picture gp25.svg
     """
-    robot, file = load_robot(name), read_robot_file(robot_path(name))
+    robot, file = opl.load_robot(name), opl.read_robot_file(opl.robot_path(name))
     if picture is not None:
-        try:
-            picture.write_text(arm_view(robot), encoding="utf-8", newline="\n")
-        except OSError as error:
-            raise InputError(str(picture), f"cannot be written: {error.strerror}") from error
+        opl.write_file(picture, opl.arm_view(robot))
     if as_json:
-        told = {**_figures(robot), **file.model_dump(exclude={"name", "title", "maker"})}
-        click.echo(json.dumps(told, indent=2))
+        figures = {**_figures(robot), **file.model_dump(exclude={"name", "title", "maker"})}
+        click.echo(opl.to_json(figures))
     else:
         show_robot(robot, file)
         if picture is not None:
@@ -94,16 +84,17 @@ def import_description(file: Path, name: str, out: Path, maker: str, base: str) 
 
     The arm has a spherical wrist, or three parallel axes in the middle as those of Universal
     Robots. The closed form of its inverse kinematics is read off the joint axes and checked on
-    random postures. Meshes are copied. A frame base in the URDF is taken for the controller's own.
+    random configurations. Meshes are copied. A frame base in the URDF is taken for the controller's
+    own.
 
     Example: opl robots import-urdf my_arm.urdf --name my_arm --out robots/my_arm
     """
-    made = import_urdf(file, name, out, base_at_floor=base == "floor", maker=maker)
+    made = opl.import_urdf(file, name, out, base_at_floor=base == "floor", maker=maker)
     click.echo(
-        f"{made.robot.name}: arm with {read_robot_file(made.files[0]).arm.family}, "
+        f"{made.robot.name}: arm with {opl.read_robot_file(made.files[0]).arm.family}, "
         f"reach {made.robot.reach * 1e3:.0f} mm"
     )
-    click.echo(f"FK(IK) closes within {made.closure:.1g} on random postures")
+    click.echo(f"FK(IK) closes within {made.closure:.1g} on random configurations")
     for line in made.cautions:
         click.echo(f"caution: {line}", err=True)
     for path in made.files:
@@ -121,19 +112,10 @@ def import_params(file: Path, robot: str, out: Path | None) -> None:
 
     Example: opl robots import-params RC.PRM --robot mh24 --out pulses.yaml
     """
-    owner = load_robot(robot)
-    try:
-        text = file.read_text(encoding="latin-1")
-    except OSError as error:
-        raise InputError(str(file), f"cannot be read: {error.strerror}") from error
-    parameters = read_parameters(text, str(file))
-    path = out or Path(f"{owner.name}_pulses.yaml")
-    try:
-        path.write_text(ratio_file(owner, parameters, file.name), encoding="utf-8")
-    except OSError as error:
-        raise InputError(str(path), f"cannot be written: {error.strerror}") from error
-    for name, ratio in zip(owner.joint_names, parameters.pulses_per_degree, strict=True):
+    owner = opl.load_robot(robot)
+    made = opl.import_pulse_ratios(file, owner, out or Path(f"{owner.name}_pulses.yaml"))
+    for name, ratio in made.pulses_per_degree.items():
         click.echo(f"{name} {ratio:.2f} pulses per degree")
-    for line in mismatches(owner, parameters):
+    for line in made.cautions:
         click.echo(f"caution: {line}", err=True)
-    click.echo(f"wrote {path}; name it in the job as program.pulse_ratios")
+    click.echo(f"wrote {made.file}; name it in the job as {opl.keys.PROGRAM_PULSE_RATIOS}")

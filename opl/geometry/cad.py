@@ -7,17 +7,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Curve2d, BRepAdaptor_Surface
+from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
+from OCP.BRepGProp import BRepGProp
+from OCP.BRepTools import BRepTools_WireExplorer
+from OCP.Geom import Geom_BSplineSurface
+from OCP.GeomConvert import GeomConvert
+from OCP.GProp import GProp_GProps
+from OCP.IFSelect import IFSelect_ReturnStatus
+from OCP.IGESControl import IGESControl_Reader
+from OCP.Message import Message
+from OCP.STEPControl import STEPControl_Reader
+from OCP.TopAbs import TopAbs_Orientation, TopAbs_ShapeEnum
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopoDS import TopoDS
 
 from opl.errors import InputError
 from opl.geometry.frames import Array
 from opl.geometry.nurbs import NurbsSurface
 from opl.geometry.patchwork import Face
-from opl.geometry.trim import Trim
+from opl.geometry.trim import Trim, polygon_area
 
 # OpenCASCADE reads every file into millimetres, whatever unit its header states
 _MM = 1e-3
@@ -32,65 +46,29 @@ _SIDE = 1e-6
 # a face with less area is none [mm^2]
 _LEAST_AREA = 1e-6
 
-_TYPES = (
-    "plane",
-    "cylinder",
-    "cone",
-    "sphere",
-    "torus",
-    "bezier",
-    "b-spline",
-    "revolution",
-    "extrusion",
-    "offset",
-    "other",
-)
+# in the order of GeomAbs_SurfaceType
+_TYPES = ("plane", "cylinder", "cone", "sphere", "torus", "bezier", "b-spline",
+          "revolution", "extrusion", "offset", "other")  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class CadFace:
-    """A face of a CAD file.
-
-    Attributes:
-        type: What kind of surface it is in the file, e.g. ``plane`` or ``b-spline``.
-        face: Its NURBS surface and what its borders leave of it, in the file's frame. The outside
-            is where the file has it: of a face that bounds a solid, away from that.
-    """
-
-    type: str
-    face: Face
-
-
-def load_cad_faces(path: Path) -> tuple[CadFace, ...]:
+def load_cad_faces(path: Path) -> tuple[Face, ...]:
     """Read the faces of a STEP or IGES file, in the order of the file.
 
+    The outside is where the file has it: of a face that bounds a solid, away from that.
+
     Raises:
-        InputError: If the extra is not installed, or the file cannot be read, has no faces, or has
-            a face without area.
+        InputError: If the file cannot be read, has no faces, or has a face without area.
     """
-    try:
-        from OCP.TopAbs import TopAbs_ShapeEnum
-        from OCP.TopExp import TopExp_Explorer
-        from OCP.TopoDS import TopoDS
-    except ImportError as error:
-        raise InputError(
-            str(path), "needs the optional extra for STEP and IGES: pip install 'opl[cad]'"
-        ) from error
-    shape = _read(path)
-    explorer = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
-    faces: list[CadFace] = []
-    while explorer.More():
-        raw = TopoDS.Face_s(explorer.Current())
-        faces.append(_converted(path, raw, len(faces) + 1))
-        explorer.Next()
+    faces = tuple(
+        _converted(path, TopoDS.Face_s(raw), number)
+        for number, raw in enumerate(_all(_read(path), "FACE"), start=1)
+    )
     if not faces:
         raise InputError(str(path), "holds no faces")
-    return tuple(faces)
+    return faces
 
 
 def _all(shape: Any, kind: str) -> Iterator[Any]:
-    from OCP.TopAbs import TopAbs_ShapeEnum
-    from OCP.TopExp import TopExp_Explorer
 
     explorer = TopExp_Explorer(shape, getattr(TopAbs_ShapeEnum, f"TopAbs_{kind}"))
     while explorer.More():
@@ -99,10 +77,6 @@ def _all(shape: Any, kind: str) -> Iterator[Any]:
 
 
 def _read(path: Path) -> Any:
-    from OCP.IFSelect import IFSelect_ReturnStatus
-    from OCP.IGESControl import IGESControl_Reader
-    from OCP.Message import Message
-    from OCP.STEPControl import STEPControl_Reader
 
     try:
         content = path.read_bytes().rstrip()
@@ -110,42 +84,28 @@ def _read(path: Path) -> Any:
         raise InputError(str(path), f"cannot be read: {error.strerror}") from error
     if not content:
         raise InputError(str(path), "is empty")
-    # OpenCASCADE tells its troubles on standard output
+    # OpenCASCADE prints its troubles to standard output
     printers = Message.DefaultMessenger_s().ChangePrinters()
     printers.Clear()
     is_step = path.suffix.lower() in (".step", ".stp")
     reader = STEPControl_Reader() if is_step else IGESControl_Reader()
     what = "STEP" if is_step else "IGES"
-    # the last record of an IGES file says T in column 73; a file cut short is read without a word
+    # the last record of an IGES file has a T in column 73; OpenCASCADE reads what is cut short
     if not is_step and content.splitlines()[-1][72:73] != b"T":
         raise InputError(str(path), "is not a whole IGES file")
     try:
-        if reader.ReadFile(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
-            raise InputError(str(path), f"is not a whole {what} file")
-        if reader.TransferRoots() == 0:
-            raise InputError(
-                str(path), f"holds no shape that can be read; is the {what} file whole?"
-            )
-        shape = reader.OneShape()
-    except InputError:
-        raise
+        done = reader.ReadFile(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone
+        shape = reader.OneShape() if done and reader.TransferRoots() else None
     except Exception as error:  # OpenCASCADE raises many kinds, all of them about the file
         raise InputError(str(path), f"is not a {what} file: {error}") from error
-    if shape.IsNull():
+    if not done:
+        raise InputError(str(path), f"is not a whole {what} file")
+    if shape is None or shape.IsNull():
         raise InputError(str(path), f"holds no shape that can be read; is the {what} file whole?")
     return shape
 
 
-def _converted(path: Path, raw: Any, number: int) -> CadFace:
-    from OCP.BRep import BRep_Tool
-    from OCP.BRepAdaptor import BRepAdaptor_Surface
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_NurbsConvert
-    from OCP.BRepGProp import BRepGProp
-    from OCP.Geom import Geom_BSplineSurface, Geom_RectangularTrimmedSurface
-    from OCP.GeomConvert import GeomConvert
-    from OCP.GProp import GProp_GProps
-    from OCP.TopAbs import TopAbs_Orientation
-    from OCP.TopoDS import TopoDS
+def _converted(path: Path, raw: Any, number: int) -> Face:
 
     outward = -1.0 if raw.Orientation() == TopAbs_Orientation.TopAbs_REVERSED else 1.0
     try:
@@ -156,43 +116,30 @@ def _converted(path: Path, raw: Any, number: int) -> CadFace:
             raise ValueError("has no area")
         converted = TopoDS.Face_s(BRepBuilderAPI_NurbsConvert(raw, True).Shape())
         geometry = BRep_Tool.Surface_s(converted)
-        if isinstance(geometry, Geom_RectangularTrimmedSurface):
-            geometry = GeomConvert.SurfaceToBSplineSurface_s(geometry)
         if not isinstance(geometry, Geom_BSplineSurface):
             geometry = GeomConvert.SurfaceToBSplineSurface_s(geometry)
         placed = geometry.Transformed(converted.Location().Transformation())
         loops = tuple(_loops(converted))
         surface, trim = _surface(placed, loops)
-        face = Face(surface, outward, trim)
+        return Face(surface, outward, trim, _TYPES[kind] if kind < len(_TYPES) else "other")
     except Exception as error:
         # OpenCASCADE raises many kinds, which have nothing in common but where they come from
         if not isinstance(error, ValueError) and not type(error).__module__.startswith("OCP"):
             raise
         raise InputError(str(path), f"face {number}: {error}") from error
-    name = _TYPES[kind] if kind < len(_TYPES) else "other"
-    return CadFace(name, face)
 
 
 def _surface(spline: Any, loops: tuple[Array, ...]) -> tuple[NurbsSurface, Trim | None]:
     """Return the part of a B-spline surface that its loops span, and the trim if there is one."""
-    from OCP.Geom import Geom_BSplineSurface
-
     if not loops:
         raise ValueError("has no border that can be read")
     corners = np.concatenate(loops)
     low, high = corners.min(axis=0), corners.max(axis=0)
-    spline = (
-        Geom_BSplineSurface.DownCast_s(spline.Copy())
-        if hasattr(Geom_BSplineSurface, "DownCast_s")
-        else spline.Copy()
-    )
+    spline = spline.Copy()
     bounds = np.array(spline.Bounds()).reshape(2, 2)  # (u0, u1), (v0, v1)
     for axis, periodic in enumerate((spline.IsUPeriodic(), spline.IsVPeriodic())):
         if not periodic:
-            low[axis], high[axis] = (
-                max(low[axis], bounds[axis, 0]),
-                min(high[axis], bounds[axis, 1]),
-            )
+            low[axis], high[axis] = np.clip((low[axis], high[axis]), *bounds[axis])
     if (high - low <= 0.0).any():
         raise ValueError("has no area")
     if spline.IsUPeriodic():
@@ -200,17 +147,12 @@ def _surface(spline: Any, loops: tuple[Array, ...]) -> tuple[NurbsSurface, Trim 
     if spline.IsVPeriodic():
         spline.SetVNotPeriodic()
     surface = _nurbs(spline)
-    (u0, v0), (u1, v1) = surface.domain
     # loops of a periodic face may lie one period further along
-    shift = np.zeros(2)
-    for axis, (a, b) in enumerate(((u0, u1), (v0, v1))):
-        middle = 0.5 * (low[axis] + high[axis])
-        shift[axis] = (
-            (b - a) * np.round((0.5 * (a + b) - middle) / (b - a))
-            if not (a - 1e-9 <= middle <= b + 1e-9)
-            else 0.0
-        )
-    loops = tuple(loop + shift for loop in loops)
+    first, last = surface.domain
+    middle = 0.5 * (low + high)
+    periods = np.round((0.5 * (first + last) - middle) / (last - first))
+    inside = (first - 1e-9 <= middle) & (middle <= last + 1e-9)
+    loops = tuple(loop + np.where(inside, 0.0, (last - first) * periods) for loop in loops)
     if len(loops) == 1 and _is_rectangle(loops[0], surface.domain):
         return surface, None
     return surface, Trim(loops)
@@ -225,26 +167,13 @@ def _nurbs(spline: Any) -> NurbsSurface:
             net[i, j] = pole.X(), pole.Y(), pole.Z()
             weights[i, j] = spline.Weight(i + 1, j + 1)
     knots_u, knots_v = (
-        np.concatenate(
-            [
-                np.full(
-                    getattr(spline, f"{axis}Multiplicity")(k), getattr(spline, f"{axis}Knot")(k)
-                )
-                for k in range(1, getattr(spline, f"Nb{axis}Knots")() + 1)
-            ]
-        )
-        for axis in "UV"
+        np.array(list(knots)) for knots in (spline.UKnotSequence(), spline.VKnotSequence())
     )
     return NurbsSurface(spline.UDegree(), spline.VDegree(), knots_u, knots_v, _MM * net, weights)
 
 
 def _loops(face: Any) -> Iterator[Array]:
     """Yield the borders of a face as polygons in its parameters."""
-    from OCP.BRepAdaptor import BRepAdaptor_Curve2d
-    from OCP.BRepTools import BRepTools_WireExplorer
-    from OCP.TopAbs import TopAbs_Orientation
-    from OCP.TopoDS import TopoDS
-
     for wire in _all(face, "WIRE"):
         explorer = BRepTools_WireExplorer(TopoDS.Wire_s(wire), face)
         corners: list[Array] = []
@@ -257,9 +186,9 @@ def _loops(face: Any) -> Iterator[Array]:
             angles = np.unwrap(np.arctan2(chords[:, 1], chords[:, 0]))
             turn = float(np.abs(np.diff(angles)).sum())
             count = int(np.clip(np.ceil(turn / _BORDER_TURN), *_BORDER_POINTS))
-            points = coarse if turn < 1e-9 else _points(curve, np.linspace(first, last, count + 1))
-            if turn < 1e-9:
-                points = points[[0, -1]]
+            straight = turn < 1e-9
+            places = np.linspace(first, last, count + 1)
+            points = coarse[[0, -1]] if straight else _points(curve, places)
             if edge.Orientation() == TopAbs_Orientation.TopAbs_REVERSED:
                 points = points[::-1]
             corners.append(points[:-1])
@@ -279,6 +208,4 @@ def _is_rectangle(loop: Array, domain: Array) -> bool:
     """Return whether a loop runs along the sides of the domain and nowhere else."""
     span = np.ptp(domain, axis=0)
     on_side = (np.abs(loop[:, None] - domain) <= _SIDE * span).any(axis=(1, 2))
-    x, y = loop.T
-    area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
-    return bool(on_side.all()) and area >= (1.0 - 1e-5) * float(span.prod())
+    return bool(on_side.all()) and polygon_area(loop) >= (1.0 - 1e-5) * float(span.prod())

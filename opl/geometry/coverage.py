@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from opl.geometry.frames import Array
+from opl.geometry.toolpath import CutterPoints
 
 # points looked at between two cutter points of a pass are this much nearer than a pitch
 _LOOKS_PER_PITCH = 8.0
@@ -48,40 +49,31 @@ class AreaSamples:
         )
 
 
-def uncovered(
-    samples: AreaSamples, points: Array, pass_index: np.ndarray, pitch: float
-) -> NDArray[np.bool_]:
-    """Return which samples are more than half a pitch away from every pass, shape (k,).
-
-    Args:
-        samples: Of the surface.
-        points: Cutter points in [m], shape (n, 3).
-        pass_index: Pass of each, shape (n,).
-        pitch: Distance of the rows in [m].
-    """
-    looks, spacing = looks_along(points, pass_index, pitch)[0], pitch / _LOOKS_PER_PITCH
+def uncovered(samples: AreaSamples, points: CutterPoints, pitch: float) -> NDArray[np.bool_]:
+    """Return which samples are more than half a pitch [m] away from every pass, shape (k,)."""
+    looks, spacing = _looks_along(points, pitch)[0], pitch / _LOOKS_PER_PITCH
     distance, _ = cKDTree(looks).query(samples.points)
     # the nearest look may be half a spacing further along than the path itself
     return np.asarray(distance > np.hypot(0.5 * pitch * (1.0 + 1e-6), 0.5 * spacing))
 
 
 def lying_on_others(
-    points: Array, pass_index: np.ndarray, pitch: float, tolerance: float
+    cutter_points: CutterPoints, pitch: float, tolerance: float
 ) -> list[tuple[int, int]]:
     """Return the passes that run along an earlier one for at least half of their points.
 
     Args:
-        points: Cutter points in [m], shape (n, 3).
-        pass_index: Pass of each, shape (n,).
+        cutter_points: The points of all passes.
         pitch: Distance of the rows in [m].
         tolerance: Passes that are no further apart than this are one [m].
 
     Returns:
         Pairs of passes, the earlier one first.
     """
-    looks, owner = looks_along(points, pass_index, pitch)
+    looks, owner = _looks_along(cutter_points, pitch)
     reach = float(np.hypot(tolerance, 0.5 * pitch / _LOOKS_PER_PITCH))
-    own = [points[pass_index == k] for k in range(int(pass_index.max()) + 1)]
+    points, pass_index = cutter_points.Ts_workpiece_cutter[:, :3, 3], cutter_points.pass_index
+    own = [points[pass_index == k] for k in range(cutter_points.n_passes)]
     # a pass that lies on another one does so in its middle or in one of its quarters
     some = np.array([mine[[len(mine) // 4, len(mine) // 2, 3 * len(mine) // 4]] for mine in own])
     near = cKDTree(looks).query_ball_point(some.reshape(-1, 3), reach)
@@ -95,8 +87,9 @@ def lying_on_others(
     return found
 
 
-def looks_along(points: Array, pass_index: np.ndarray, pitch: float) -> tuple[Array, np.ndarray]:
+def _looks_along(cutter_points: CutterPoints, pitch: float) -> tuple[Array, np.ndarray]:
     """Return points along passes, close to each other, and the pass of each, (m, 3) and (m,)."""
+    points, pass_index = cutter_points.Ts_workpiece_cutter[:, :3, 3], cutter_points.pass_index
     one_pass = np.diff(pass_index) == 0
     starts, ends = points[:-1][one_pass], points[1:][one_pass]
     lengths = np.linalg.norm(ends - starts, axis=1)

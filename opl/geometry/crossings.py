@@ -9,7 +9,6 @@ plane, normal to an edge in that plane.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,29 +22,11 @@ _TOUCHING = 2e-6
 _BLOCK = 30_000
 
 
-@dataclass(frozen=True, eq=False)
-class _Tree:
-    """Triangles in groups that are halved from level to level.
-
-    Attributes:
-        order: The triangles, neighbours near each other; filled up with -1 to a power of two.
-        low: Least x, y, z of the groups of each level, the whole first, shapes (2^level, 3).
-        high: Largest x, y, z, likewise.
-    """
-
-    order: np.ndarray
-    low: tuple[Array, ...]
-    high: tuple[Array, ...]
-
-
 def crossing_triangles(triangles: Array) -> np.ndarray:
     """Return the pairs of triangles that cross or overlap, the smaller index first, shape (k, 2).
 
     Triangles that share a corner or an edge, or touch otherwise, do not cross; those that lie on
-    each other do. Those without area are passed over.
-
-    Args:
-        triangles: Their corners in [m], shape (n, 3, 3).
+    each other do. Those without area are passed over. Corners are in [m], shape (n, 3, 3).
     """
     size = np.ptp(triangles.reshape(-1, 3), axis=0).max() if len(triangles) else 0.0
     touching = _TOUCHING * float(size)
@@ -63,14 +44,19 @@ def crossing_triangles(triangles: Array) -> np.ndarray:
     outward = np.cross(edges, normals[:, None])
     outward /= np.linalg.norm(outward, axis=2, keepdims=True)
     found = [
-        pairs[_cross(triangles, normals, outward, pairs, touching)]
-        for pairs in _near(_tree(triangles))
+        pairs[_cross(triangles, normals, outward, pairs, touching)] for pairs in _near(triangles)
     ]
     crossing = np.sort(sound[np.concatenate([nothing, *found])], axis=1)
     return crossing[np.lexsort(crossing.T[::-1])]
 
 
-def _tree(triangles: Array) -> _Tree:
+def _tree(triangles: Array) -> tuple[np.ndarray, list[Array], list[Array]]:
+    """Return triangles in groups that are halved from level to level.
+
+    Returns:
+        The triangles, neighbours near each other, filled up with -1 to a power of two; least and
+        largest x, y, z of the groups of each level, the whole first, shapes (2^level, 3).
+    """
     low, high = triangles.min(axis=1), triangles.max(axis=1)
     n_levels = int(np.ceil(np.log2(len(triangles))))
     order = np.full(2**n_levels, -1)
@@ -81,7 +67,7 @@ def _tree(triangles: Array) -> _Tree:
     for _ in range(n_levels):
         lows.append(lows[-1].reshape(-1, 2, 3).min(axis=1))
         highs.append(highs[-1].reshape(-1, 2, 3).max(axis=1))
-    return _Tree(order, tuple(lows[::-1]), tuple(highs[::-1]))
+    return order, lows[::-1], highs[::-1]
 
 
 def _along_a_curve(points: Array) -> np.ndarray:
@@ -96,18 +82,19 @@ def _along_a_curve(points: Array) -> np.ndarray:
     return code
 
 
-def _near(tree: _Tree) -> Iterator[np.ndarray]:
+def _near(triangles: Array) -> Iterator[np.ndarray]:
     """Yield the pairs of triangles whose boxes meet, in blocks of shape (k, 2)."""
-    bottom = len(tree.low) - 1
+    order, lows, highs = _tree(triangles)
+    bottom = len(lows) - 1
     halves = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
     waiting = [(0, np.zeros((1, 2), dtype=np.int64))]
     while waiting:
         level, pairs = waiting.pop()
         if level == bottom:
-            yield tree.order[pairs]
+            yield order[pairs]
             continue
         one, other = (2 * pairs[:, None] + halves).reshape(-1, 2).T
-        low, high = tree.low[level + 1], tree.high[level + 1]
+        low, high = lows[level + 1], highs[level + 1]
         # each pair once; a triangle is no pair with itself
         kept = one < other if level + 1 == bottom else one <= other
         one, other = one[kept], other[kept]
@@ -122,15 +109,9 @@ def _near(tree: _Tree) -> Iterator[np.ndarray]:
 def _cross(
     triangles: Array, normals: Array, outward: Array, pairs: np.ndarray, touching: float
 ) -> np.ndarray:
-    """Return which pairs sink into each other, shape (k,).
+    """Return which pairs of triangles sink into each other by more than ``touching`` [m], (k,).
 
-    Args:
-        triangles: Corners in [m], shape (n, 3, 3).
-        normals: Unit normals, shape (n, 3).
-        outward: Unit directions in each plane out over its edges, the first from the first to the
-            second corner, shape (n, 3, 3).
-        pairs: Triangles, shape (k, 2).
-        touching: What is no deeper than this only touches [m].
+    ``outward`` are unit directions in each plane out over its edges, shape (n, 3, 3).
     """
     left = np.arange(len(pairs))
     flat = np.ones(len(pairs), dtype=bool)
@@ -165,4 +146,4 @@ def _depth(one: Array, other: Array, axes: Array) -> Array:
     overlap = np.minimum(a.max(axis=2) - b.min(axis=2), b.max(axis=2) - a.min(axis=2))
     # parallel edges have no axis of their own
     none = lengths <= 1e-12 * lengths.max(axis=1, initial=0.0, keepdims=True)
-    return np.where(none, np.inf, overlap / np.where(none, 1.0, lengths)).min(axis=1)
+    return np.asarray(np.where(none, np.inf, overlap / np.where(none, 1.0, lengths)).min(axis=1))

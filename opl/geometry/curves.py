@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PPoly
+from scipy.interpolate import CubicHermiteSpline, PPoly
 from scipy.spatial import cKDTree
 
 from opl.geometry.frames import Array
@@ -64,6 +64,18 @@ def curvature_jumps(before: Array, after: Array) -> NDArray[np.bool_]:
     return np.abs(after - before) > _SAME_FRACTION * larger + _SAME_CURVATURE
 
 
+def hermite_through(points: Array, tangents: Array) -> tuple[CubicHermiteSpline, Array]:
+    """Return a curve through nodes as a function of its arc length, and its turns between them.
+
+    Each piece is as long as the circular arc with its chord and its turn. Points are in [m] and
+    tangents of unit length, shape (k, 3); turns in [rad], shape (k - 1,).
+    """
+    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    turns = np.arccos(np.clip(np.sum(tangents[1:] * tangents[:-1], axis=1), -1.0, 1.0))
+    arcs = chords / np.sinc(turns / (2.0 * np.pi))
+    return CubicHermiteSpline(np.append(0.0, np.cumsum(arcs)), points, tangents), turns
+
+
 @dataclass(frozen=True, eq=False)
 class Piece:
     """A curve from one arc length to another, both in [m]."""
@@ -101,7 +113,7 @@ class ChainedCurve:
     @property
     def arc_length(self) -> Array:
         """Where its polynomials begin and end in [m], shape (k,)."""
-        return self.positions.x
+        return np.asarray(self.positions.x)
 
     @property
     def length(self) -> float:
@@ -152,7 +164,7 @@ def _along(curve: SurfaceCurve, arc_length: float) -> float:
 
 def _shifted(c: Array, by: float) -> Array:
     """Return the coefficients of a polynomial, highest power first, begun further along."""
-    shifted = c.copy()
+    shifted: Array = c.copy()
     for last in range(len(c) - 1, 0, -1):  # Horner's scheme, again and again
         for k in range(1, last + 1):
             shifted[k] += by * shifted[k - 1]
@@ -184,11 +196,7 @@ def is_closed(curve: SurfaceCurve) -> bool:
 
 
 def joined(curves: Sequence[SurfaceCurve]) -> list[SurfaceCurve]:
-    """Join curves that continue each other, and leave the others as they are.
-
-    Args:
-        curves: Directed curves, in the order in which closed chains look for their start.
-    """
+    """Join directed curves that continue each other; a closed chain begins with its first one."""
     if len(curves) < 2:
         return list(curves)
     ends = np.stack([curve.frames(np.array([0.0, curve.length])) for curve in curves])
@@ -244,4 +252,4 @@ def _continues(Ts_end: Array, Ts_start: Array) -> Array:
     """Return where poses meet with the same axis z and axis x, shape (n,)."""
     near = np.linalg.norm(Ts_end[:, :3, 3] - Ts_start[:, :3, 3], axis=1) <= MEETING
     aligned = np.sum(Ts_end[:, :3, :3] * Ts_start[:, :3, :3], axis=1) >= np.cos(TANGENT)
-    return near & aligned.all(axis=1)
+    return np.asarray(near & aligned.all(axis=1))

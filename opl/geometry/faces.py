@@ -11,13 +11,12 @@ import numpy as np
 from opl.errors import InputError
 from opl.geometry.coverage import AreaSamples
 from opl.geometry.frames import Array
-from opl.geometry.machined import CAD, MESHES, NURBS
+from opl.geometry.machined import MESHES, load_smooth_faces
 from opl.geometry.mesh import TriangleMesh, load_triangles
 from opl.geometry.mesh_surface import MeshSurface
 from opl.geometry.passes import MachinedSurface, bounding_box
-from opl.geometry.patchwork import Face, Patchwork
+from opl.geometry.patchwork import Patchwork
 from opl.geometry.regions import smooth_regions
-from opl.geometry.surface_file import load_faces
 
 # a face is sampled about this often across its longest side
 _LOOKS = 40
@@ -63,7 +62,7 @@ class FaceSummary:
 
 
 def list_faces(path: Path, unit: Literal["mm", "m"] | None, crease: float) -> list[FaceSummary]:
-    """Return what can be said of each face of a file.
+    """Return a summary of each face of a file.
 
     Args:
         path: A STEP or IGES file, a NURBS file, or a mesh.
@@ -73,28 +72,14 @@ def list_faces(path: Path, unit: Literal["mm", "m"] | None, crease: float) -> li
     Raises:
         InputError: If the file cannot be used, or the unit of a mesh is missing.
     """
-    suffix = path.suffix.lower()
-    if suffix in MESHES:
+    if path.suffix.lower() in MESHES:
         if unit is None:
-            raise InputError(str(path), "a mesh does not say its unit: give --unit mm or --unit m")
+            raise InputError(str(path), "a mesh file has no unit: give --unit mm or --unit m")
         return _mesh_faces(load_triangles(path, unit), crease)
-    if suffix in CAD:
-        from opl.geometry import cad  # the extra is only needed by those who have such files
-
-        found = cad.load_cad_faces(path)
-        typed = [(one.type, one.face) for one in found]
-    elif suffix in NURBS:
-        typed = [("nurbs", face) for face in load_faces(path)]
-    else:
-        raise InputError(str(path), f"must be one of {', '.join((*CAD, *NURBS, *MESHES))}")
     return [
-        _summary(number, name, Patchwork((face,)), _holes(face))
-        for number, (name, face) in enumerate(typed, start=1)
+        _summary(number, face.type, Patchwork((face,)), face.n_holes)
+        for number, face in enumerate(load_smooth_faces(path), start=1)
     ]
-
-
-def _holes(face: Face) -> int:
-    return 0 if face.trim is None else len(face.trim.loops) - 1
 
 
 def _mesh_faces(mesh: TriangleMesh, crease: float) -> list[FaceSummary]:
@@ -111,31 +96,21 @@ def _summary(number: int, name: str, face: MachinedSurface, holes: int | None) -
     low, high = bounding_box(face)
     samples = face.area_samples(float((high - low).max()) / _LOOKS)
     area = float(samples.areas.sum())
-    return FaceSummary(
-        number=number,
-        type=name,
-        area=area,
-        low=low,
-        high=high,
-        normal=(samples.areas[:, None] * samples.normals).sum(axis=0) / area,
-        holes=holes,
-        samples=samples,
-    )
+    normal = (samples.areas[:, None] * samples.normals).sum(axis=0) / area
+    return FaceSummary(number, name, area, low, high, normal, holes, samples)
 
 
-def preview(faces: list[FaceSummary], face: FaceSummary) -> tuple[str, list[str]]:
-    """Return where to look from to see a face best, and a picture of it among the others in text.
+def preview_face(faces: list[FaceSummary], face: FaceSummary) -> tuple[str, list[str]]:
+    """Return where to look from to see one of the faces best, and a picture of all in text.
 
-    Args:
-        faces: All faces.
-        face: The one, drawn with ``#``; the others are dots.
+    The face is drawn with ``#``, the others with dots.
     """
     view = max(VIEWS, key=lambda name: VIEWS[name][1] * float(face.normal[VIEWS[name][0]]))
     depth, sign = VIEWS[view]
     across, up = (k for k in range(3) if k != depth)
     low = np.min([one.low for one in faces], axis=0)
     high = np.max([one.high for one in faces], axis=0)
-    # the same scale both ways, a line being as high as two characters are wide
+    # the same scale across and down, a line being as high as two characters are wide
     scale = max((high[across] - low[across]) / _WIDTH, (high[up] - low[up]) / (2.0 * _HEIGHT))
     width = int(np.ceil((high[across] - low[across]) / scale + 1e-9)) + 1
     height = int(np.ceil((high[up] - low[up]) / (2.0 * scale) + 1e-9)) + 1

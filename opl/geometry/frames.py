@@ -7,10 +7,25 @@ of poses is ``Ts_a_b``. Every function takes and returns arrays of shape (..., 4
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+
+
+def read_only(values: ArrayLike, dtype: type = float) -> NDArray[Any]:
+    """Return a copy of an array that cannot be written to."""
+    copy: NDArray[Any] = np.array(values, dtype=dtype)
+    copy.setflags(write=False)
+    return copy
+
+
+def in_mm(point: Array) -> str:
+    """Return a point in [m], shape (3,), as messages give it."""
+    x, y, z = 1e3 * point + 0.0  # no negative zero
+    return f"({x:.4g}, {y:.4g}, {z:.4g}) mm"
 
 
 class NotARotationError(ValueError):
@@ -37,7 +52,7 @@ def inverse(T_a_b: Array) -> Array:
 
 def transform(T_a_b: Array, p_b: Array) -> Array:
     """Return points given in frame b, shape (..., 3), in coordinates of frame a."""
-    return np.einsum("...ij,...j->...i", T_a_b[..., :3, :3], p_b) + T_a_b[..., :3, 3]
+    return np.asarray(np.einsum("...ij,...j->...i", T_a_b[..., :3, :3], p_b) + T_a_b[..., :3, 3])
 
 
 def pose(R: Array, p: Array) -> Array:
@@ -93,18 +108,14 @@ def rotation_angle(T_a_b: Array, T_a_c: Array) -> Array:
     difference = T_a_b[..., :3, :3] - T_a_c[..., :3, :3]
     # |R_b - R_c| = 2 sqrt(2) sin(angle / 2): well conditioned where arccos of the trace is not
     chord = np.linalg.norm(difference, axis=(-2, -1)) / (2.0 * np.sqrt(2.0))
-    return 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0))
+    return np.asarray(2.0 * np.arcsin(np.clip(chord, 0.0, 1.0)))
 
 
 def interpolate(T_a_b: Array, T_a_c: Array, fraction: Array) -> Array:
     """Return the poses between two poses as the intermediate nodes of the paper take them.
 
-    Origin, axis z and axis x are interpolated linearly, then made orthonormal again.
-
-    Args:
-        T_a_b: Pose at fraction 0, shape (..., 4, 4).
-        T_a_c: Pose at fraction 1, shape (..., 4, 4).
-        fraction: Where between the two, shape (...).
+    Origin, axis z and axis x are interpolated linearly, then made orthonormal again. The fraction,
+    shape (...), is 0 at T_a_b and 1 at T_a_c.
     """
     s = np.asarray(fraction)[..., None]
     z, x, p = ((1.0 - s) * T_a_b[..., :3, k] + s * T_a_c[..., :3, k] for k in (2, 0, 3))

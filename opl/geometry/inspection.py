@@ -12,7 +12,7 @@ from opl.findings import Finding, Level
 from opl.geometry.coverage import AreaSamples, lying_on_others, uncovered
 from opl.geometry.frames import rotation_angle
 from opl.geometry.mesh_surface import MeshSurface
-from opl.geometry.passes import LaidPasses, MachinedSurface, Order, Passes, bounding_box
+from opl.geometry.passes import LaidPasses, MachinedSurface, Order, Passes, longest_side
 from opl.geometry.wheel import ContactWheel
 
 # normals that turn by more than this from one cutter point to the next jump [rad]
@@ -50,7 +50,7 @@ def inspect(
     passes: Passes,
     laid: LaidPasses,
     wheel: ContactWheel,
-    contact_allowance: float,
+    max_belt_penetration: float,
 ) -> Inspection:
     """Look for what is doubtful about cutter points.
 
@@ -59,25 +59,28 @@ def inspect(
         passes: How it was cut.
         laid: The cutter points.
         wheel: The wheel.
-        contact_allowance: How deep the part may sink into the belt in [m].
+        max_belt_penetration: How deep the part may sink into the belt in [m].
     """
     pointed = [
-        *_hollows(laid, wheel, contact_allowance),
+        *_hollows(laid, wheel, max_belt_penetration),
         *_segments(laid, passes),
         *_jumps(laid),
         *_repeated(laid, passes),
     ]
-    findings = [_warning(kind, _points(chosen), message) for kind, chosen, message in pointed]
+    findings = [
+        Finding(Level.WARNING, kind, _points(chosen), message) for kind, chosen, message in pointed
+    ]
     doubtful = np.zeros(len(laid.points), dtype=bool)
     for _, chosen, _ in pointed:
         doubtful |= chosen
-    samples = surface.area_samples(_spacing(surface, passes))
-    points, pass_index = laid.points.Ts_workpiece_cutter[:, :3, 3], laid.points.pass_index
-    missed = samples.chosen(uncovered(samples, points, pass_index, passes.pitch))
+    spacing = max(passes.pitch / _LOOKS_PER_PITCH, longest_side(surface) / _MOST_LOOKS)
+    samples = surface.area_samples(spacing)
+    missed = samples.chosen(uncovered(samples, laid.points, passes.pitch))
     fraction = float(missed.areas.sum() / samples.areas.sum())
     if fraction > UNCOVERED:
         findings.append(
-            _warning(
+            Finding(
+                Level.WARNING,
                 "coverage",
                 "the surface",
                 f"{100.0 * fraction:.1f} % of the area is more than half a pitch "
@@ -86,7 +89,8 @@ def inspect(
         )
     if isinstance(surface, MeshSurface) and surface.facet_error > passes.max_bow_height:
         findings.append(
-            _warning(
+            Finding(
+                Level.WARNING,
                 "mesh",
                 "the surface",
                 f"its triangles lie up to about {1e3 * surface.facet_error:.2g} mm off the smooth "
@@ -97,13 +101,7 @@ def inspect(
     return Inspection(tuple(findings), doubtful, missed, fraction)
 
 
-def _spacing(surface: MachinedSurface, passes: Passes) -> float:
-    """Return how far apart in [m] the area is looked at."""
-    longest = float(np.ptp(bounding_box(surface), axis=0).max())
-    return max(passes.pitch / _LOOKS_PER_PITCH, longest / _MOST_LOOKS)
-
-
-def _hollows(laid: LaidPasses, wheel: ContactWheel, allowance: float) -> Iterator[_Doubt]:
+def _hollows(laid: LaidPasses, wheel: ContactWheel, penetration: float) -> Iterator[_Doubt]:
     """Yield where the surface is too hollow for the wheel.
 
     Across the path the wheel is round: a hollow of a smaller radius takes neither its flat nor its
@@ -121,10 +119,10 @@ def _hollows(laid: LaidPasses, wheel: ContactWheel, allowance: float) -> Iterato
         )
     # how deep both edges of the flat sink in when its middle touches
     sunk = -along * wheel.width**2 / 8.0
-    bridged = (sunk > allowance) & ~tight
+    bridged = (sunk > penetration) & ~tight
     if bridged.any():
         deepest = int(np.argmax(np.where(bridged, sunk, 0.0)))
-        way = (
+        hint = (
             "only an edge of the wheel can grind there"
             if wheel.max_roll > 0.0
             else "it cannot be ground: the part may not roll about the wheel's edges (max_roll_deg)"
@@ -134,7 +132,7 @@ def _hollows(laid: LaidPasses, wheel: ContactWheel, allowance: float) -> Iterato
             bridged,
             f"radius {-1e3 / along[deepest]:.1f} mm along the path at cutter point {deepest} "
             f"against the wheel's flat of {1e3 * wheel.width:g} mm, which would cut in "
-            f"{1e3 * sunk[deepest]:.2g} mm ({1e3 * allowance:g} mm allowed): {way}",
+            f"{1e3 * sunk[deepest]:.2g} mm ({1e3 * penetration:g} mm allowed): {hint}",
         )
 
 
@@ -176,30 +174,25 @@ def _jumps(laid: LaidPasses) -> Iterator[_Doubt]:
 
 
 def _repeated(laid: LaidPasses, passes: Passes) -> Iterator[_Doubt]:
-    """Yield passes that lie on another one though the job asks for none twice."""
+    """Yield passes that lie on another one though the job grinds none twice."""
     if passes.order is Order.BOTH or passes.repeats > 1:
         return
-    points, pass_index = laid.points.Ts_workpiece_cutter[:, :3, 3], laid.points.pass_index
-    pairs = lying_on_others(points, pass_index, passes.pitch, passes.max_bow_height)
+    pairs = lying_on_others(laid.points, passes.pitch, passes.max_bow_height)
     if pairs:
-        told = [f"pass {again + 1} lies on pass {first + 1}" for first, again in pairs[:4]]
-        told += [f"{len(pairs) - 4} more"] if len(pairs) > 4 else []
+        listed = [f"pass {again + 1} lies on pass {first + 1}" for first, again in pairs[:4]]
+        listed += [f"{len(pairs) - 4} more"] if len(pairs) > 4 else []
         yield (
             "duplicate",
-            np.isin(pass_index, [again for _, again in pairs]),
-            f"{', '.join(told)}: do faces of the surface lie on each other?",
+            np.isin(laid.points.pass_index, [again for _, again in pairs]),
+            f"{', '.join(listed)}: do faces of the surface lie on each other?",
         )
-
-
-def _warning(kind: str, where: str, message: str) -> Finding:
-    return Finding(Level.WARNING, kind, where, message)
 
 
 def _points(chosen: np.ndarray) -> str:
     """Return which cutter points are chosen, e.g. ``cutter points 0-12, 40 (14 of 99)``."""
     places = np.flatnonzero(chosen)
     runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
-    told = [f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs[:8]]
+    listed = [f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs[:8]]
     if len(runs) > 8:
-        told.append("...")
-    return f"cutter points {', '.join(told)} ({len(places)} of {len(chosen)})"
+        listed.append("...")
+    return f"cutter points {', '.join(listed)} ({len(places)} of {len(chosen)})"

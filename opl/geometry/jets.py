@@ -1,7 +1,7 @@
 """Intervals, and functions enclosed with their first two derivatives.
 
 An interval is its middle and its radius, in arrays: one for each cell that is looked at. Operations
-give intervals that hold every result; round-off, some 1e-15 of the numbers in it, is left to whoever
+give intervals that hold every result; round-off, some 1e-15 of the numbers in it, is left to who
 uses the result. Where an operation is not defined everywhere in an interval, the result is not
 finite, and so is whatever is computed from it.
 """

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from opl.errors import InputError
 from opl.geometry.crossings import crossing_triangles
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, in_mm, read_only
 
 _METRES = {"mm": 1e-3, "m": 1.0}
 _SUFFIXES = (".stl", ".ply", ".obj")
@@ -40,17 +40,15 @@ class TriangleMesh:
     faces: NDArray[np.int64]
 
     def __post_init__(self) -> None:
-        vertices = np.array(self.vertices, dtype=float)
-        faces = np.array(self.faces, dtype=np.int64)
+        vertices, faces = read_only(self.vertices), read_only(self.faces, np.int64)
         if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
             raise ValueError(f"vertices: must be finite, of shape (n, 3), got {vertices.shape}")
         if faces.ndim != 2 or faces.shape[1] != 3:
             raise ValueError(f"faces: must have shape (m, 3), got {faces.shape}")
         if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
             raise ValueError(f"faces: indices must lie between 0 and {len(vertices) - 1}")
-        for name, array in (("vertices", vertices), ("faces", faces)):
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces)
 
     @property
     def triangles(self) -> Array:
@@ -58,9 +56,14 @@ class TriangleMesh:
         return self.vertices[self.faces]
 
     @property
+    def edges(self) -> NDArray[np.int64]:
+        """Return the vertices at both ends of the three edges of each triangle, shape (m, 3, 2)."""
+        return self.faces[:, [[0, 1], [1, 2], [2, 0]]]
+
+    @property
     def is_closed(self) -> bool:
         """Return whether every edge belongs to an even number of triangles: there is an inside."""
-        edges = np.sort(self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        edges = np.sort(self.edges.reshape(-1, 2), axis=1)
         return bool((np.unique(edges, axis=0, return_counts=True)[1] % 2 == 0).all())
 
     @property
@@ -74,11 +77,7 @@ def winding_number(mesh: TriangleMesh, point: Array) -> float:
     """Return how often a surface winds around a point: 1 in a solid, 0 outside, a part if open.
 
     It is the sum of the solid angles of its triangles (Van Oosterom and Strackee, The Solid Angle
-    of a Plane Triangle, 1983), over that of a whole sphere.
-
-    Args:
-        mesh: The surface.
-        point: In [m], shape (3,).
+    of a Plane Triangle, 1983), over that of a whole sphere. The point is in [m], shape (3,).
     """
     a, b, c = np.moveaxis(mesh.triangles - point, 1, 0)
     la, lb, lc = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
@@ -91,7 +90,7 @@ def winding_number(mesh: TriangleMesh, point: Array) -> float:
 def box_corners(points: Array) -> Array:
     """Return the corners of the box around points in [m], along the axes, shape (8, 3)."""
     low, high = points.min(axis=0), points.max(axis=0)
-    return np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+    return np.asarray(np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T)
 
 
 def load_mesh(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
@@ -102,7 +101,7 @@ def load_mesh(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
 
     Args:
         path: The file.
-        unit: What one unit of the file is; mesh files do not say.
+        unit: What one unit of the file is; mesh files do not state it.
 
     Raises:
         InputError: If the file cannot be read, has no triangles, or if they do not enclose a
@@ -123,33 +122,25 @@ def load_mesh(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
 
 
 def load_triangles(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
-    """Read triangles, which need not enclose anything, from an STL, PLY or OBJ file.
+    """Read triangles, which need not enclose anything; arguments as of `load_mesh`.
 
     Corners at the same place become one vertex; triangles without area are left out.
-
-    Args:
-        path: The file.
-        unit: What one unit of the file is; mesh files do not say.
 
     Raises:
         InputError: If the file cannot be read, has no triangles with an area, or if neighbouring
             triangles face opposite sides.
     """
     mesh = load_shell(path, unit)
-    directed = mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    directed = mesh.edges.reshape(-1, 2)
     if len(np.unique(directed, axis=0)) < len(directed):
         raise InputError(str(path), "has neighbouring triangles that face opposite sides")
     return mesh
 
 
 def load_shell(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
-    """Read triangles that only stand in the way: they may be open, cross and face either side.
+    """Read triangles that may be open, cross and face either side; arguments as of `load_mesh`.
 
     Corners at the same place become one vertex; triangles without area are left out.
-
-    Args:
-        path: The file.
-        unit: What one unit of the file is; mesh files do not say.
 
     Raises:
         InputError: If the file cannot be read or has no triangles with an area.
@@ -190,7 +181,7 @@ def _open_edges(mesh: trimesh.Trimesh, unit: Literal["mm", "m"]) -> str:
     wrong = edges[counts != 2]
     middle = _METRES[unit] * np.asarray(mesh.vertices)[wrong[0]].mean(axis=0)
     return (
-        f"{len(wrong)} edges are not those of two triangles, one of them near {_place(middle)}; a "
+        f"{len(wrong)} edges are not those of two triangles, one of them near {in_mm(middle)}; a "
         "solid without holes is needed"
     )
 
@@ -204,11 +195,6 @@ def _crossing(solid: TriangleMesh, pairs: NDArray[np.int64]) -> str:
     more = f", and {len(pairs) - 1} more pairs" if len(pairs) > 1 else ""
     return (
         f"triangles {pairs[0, 0] + 1} and {pairs[0, 1] + 1} of {len(solid.faces)} near "
-        f"{_place(0.5 * (low + high))}{more}; a solid with an inside is needed, so unite its "
+        f"{in_mm(0.5 * (low + high))}{more}; a solid with an inside is needed, so unite its "
         "bodies before it is exported"
     )
-
-
-def _place(point: Array) -> str:
-    x, y, z = 1e3 * point + 0.0  # no negative zero
-    return f"({x:.4g}, {y:.4g}, {z:.4g}) mm"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import PPoly
 
-from opl.geometry.frames import Array, from_axes
+from opl.geometry.frames import Array, from_axes, in_mm
 from opl.geometry.mesh import TriangleMesh
 
 # a vertex nearer to the plane than this fraction of the mesh's size is moved off it
@@ -39,13 +39,9 @@ class MeshCurve:
     def through(
         cls, points: Array, normals: Array, tensors: Array, plane_normal: Array
     ) -> MeshCurve | None:
-        """Return the curve through points, directed along axis x; None if it has no length.
+        """Return the curve through points in [m], shape (k, 3), directed along axis x.
 
-        Args:
-            points: In [m], shape (k, 3).
-            normals: Smooth normals, shape (k, 3).
-            tensors: Curvature in [1/m], shape (k, 3, 3).
-            plane_normal: Unit normal of the plane that they lie on, shape (3,).
+        The other arguments are its attributes; None if it has no length.
         """
         steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
         kept = np.append(True, steps > _SAME)
@@ -69,7 +65,7 @@ class MeshCurve:
 
     @property
     def breaks(self) -> Array:
-        """Return no place: triangles do not tell where the curvature of their surface jumps."""
+        """Return no place: triangles do not show where the curvature of their surface jumps."""
         return np.empty(0)
 
     def frames(self, arc_length: Array) -> Array:
@@ -83,10 +79,9 @@ class MeshCurve:
         points = self.positions(arc_length)
         touching = np.linalg.norm(x, axis=-1) < 1e-6 * np.linalg.norm(z, axis=-1)
         if touching.any():
-            place = 1e3 * points[touching][0]
             raise ValueError(
-                f"the plane touches the mesh at ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}) "
-                "mm and does not cut it there"
+                f"the plane touches the mesh at {in_mm(points[touching][0])} and does not cut it "
+                "there"
             )
         return from_axes(z, x, points)
 
@@ -113,15 +108,15 @@ def plane_polylines(
         offset: Distance of the plane from the origin along n in [m].
 
     Returns:
-        For each polyline its nodes as points of edges: both vertices and the fraction of the way
-        between them, shapes (k,). A closed one ends with its first node.
+        For each polyline its nodes as points of edges: both vertices and the fraction of the
+        distance between them, shapes (k,). A closed one ends with its first node.
     """
     heights = mesh.vertices @ plane_normal - offset
     scale = _ON_PLANE * float(np.ptp(mesh.vertices, axis=0).max(initial=0.0))
     # so every cut edge is cut in its inside, and each polyline is a chain of whole triangles
     heights = np.where(np.abs(heights) < scale, scale, heights)
     above = heights > 0.0
-    edges = mesh.faces[:, [[0, 1], [1, 2], [2, 0]]]  # (m, 3, 2)
+    edges = mesh.edges
     cut = above[edges[..., 0]] != above[edges[..., 1]]
     crossed = np.flatnonzero(cut.any(axis=1))  # each in two edges
     if not len(crossed):

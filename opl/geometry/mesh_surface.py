@@ -21,7 +21,7 @@ from opl.geometry.curves import SurfaceCurve
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh, load_triangles
 from opl.geometry.mesh_curves import MeshCurve, plane_polylines
-from opl.geometry.patchwork import in_order
+from opl.geometry.patchwork import across_rows, in_order
 from opl.geometry.regions import face_normals, smooth_regions
 
 
@@ -137,12 +137,8 @@ class MeshSurface:
     def curvature_across(self, spacing: float, direction: Array) -> tuple[Array, Array]:
         """Return curvature in [1/m] and slope across rows; see `Patchwork.curvature_across`."""
         used = np.unique(self.mesh.faces)
-        normals = self.normals[used]
-        x = np.cross(normals, direction)
-        slope = np.linalg.norm(x, axis=1)
-        cut = slope > 0.05
-        y = np.cross(normals[cut], x[cut] / slope[cut, None])
-        return np.einsum("ki,kij,kj->k", y, self.bending[used][cut], y), slope[cut]
+        cut, slope, _, y = across_rows(self.normals[used], direction)
+        return np.einsum("ki,kij,kj->k", y, self.bending[used][cut], y), slope
 
 
 def load_mesh_surface(
@@ -174,7 +170,7 @@ def load_mesh_surface(
 
 def _unit(vectors: Array) -> Array:
     lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, lengths, out=np.zeros_like(vectors), where=lengths > 0.0)
+    return np.asarray(vectors / np.where(lengths > 0.0, lengths, 1.0))
 
 
 def _mirrored_to_border(normals: Array, mesh: TriangleMesh) -> Array:
@@ -183,8 +179,8 @@ def _mirrored_to_border(normals: Array, mesh: TriangleMesh) -> Array:
     The normals at both ends of an arc are mirror images in the plane halfway between; so those of
     the border follow from their neighbours inside.
     """
-    edges = mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    ends, counts = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    edges = np.sort(mesh.edges.reshape(-1, 2), axis=1)
+    ends, counts = np.unique(edges, axis=0, return_counts=True)
     border = np.zeros(len(normals), dtype=bool)
     border[ends[counts == 1]] = True
     inward = np.concatenate([ends, ends[:, ::-1]])

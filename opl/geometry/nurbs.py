@@ -11,7 +11,7 @@ from math import comb
 import numpy as np
 from scipy.interpolate import NdBSpline
 
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, in_mm, read_only
 
 # du x dv below this fraction of its average over the surface is taken for zero
 _DEGENERATE_AREA = 1e-9
@@ -26,10 +26,9 @@ class DegenerateNormalError(ValueError):
     """
 
     def __init__(self, uv: Array, point: Array) -> None:
-        x, y, z = 1e3 * point
         super().__init__(
             f"the surface has no normal at (u, v) = ({uv[0]:.6g}, {uv[1]:.6g}), "
-            f"point ({x:.4g}, {y:.4g}, {z:.4g}) mm: du x dv is zero"
+            f"point {in_mm(point)}: du x dv is zero"
         )
         self.uv = uv
         self.point = point
@@ -62,10 +61,9 @@ class NurbsSurface:
 
     def __post_init__(self) -> None:
         for name in ("knots_u", "knots_v", "control_points", "weights"):
-            array = np.array(getattr(self, name), dtype=float)
+            array = read_only(getattr(self, name))
             if not np.isfinite(array).all():
                 raise ValueError(f"{name}: must be finite")
-            array.flags.writeable = False
             object.__setattr__(self, name, array)
         points, weights = self.control_points, self.weights
         if points.ndim != 3 or points.shape[2] != 3:
@@ -102,13 +100,9 @@ class NurbsSurface:
         return np.array([[u0, v0], [u1, v1]])
 
     def point(self, uv: Array) -> Array:
-        """Return S(u, v) in [m], shape (..., 3); nan outside the domain.
-
-        Args:
-            uv: Parameters, shape (..., 2).
-        """
+        """Return S(u, v) in [m], shape (..., 3), of (..., 2); nan outside the domain."""
         homogeneous = self._homogeneous(uv)
-        return homogeneous[..., :3] / homogeneous[..., 3:]
+        return np.asarray(homogeneous[..., :3] / homogeneous[..., 3:])
 
     def derivatives(self, uv: Array, order: int = 1) -> Array:
         """Return the point and its partial derivatives, eq. (4.20).
@@ -142,17 +136,13 @@ class NurbsSurface:
         return S
 
     def normal(self, uv: Array) -> Array:
-        """Return the unit normals along du x dv, shape (..., 3).
-
-        Args:
-            uv: Parameters, shape (..., 2).
+        """Return the unit normals along du x dv, shape (..., 3), of parameters (..., 2).
 
         Raises:
             DegenerateNormalError: Where du x dv is zero, at a pole or a cusp, and for parameters
                 outside the domain.
         """
-        S = self.derivatives(uv, 1)
-        return self.unit_normal(uv, S)
+        return self.unit_normal(uv, self.derivatives(uv, 1))
 
     def curvature_tensor(self, uv: Array, x: Array, y: Array) -> Array:
         """Return the second fundamental form in two orthonormal tangent directions.
@@ -180,14 +170,10 @@ class NurbsSurface:
         mixed = np.linalg.solve(first, tangents @ np.stack([x, y], axis=-1))
         L, M, N = (-np.sum(S[..., k, m, :] * n, axis=-1) for k, m in ((2, 0), (1, 1), (0, 2)))
         second = np.stack([np.stack([L, M], axis=-1), np.stack([M, N], axis=-1)], axis=-2)
-        return np.swapaxes(mixed, -1, -2) @ second @ mixed
+        return np.asarray(np.swapaxes(mixed, -1, -2) @ second @ mixed)
 
     def unit_normal(self, uv: Array, S: Array) -> Array:
-        """Return the unit normals of known derivatives.
-
-        Args:
-            uv: Parameters, shape (..., 2).
-            S: What `derivatives` returned for them.
+        """Return the unit normals where `derivatives` returned S, shape (..., 3).
 
         Raises:
             DegenerateNormalError: Where du x dv is zero.
@@ -198,7 +184,7 @@ class NurbsSurface:
         if degenerate.any():
             first = np.unravel_index(np.argmax(degenerate), degenerate.shape)
             raise DegenerateNormalError(np.asarray(uv)[first], S[..., 0, 0, :][first])
-        return normal / area
+        return np.asarray(normal / area)
 
 
 def _check_knots(axis: str, degree: int, knots: Array, n_points: int) -> None:

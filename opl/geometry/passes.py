@@ -17,7 +17,7 @@ from opl.geometry.coverage import AreaSamples
 from opl.geometry.curves import MEETING, SurfaceCurve, clipped, is_closed
 from opl.geometry.frames import Array
 from opl.geometry.iso_lines import iso_curves
-from opl.geometry.order import shortest_air
+from opl.geometry.order import shortest_links
 from opl.geometry.patchwork import Patchwork
 from opl.geometry.steps import balanced_steps
 from opl.geometry.toolpath import CutterPoints
@@ -26,16 +26,30 @@ from opl.geometry.toolpath import CutterPoints
 _CURVE_ERROR = 1e-3
 
 
+class PassesError(ValueError):
+    """A value of `Passes` does not go with the surface, or is out of its range.
+
+    Attributes:
+        attribute: Which one.
+        message: What is wrong with it.
+    """
+
+    def __init__(self, attribute: str, message: str) -> None:
+        super().__init__(f"{attribute}: {message}")
+        self.attribute = attribute
+        self.message = message
+
+
 class Order(str, Enum):
     """In which order and direction the passes are ground."""
 
     ONE_WAY = "one_way"  # row by row, all in the direction of axis x
     ZIGZAG = "zigzag"  # row by row, every second one backwards
     BOTH = "both"  # row by row, each there and back
-    SHORTEST = "shortest"  # in whatever order and direction leaves the shortest way in the air
+    SHORTEST = "shortest"  # in whatever order and direction leaves the shortest links
 
 
-class Kind(str, Enum):
+class PassKind(str, Enum):
     """What curves passes run along."""
 
     SECTIONS = "sections"  # where planes cut the surface
@@ -63,7 +77,12 @@ class MachinedSurface(Protocol):
 
 def bounding_box(surface: MachinedSurface) -> Array:
     """Return the least and the largest x, y, z of a surface in [m], shape (2, 3)."""
-    return np.array([surface.extent_along(axis) for axis in np.eye(3)]).T
+    return np.asarray(np.array([surface.extent_along(axis) for axis in np.eye(3)]).T)
+
+
+def longest_side(surface: MachinedSurface) -> float:
+    """Return the longest side of the bounding box in [m]."""
+    return float(np.ptp(bounding_box(surface), axis=0).max())
 
 
 @dataclass(frozen=True)
@@ -93,7 +112,7 @@ class Passes:
     margin: float = 0.0
     rows: int | None = None
     order: Order = Order.ONE_WAY
-    kind: Kind = Kind.SECTIONS
+    kind: PassKind = PassKind.SECTIONS
     end_margin: float = 0.0
     repeats: int = 1
     shift: float = 0.0
@@ -128,12 +147,12 @@ def lay_passes(surface: MachinedSurface, passes: Passes) -> LaidPasses:
 
     Raises:
         DegenerateNormalError: If a pass runs through a place where the surface has no normal.
-        ValueError: If a value is out of its range, if the rows do not fit, or if a plane misses or
-            merely touches the surface.
+        PassesError: If a value is out of its range, or if the rows do not fit.
+        ValueError: If a plane misses or merely touches the surface.
     """
     for name in ("pitch", "max_bow_height", "largest_step", "repeats"):
         if not getattr(passes, name) > 0.0:
-            raise ValueError(f"{name}: must be positive, got {getattr(passes, name):g}")
+            raise PassesError(name, f"must be positive, got {getattr(passes, name):g}")
     low, high, curves_at = _rows_of(surface, passes)
     first = _row_offsets(low, high, passes)
     rounding = 1e-9 * (high - low)
@@ -166,18 +185,18 @@ CurvesAt = Callable[[float], Sequence[SurfaceCurve]]
 def _rows_of(surface: MachinedSurface, passes: Passes) -> tuple[float, float, CurvesAt]:
     """Return where rows may lie, from and to in [m], and the curves of the row at a place."""
     tolerance = _CURVE_ERROR * passes.max_bow_height
-    if passes.kind is Kind.SECTIONS:
+    if passes.kind is PassKind.SECTIONS:
         length = float(np.linalg.norm(passes.plane_normal))
         if not length > 0.0:
-            raise ValueError("plane_normal: must not be zero")
+            raise PassesError("plane_normal", "must not be zero")
         normal = np.asarray(passes.plane_normal, dtype=np.float64) / length
         low, high = surface.extent_along(normal)
         return low, high, lambda offset: surface.curves(normal, offset, tolerance)
 
     if not isinstance(surface, Patchwork) or len(surface.faces) != 1:
-        raise ValueError(f"kind: {passes.kind.value} needs a single NURBS face")
+        raise PassesError("kind", f"{passes.kind.value} needs a single NURBS face")
     face = surface.faces[0]
-    axis = 0 if passes.kind is Kind.ALONG_U else 1
+    axis = 0 if passes.kind is PassKind.ALONG_U else 1
     across = (face.grid.v, face.grid.u)[axis]
     # the widest distance between neighbouring lines of the grid counts
     gaps = np.linalg.norm(np.diff(face.grid.points, axis=1 - axis), axis=2).max(axis=axis)
@@ -197,9 +216,10 @@ def _row_offsets(low: float, high: float, passes: Passes) -> Array:
     n_fitting = int((room + rounding) // pitch) + 1 if room >= -rounding else 0
     if n_fitting == 0 or (rows is not None and not 1 <= rows <= n_fitting):
         wanted = "a row" if rows is None else f"{rows} rows"
-        raise ValueError(
-            f"rows: {wanted} of pitch {1e3 * pitch:g} mm do not fit; between margins of "
-            f"{1e3 * margin:g} mm on {1e3 * (high - low):.6g} mm there is room for {n_fitting}"
+        raise PassesError(
+            "rows",
+            f"{wanted} of pitch {1e3 * pitch:g} mm do not fit; between margins of "
+            f"{1e3 * margin:g} mm on {1e3 * (high - low):.6g} mm there is room for {n_fitting}",
         )
     n = n_fitting if rows is None else rows
     return 0.5 * (low + high) + pitch * (np.arange(n, dtype=np.float64) - 0.5 * (n - 1))
@@ -238,7 +258,7 @@ def _ordered(
 ) -> Iterator[tuple[int, int]]:
     """Yield which curve comes next, and 1 if it is travelled forwards, -1 if backwards."""
     if order is Order.SHORTEST:
-        yield from shortest_air(np.stack([one.frames[[0, -1]] for one in laid]))
+        yield from shortest_links(np.stack([one.frames[[0, -1]] for one in laid]))
         return
     first = 0
     for number, row in enumerate(rows):

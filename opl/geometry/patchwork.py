@@ -13,7 +13,7 @@ from opl.geometry.curves import MEETING, SurfaceCurve, joined
 from opl.geometry.frames import Array
 from opl.geometry.nurbs import NurbsSurface
 from opl.geometry.section import Section
-from opl.geometry.section_curves import section_curves
+from opl.geometry.section_curves import FaceCurve, section_curves
 from opl.geometry.surface_grid import SurfaceGrid, extent_along, sample_grid
 from opl.geometry.trim import Trim, parts_inside
 
@@ -35,6 +35,7 @@ class Face:
         surface: The surface.
         outward: 1.0 if du x dv points outward, -1.0 if inward.
         trim: What of it there is, None for all.
+        type: What kind of surface it is in its file, such as ``plane`` or ``b-spline``.
 
     Raises:
         ValueError: If it has no area; the message begins with what is to blame.
@@ -43,6 +44,7 @@ class Face:
     surface: NurbsSurface
     outward: float = 1.0
     trim: Trim | None = None
+    type: str = "nurbs"
 
     def __post_init__(self) -> None:
         across, along = (np.diff(self.grid.points, axis=axis) for axis in (0, 1))
@@ -52,6 +54,11 @@ class Face:
             raise ValueError("control_points: span no area")
         if self.trim is not None:
             self.trim.check_against(self.surface.domain)
+
+    @property
+    def n_holes(self) -> int:
+        """Return the number of borders beyond the outer one."""
+        return 0 if self.trim is None else len(self.trim.loops) - 1
 
     @cached_property
     def grid(self) -> SurfaceGrid:
@@ -86,14 +93,15 @@ class Face:
             offset += _BESIDE_POLE * (
                 -1.0 if offset > np.median(self.grid.points @ plane_normal) else 1.0
             )
-        section = Section(self.surface, plane_normal, offset, self.outward)
-        found: list[SurfaceCurve] = []
-        for curve in section_curves(section, self.grid, tolerance):
-            if self.trim is None:
-                found.append(curve)
-            else:
-                found += parts_inside(curve, curve.parameters, self.trim)
+        section = Section(self.surface, self.outward, plane_normal, offset)
+        found = self.trimmed(section_curves(section, self.grid, tolerance))
         return [curve for curve in found if curve.length > _SHORTEST]
+
+    def trimmed(self, curves: Sequence[FaceCurve]) -> Sequence[SurfaceCurve]:
+        """Return what the trim leaves of curves on the face."""
+        if self.trim is None:
+            return curves
+        return [part for curve in curves for part in parts_inside(curve, self.trim)]
 
     def area_samples(self, spacing: float) -> AreaSamples:
         """Return points that stand for the area around them."""
@@ -126,11 +134,7 @@ class Patchwork:
     faces: tuple[Face, ...]
 
     def extent_along(self, direction: Array) -> tuple[float, float]:
-        """Return the least and the largest d . S in [m] over all faces.
-
-        Args:
-            direction: Unit direction d, shape (3,).
-        """
+        """Return the least and the largest d . S in [m] over all faces; d is a unit vector."""
         low, high = zip(*(face.extent_along(direction) for face in self.faces), strict=True)
         return min(low), max(high)
 
@@ -171,15 +175,23 @@ class Patchwork:
         curvatures, slopes = [], []
         for face in self.faces:
             samples = face.area_samples(spacing)
-            x = np.cross(samples.normals, direction)
-            slope = np.linalg.norm(x, axis=1)
-            cut = slope > 0.05
-            x = x[cut] / slope[cut, None]
-            y = np.cross(samples.normals[cut], x)
+            cut, slope, x, y = across_rows(samples.normals, direction)
             tensor = face.outward * face.surface.curvature_tensor(samples.uv[cut], x, y)
             curvatures.append(tensor[:, 1, 1])
-            slopes.append(slope[cut])
+            slopes.append(slope)
         return np.concatenate(curvatures), np.concatenate(slopes)
+
+
+def across_rows(normals: Array, direction: Array) -> tuple[np.ndarray, Array, Array, Array]:
+    """Return where planes cut a surface rather than touch it, slope, and tangents along and across.
+
+    Shapes (n,) of bool, and (k,), (k, 3), (k, 3) of what is cut.
+    """
+    x = np.cross(normals, direction)
+    slope = np.linalg.norm(x, axis=1)
+    cut = slope > 0.05
+    x = x[cut] / slope[cut, None]
+    return cut, slope[cut], x, np.cross(normals[cut], x)
 
 
 def in_order(curves: Sequence[SurfaceCurve]) -> list[SurfaceCurve]:
@@ -193,8 +205,8 @@ def in_order(curves: Sequence[SurfaceCurve]) -> list[SurfaceCurve]:
     if np.linalg.norm(along) > MEETING * len(curves):
         return sorted(curves, key=lambda curve: float(along @ curve.positions(0.5 * curve.length)))
 
-    def place(curve: SurfaceCurve) -> list[float]:
+    def place(curve: SurfaceCurve) -> tuple[float, ...]:
         middle = curve.positions(np.linspace(0.0, curve.length, 33)).mean(axis=0)
-        return np.round(np.array([-curve.length, *middle]), 4).tolist()
+        return tuple(np.round(np.array([-curve.length, *middle]), 4))
 
     return sorted(curves, key=place)

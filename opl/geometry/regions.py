@@ -18,10 +18,10 @@ def face_normals(mesh: TriangleMesh) -> tuple[Array, Array]:
     return normals / lengths[:, None], 0.5 * lengths
 
 
-def neighbours(faces: np.ndarray) -> np.ndarray:
-    """Return the pairs of triangles, vertices of shape (m, 3), that share an edge; shape (k, 2)."""
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    owner = np.repeat(np.arange(len(faces)), 3)
+def neighbours(mesh: TriangleMesh) -> np.ndarray:
+    """Return the pairs of triangles that share an edge, shape (k, 2)."""
+    edges = np.sort(mesh.edges.reshape(-1, 2), axis=1)
+    owner = np.repeat(np.arange(len(mesh.faces)), 3)
     order = np.lexsort(edges.T[::-1])
     edges, owner = edges[order], owner[order]
     same = (edges[1:] == edges[:-1]).all(axis=1)
@@ -32,20 +32,17 @@ def neighbours(faces: np.ndarray) -> np.ndarray:
 def smooth_regions(mesh: TriangleMesh, crease: float) -> np.ndarray:
     """Return the region of each triangle, 0, 1, ..., the largest area first, shape (m,).
 
-    Neighbours belong together unless the edge between them is a crease.
-
-    Args:
-        mesh: The mesh; its triangles have areas.
-        crease: Angle in [rad] between two normals that makes an edge a crease.
+    Neighbours belong together unless their normals differ by more than ``crease`` [rad]. All
+    triangles must have areas.
     """
     normals, areas = face_normals(mesh)
-    pairs = neighbours(mesh.faces)
+    pairs = neighbours(mesh)
     cosine = np.sum(normals[pairs[:, 0]] * normals[pairs[:, 1]], axis=1)
     first, second = pairs[cosine >= np.cos(crease)].T
     graph = coo_array((np.ones(len(first)), (first, second)), shape=(len(areas), len(areas)))
     count, labels = connected_components(graph, directed=False)
     sizes = np.bincount(labels, weights=areas, minlength=count)
-    # equal areas in the order of their first triangle, whatever the last digit says
+    # equal areas in the order of their first triangle, whatever their last digits are
     rank = np.empty(count, dtype=np.int64)
     rank[np.argsort(-np.round(sizes / sizes.max(), 6), kind="stable")] = np.arange(count)
-    return rank[labels]
+    return np.asarray(rank[labels])

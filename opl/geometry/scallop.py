@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.geometry.passes import MachinedSurface, bounding_box
+from opl.geometry.passes import MachinedSurface, longest_side
 
 # the surface is looked at about this often across its longest side
 _LOOKS = 60
@@ -57,10 +57,9 @@ def row_pitch(
         ValueError: If no place of the surface limits the pitch.
     """
     normal = np.asarray(plane_normal, dtype=np.float64) / np.linalg.norm(plane_normal)
-    longest = float(np.ptp(bounding_box(surface), axis=0).max())
-    curvature, slope = surface.curvature_across(longest / _LOOKS, normal)
+    curvature, slope = surface.curvature_across(longest_side(surface) / _LOOKS, normal)
     pitch = scallop_pitch(curvature, height, wheel_radius) * np.maximum(slope, _LEAST_SLOPE)
     least = float(pitch.min(initial=np.inf))
     if not np.isfinite(least):
-        raise ValueError("the surface is nowhere rounder than the wheel: give pitch_mm instead")
+        raise ValueError("the surface is nowhere rounder than the wheel")
     return least

@@ -1,12 +1,13 @@
-"""One plane that cuts a surface: where, in which direction, and how the cut bends."""
+"""What determines a curve on a face: here a plane that cuts it."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
 
-from opl.geometry.frames import Array, from_axes
+from opl.geometry.frames import Array, from_axes, in_mm
 from opl.geometry.nurbs import NurbsSurface
 
 # points of a curve lie this near to their plane [m], on the surface they lie exactly; the search
@@ -20,29 +21,61 @@ _TOUCHING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Section:
-    """A plane n . p = offset through a surface whose outside is known.
+class Trace(ABC):
+    """A condition that the points of a curve on a surface satisfy.
 
     Attributes:
         surface: The surface.
-        plane_normal: Unit normal n of the plane, shape (3,).
-        offset: Distance of the plane from the origin along n in [m].
         outward: 1.0 if du x dv points outward, -1.0 if inward.
     """
 
     surface: NurbsSurface
+    outward: float
+
+    @abstractmethod
+    def frames(self, uv: Array) -> Array:
+        """Return Ts_workpiece_cutter, shape (..., 4, 4), of parameters (..., 2) of the curve.
+
+        Raises:
+            DegenerateNormalError: Where the surface has no normal.
+        """
+
+    @abstractmethod
+    def closest(self, uv: Array, targets: Array, tangents: Array) -> Array:
+        """Return the parameters of the points of the curve abreast of given points.
+
+        Args:
+            uv: First guesses, shape (k, 2).
+            targets: Points near the curve in [m], shape (k, 3).
+            tangents: Directions of the curve there, shape (k, 3).
+
+        Raises:
+            ValueError: Where there is no such point in the domain.
+        """
+
+    def bending(self, uv: Array) -> Array:
+        """Return the curvature in [1/m] in the frames' axes x and y, shape (k, 2, 2)."""
+        R = self.frames(uv)[:, :3, :3]
+        return self.outward * self.surface.curvature_tensor(uv, R[:, :, 0], R[:, :, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class Section(Trace):
+    """A plane n . p = offset through a surface.
+
+    Attributes:
+        plane_normal: Unit normal n of the plane, shape (3,).
+        offset: Distance of the plane from the origin along n in [m].
+    """
+
     plane_normal: Array
     offset: float
-    outward: float
 
     def frames(self, uv: Array) -> Array:
         """Return Ts_workpiece_cutter, shape (..., 4, 4): z outward normal, x = z cross n.
 
         The tangent of the curve is normal to both the surface's and the plane's normal, so x is
         exact where z is.
-
-        Args:
-            uv: Parameters of points of the section, shape (..., 2).
 
         Raises:
             DegenerateNormalError: Where the surface has no normal.
@@ -53,28 +86,16 @@ class Section:
         points = self.surface.point(uv)
         touching = np.linalg.norm(x, axis=-1) < _TOUCHING
         if touching.any():
-            place = 1e3 * points[touching][0]
             raise ValueError(
                 f"the plane {1e3 * self.offset:.4g} mm along its normal touches the surface at "
-                f"({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g}) mm and does not cut it there"
+                f"{in_mm(points[touching][0])} and does not cut it there"
             )
         return from_axes(z, x, points)
 
-    def bending(self, uv: Array) -> Array:
-        """Return the curvature in [1/m] in the frames' axes x and y, shape (k, 2, 2)."""
-        R = self.frames(uv)[:, :3, :3]
-        return self.outward * self.surface.curvature_tensor(uv, R[:, :, 0], R[:, :, 1])
-
     def closest(self, uv: Array, targets: Array, tangents: Array) -> Array:
-        """Return the parameters of the points of the section abreast of given points.
+        """See `Trace.closest`; Newton's method on two equations.
 
-        Newton's method on two equations: the point lies on the plane, and its difference to the
-        target is normal to the tangent.
-
-        Args:
-            uv: First guesses, shape (k, 2).
-            targets: Points near the section in [m], shape (k, 3).
-            tangents: Directions of the curve there, shape (k, 3).
+        The point lies on the plane, and its difference to the target is normal to the tangent.
 
         Raises:
             ValueError: Where there is no such point in the domain.
@@ -101,8 +122,7 @@ class Section:
 
     def lost(self, point: Array) -> ValueError:
         """Return the error that a curve cannot be followed near a point [m]."""
-        x, y, z = 1e3 * point
         return ValueError(
             f"the plane {1e3 * self.offset:.4g} mm along its normal: its curve on the surface "
-            f"cannot be followed near ({x:.4g}, {y:.4g}, {z:.4g}) mm; is the surface smooth there?"
+            f"cannot be followed near {in_mm(point)}; is the surface smooth there?"
         )

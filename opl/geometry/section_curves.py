@@ -15,12 +15,12 @@ from contourpy import LineType, contour_generator
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from opl.geometry.curves import curvature_jumps
+from opl.geometry.curves import curvature_jumps, hermite_through
 from opl.geometry.frames import Array
-from opl.geometry.section import CONVERGED, MAX_NEWTON_STEPS, ON_PLANE, Section
+from opl.geometry.section import CONVERGED, MAX_NEWTON_STEPS, ON_PLANE, Section, Trace
 from opl.geometry.surface_grid import SurfaceGrid
 
-# how far beside a knot its two sides are looked at, as a fraction of the way to the next node
+# how far beside a knot its two sides are looked at, as a fraction of the distance to the next node
 _BESIDE = 1e-6
 
 # normals on both sides of a knot that differ by more than this make a kink [rad]
@@ -31,22 +31,25 @@ _LARGEST_TURN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class SectionCurve:
-    """One curve of a section, in the direction of the frames' axis x.
+class FaceCurve:
+    """A curve on a face, in the direction of the frames' axis x.
 
     Attributes:
-        section: What it is a curve of.
+        trace: What it is a curve of.
         uv: Parameters of its nodes, shape (k, 2).
-        arc_length: Arc length at its nodes in [m], from 0, shape (k,).
         positions: The curve as a function of its arc length, (...,) to (..., 3).
         breaks: Inner arc lengths in [m] where the curvature jumps, shape (b,).
     """
 
-    section: Section
+    trace: Trace
     uv: Array
-    arc_length: Array
     positions: CubicHermiteSpline
     breaks: Array
+
+    @property
+    def arc_length(self) -> Array:
+        """Return the arc length at its nodes in [m], from 0, shape (k,)."""
+        return np.asarray(self.positions.x)
 
     @property
     def length(self) -> float:
@@ -55,31 +58,32 @@ class SectionCurve:
 
     def parameters(self, arc_length: Array) -> Array:
         """Return the exact (u, v) at given arc lengths [m], shape (k, 2)."""
-        uv = np.stack([np.interp(arc_length, self.arc_length, p) for p in self.uv.T], axis=1)
+        nodes = self.arc_length
+        uv = np.stack([np.interp(arc_length, nodes, p) for p in self.uv.T], axis=1)
         # a node may not be moved: not across the border, nor off the knot on which a break lies
-        after = np.minimum(self.arc_length.searchsorted(arc_length), len(self.arc_length) - 1)
-        inner = self.arc_length[after] != arc_length
+        after = np.minimum(nodes.searchsorted(arc_length), len(nodes) - 1)
+        inner = nodes[after] != arc_length
         targets, tangents = self.positions(arc_length), self.positions(arc_length, nu=1)
-        uv[inner] = self.section.closest(uv[inner], targets[inner], tangents[inner])
+        uv[inner] = self.trace.closest(uv[inner], targets[inner], tangents[inner])
         return uv
 
     def frames(self, arc_length: Array) -> Array:
         """Return the exact Ts_workpiece_cutter at given arc lengths [m], shape (k, 4, 4)."""
-        return self.section.frames(self.parameters(arc_length))
+        return self.trace.frames(self.parameters(arc_length))
 
     def bending(self, arc_length: Array) -> Array:
         """Return the curvature of the surface in [1/m] in axes x and y, shape (k, 2, 2)."""
-        return self.section.bending(self.parameters(arc_length))
+        return self.trace.bending(self.parameters(arc_length))
 
 
-def section_curves(section: Section, grid: SurfaceGrid, tolerance: float) -> list[SectionCurve]:
+def section_curves(section: Section, grid: SurfaceGrid, tolerance: float) -> list[FaceCurve]:
     """Return the curves in which a plane cuts a surface.
 
     A curve that crosses the seam of a closed surface is two curves that meet there. They come in
     no order.
 
     Args:
-        section: Plane and surface.
+        section: The plane and the surface.
         grid: Grid of the surface; what falls between its lines is not seen.
         tolerance: Largest error in [m] of a curve's ``positions`` between its nodes.
 
@@ -147,7 +151,7 @@ def _crossings(section: Section, grid: SurfaceGrid, line: Array) -> Array:
     return uv[np.append(chords > ON_PLANE, True)] if len(uv) else uv
 
 
-def _refined(section: Section, uv: Array, tolerance: float) -> SectionCurve:
+def _refined(section: Section, uv: Array, tolerance: float) -> FaceCurve:
     """Direct a curve along axis x and add nodes where its interpolation is not good enough."""
     frames = section.frames(uv)
     chords = np.diff(frames[:, :3, 3], axis=0)
@@ -157,12 +161,8 @@ def _refined(section: Section, uv: Array, tolerance: float) -> SectionCurve:
         frames = section.frames(uv)
         points, tangents = frames[:, :3, 3], frames[:, :3, 0]
         chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        cosine = np.clip(np.sum(tangents[1:] * tangents[:-1], axis=1), -1.0, 1.0)
-        turns = np.arccos(cosine)
-        # length of the circular arc that has this chord and this turn
-        arcs = chords / np.sinc(turns / (2.0 * np.pi))
-        arc_length = np.append(0.0, np.cumsum(arcs))
-        positions = CubicHermiteSpline(arc_length, points, tangents)
+        positions, turns = hermite_through(points, tangents)
+        arc_length = np.asarray(positions.x)
 
         between = 0.5 * (arc_length[1:] + arc_length[:-1])
         targets, directions = positions(between), positions(between, nu=1)
@@ -171,12 +171,12 @@ def _refined(section: Section, uv: Array, tolerance: float) -> SectionCurve:
         exact = section.frames(middles)
         error = np.linalg.norm(exact[:, :3, 3] - targets, axis=1)
         # an error odd about the middle shows in the tangent there
-        error += 0.25 * arcs * np.linalg.norm(exact[:, :3, 0] - directions, axis=1)
+        error += 0.25 * np.diff(arc_length) * np.linalg.norm(exact[:, :3, 0] - directions, axis=1)
         # a segment as short as the tolerance is a kink of the surface: nothing to refine
         bad = ((error > tolerance) | (turns > _LARGEST_TURN)) & (chords > tolerance)
         if not bad.any():
             breaks = arc_length[_breaks(section, uv)]
-            return SectionCurve(section, uv, arc_length, positions, breaks)
+            return FaceCurve(section, uv, positions, breaks)
         # halves must be shorter than the whole, or the refinement would never end
         halves = np.linalg.norm(np.stack([points[:-1], points[1:]]) - exact[:, :3, 3], axis=2)
         astray = bad & (halves.max(axis=0) >= chords)
@@ -188,23 +188,16 @@ def _refined(section: Section, uv: Array, tolerance: float) -> SectionCurve:
 def _breaks(section: Section, uv: Array) -> NDArray[np.int64]:
     """Return which inner nodes lie on a knot where the curvature of the curve jumps, shape (b,).
 
-    Every crossing of a knot is a node. A knot tells nothing by itself: that of an exact circle in
+    Every crossing of a knot is a node. A knot alone is no evidence: that of an exact circle in
     several rational pieces is smooth.
     """
     surface = section.surface
-    weak = [
-        _weak_knots(knots, degree)
-        for knots, degree in (
-            (surface.knots_u, surface.degree_u),
-            (surface.knots_v, surface.degree_v),
-        )
-    ]
+    both = (surface.knots_u, surface.degree_u), (surface.knots_v, surface.degree_v)
     span = np.ptp(surface.domain, axis=0)
     on_knot = np.zeros(len(uv), dtype=bool)
-    for axis, knots in enumerate(weak):
-        if len(knots):
-            gap = np.abs(uv[:, axis, None] - knots).min(axis=1)
-            on_knot |= gap <= 1e-9 * span[axis]
+    for axis, (knots, degree) in enumerate(both):
+        gaps = np.abs(uv[:, axis, None] - _weak_knots(knots, degree))
+        on_knot |= (gaps <= 1e-9 * span[axis]).any(axis=1)
     nodes = np.flatnonzero(on_knot[1:-1]) + 1
     if not len(nodes):
         return nodes
@@ -212,7 +205,7 @@ def _breaks(section: Section, uv: Array) -> NDArray[np.int64]:
     after = uv[nodes] + _BESIDE * (uv[nodes + 1] - uv[nodes])
     jumps = curvature_jumps(section.bending(before)[:, 0, 0], section.bending(after)[:, 0, 0])
     turns = np.linalg.norm(surface.normal(after) - surface.normal(before), axis=1)
-    return nodes[jumps | (turns > _KINK)]
+    return np.asarray(nodes[jumps | (turns > _KINK)])
 
 
 def _weak_knots(knots: Array, degree: int) -> Array:

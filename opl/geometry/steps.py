@@ -1,12 +1,13 @@
 """Where to put points on a curve so that the straight lines between them stay near to it.
 
-The step follows the curvature by way of the bow height, the largest distance of the curve from the
+The step follows the curvature through the bow height, the largest distance of the curve from the
 chord of a step. It is measured rather than taken from a formula, so it holds where the curvature
 changes within a step.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -52,131 +53,120 @@ def balanced_steps(curve: SurfaceCurve, max_bow_height: float, largest_step: flo
         max_bow_height: Largest distance in [m] of the curve from the chord of a step.
         largest_step: Largest length in [m] of a step along the curve.
     """
-    ends = [0.0, *curve.breaks.tolist(), curve.length]
-    spans = [
-        _balanced(curve, start, stop, max_bow_height, largest_step)
-        for start, stop in pairwise(ends)
-    ]
-    return np.concatenate([spans[0], *(span[1:] for span in spans[1:])])
+    stepping = _Stepping(curve, max_bow_height, largest_step)
+    nodes = [np.zeros(1)]
+    for start, stop in pairwise([0.0, *curve.breaks.tolist(), curve.length]):
+        span = stepping.shared_out(start, stop)
+        nodes.append((stepping.balanced(start, stop) if span is None else span)[1:])
+    return np.concatenate(nodes)
 
 
-def _balanced(
-    curve: SurfaceCurve, start: float, stop: float, max_bow_height: float, largest_step: float
-) -> Array:
-    shared = _shared_out(curve, start, stop, max_bow_height, largest_step)
-    if shared is not None:
-        return shared
-    return _one_after_another(curve, start, stop, max_bow_height, largest_step)
+@dataclass(frozen=True, eq=False)
+class _Stepping:
+    """A curve and the limits of its steps, as in `balanced_steps`."""
 
+    curve: SurfaceCurve
+    max_bow_height: float
+    largest_step: float
 
-def _shared_out(
-    curve: SurfaceCurve, start: float, stop: float, max_bow_height: float, largest_step: float
-) -> Array | None:
-    """Return balanced steps where a few looks at all of them at once are enough, else None.
+    def shared_out(self, start: float, stop: float) -> Array | None:
+        """Return balanced steps where a few looks at all of them at once are enough, else None.
 
-    A step's size is what it uses of the limits. On a circle, and nearly so elsewhere, sizes add up
-    along the curve: their sum tells the number of steps, and steps that share it evenly are
-    balanced.
-    """
-    nodes = np.linspace(start, stop, _count((stop - start) / largest_step) + 1)
-    for trial in range(_SHARINGS):
-        sizes = _sizes(curve, nodes, max_bow_height, largest_step)
-        n = _count(float(sizes.sum()))
-        if trial >= _SHARINGS // 2:
-            n += int(_SPARE * n)
-        if sizes.max() <= 1.0 and len(sizes) <= n:
-            return nodes
-        shared = np.append(0.0, np.cumsum(sizes))
-        nodes = np.interp(np.linspace(0.0, shared[-1], n + 1), shared, nodes)
-        nodes[0], nodes[-1] = start, stop
-    return None
+        A step's size is what it uses of the limits. On a circle, and nearly so elsewhere, sizes add
+        up along the curve: their sum gives the number of steps, and steps that share it evenly are
+        balanced.
+        """
+        nodes = np.linspace(start, stop, _count((stop - start) / self.largest_step) + 1)
+        for trial in range(_SHARINGS):
+            sizes = self._sizes(nodes)
+            n = _count(float(sizes.sum()))
+            if trial >= _SHARINGS // 2:
+                n += int(_SPARE * n)
+            if sizes.max() <= 1.0 and len(sizes) <= n:
+                return nodes
+            shared = np.append(0.0, np.cumsum(sizes))
+            nodes = np.interp(np.linspace(0.0, shared[-1], n + 1), shared, nodes)
+            nodes[0], nodes[-1] = start, stop
+        return None
 
+    def balanced(self, start: float, stop: float) -> Array:
+        """Return the fewest steps, balanced as well as they may be.
 
-def _one_after_another(
-    curve: SurfaceCurve, start: float, stop: float, max_bow_height: float, largest_step: float
-) -> Array:
-    """Return the fewest steps, balanced as well as they may be.
+        The longest possible steps give the number. Then all are made smaller by the same scale as
+        long as the number stays, until the last one, which took what was left over, is like the
+        others.
+        """
+        best = self._longest_steps(start, stop)
+        n = len(best) - 1
+        # n - 1 steps of full length fall short of the end, so n steps of this scale do too
+        low, high = (n - 1) / n, 1.0
+        for _ in range(_BALANCING_TRIALS):
+            fill = self._size(best[-2], best[-1]) / high
+            if fill >= _BALANCED:
+                break
+            # what the last step lacks is shared by all, but for a hair that lets the end be reached
+            scale = high * (n - 1.0 + fill + 0.01) / n
+            if scale <= low:
+                scale = 0.5 * (low + high)
+            smaller = _Stepping(
+                self.curve, scale**2 * self.max_bow_height, scale * self.largest_step
+            )
+            nodes = smaller._longest_steps(start, stop)
+            if len(nodes) <= len(best):
+                best, high = nodes, scale
+            else:
+                low = scale
+        return best
 
-    The longest possible steps give the number. Then all are made smaller by the same scale as long
-    as the number stays, until the last one, which took what was left over, is like the others.
-    """
-    best = _longest_steps(curve, start, stop, max_bow_height, largest_step)
-    n = len(best) - 1
-    # n - 1 steps of full length fall short of the end, so n steps of this scale do too
-    low, high = (n - 1) / n, 1.0
-    for _ in range(_BALANCING_TRIALS):
-        fill = _size(curve, best[-2], best[-1], max_bow_height, largest_step) / high
-        if fill >= _BALANCED:
-            break
-        # what the last step lacks is shared by all, but for a hair that lets the end be reached
-        scale = high * (n - 1.0 + fill + 0.01) / n
-        if scale <= low:
-            scale = 0.5 * (low + high)
-        nodes = _longest_steps(curve, start, stop, scale**2 * max_bow_height, scale * largest_step)
-        if len(nodes) <= len(best):
-            best, high = nodes, scale
-        else:
-            low = scale
-    return best
+    def _longest_steps(self, start: float, stop: float) -> Array:
+        nodes = [start]
+        while nodes[-1] < stop:
+            nodes.append(self._farthest(nodes[-1], stop))
+        return np.array(nodes)
 
+    def _farthest(self, start: float, stop: float) -> float:
+        """Return the end of the longest step from ``start``, ``stop`` at most.
 
-def _longest_steps(
-    curve: SurfaceCurve, start: float, stop: float, max_bow_height: float, largest_step: float
-) -> Array:
-    """Return the arc lengths of points along a curve, each as far from the last as it may be."""
-    nodes = [start]
-    while nodes[-1] < stop:
-        nodes.append(_farthest(curve, nodes[-1], stop, max_bow_height, largest_step))
-    return np.array(nodes)
+        The root of size = 1 is sought by linear interpolation; every third time the bracket is
+        halved, so that it shrinks on any curve.
+        """
+        near, near_size = start, 0.0
+        far = start + self.largest_step
+        if far > stop - _ROUNDING * self.largest_step:
+            far = stop
+        far_size = self._size(start, far)
+        if far_size <= 1.0:
+            return far
+        trial = 0
+        # the measured bow jumps a little where one more node of the curve comes in: there may be
+        # no root
+        while near_size < _LONGEST and far - near > _SEARCHED * (far - start):
+            trial += 1
+            aim = 0.5 * (1.0 + _LONGEST)
+            fraction = (aim - near_size) / (far_size - near_size) if trial % 3 else 0.5
+            end = near + fraction * (far - near)
+            size = self._size(start, end)
+            if size <= 1.0:
+                near, near_size = end, size
+            else:
+                far, far_size = end, size
+        return near
 
+    def _size(self, start: float, end: float) -> float:
+        return float(self._sizes(np.array([start, end]))[0])
 
-def _farthest(
-    curve: SurfaceCurve, start: float, stop: float, max_bow_height: float, largest_step: float
-) -> float:
-    """Return the end of the longest step from ``start``, ``stop`` at most.
+    def _sizes(self, nodes: Array) -> Array:
+        """Return how much of its limits each step uses, 1.0 at a limit; linear on a circle.
 
-    The root of size = 1 is sought by linear interpolation; every third time the bracket is halved,
-    so that it shrinks on any curve.
-    """
-    near, near_size = start, 0.0
-    far = start + largest_step
-    if far > stop - _ROUNDING * largest_step:
-        far = stop
-    far_size = _size(curve, start, far, max_bow_height, largest_step)
-    if far_size <= 1.0:
-        return far
-    trial = 0
-    # the measured bow jumps a little where one more node of the curve comes in: the root may not be
-    while near_size < _LONGEST and far - near > _SEARCHED * (far - start):
-        trial += 1
-        aim = 0.5 * (1.0 + _LONGEST)
-        fraction = (aim - near_size) / (far_size - near_size) if trial % 3 else 0.5
-        end = near + fraction * (far - near)
-        size = _size(curve, start, end, max_bow_height, largest_step)
-        if size <= 1.0:
-            near, near_size = end, size
-        else:
-            far, far_size = end, size
-    return near
-
-
-def _size(
-    curve: SurfaceCurve, start: float, end: float, max_bow_height: float, largest_step: float
-) -> float:
-    return float(_sizes(curve, np.array([start, end]), max_bow_height, largest_step)[0])
+        A hair over the largest step is rounding and not counted.
+        """
+        lengths = np.diff(nodes) / (self.largest_step * (1.0 + 2.0 * _ROUNDING))
+        bows = _bow_heights(self.curve, nodes)
+        return np.maximum(lengths, np.sqrt(bows / (_MEASURED * self.max_bow_height)))
 
 
 def _count(size: float) -> int:
     return max(int(np.ceil(size - _ROUNDING * max(size, 1.0))), 1)
-
-
-def _sizes(curve: SurfaceCurve, nodes: Array, max_bow_height: float, largest_step: float) -> Array:
-    """Return how much of its limits each step uses, 1.0 where one is reached; linear on a circle.
-
-    A hair over the largest step is rounding and not counted.
-    """
-    lengths = np.diff(nodes) / (largest_step * (1.0 + 2.0 * _ROUNDING))
-    return np.maximum(lengths, np.sqrt(_bow_heights(curve, nodes) / (_MEASURED * max_bow_height)))
 
 
 def _bow_heights(curve: SurfaceCurve, nodes: Array) -> Array:
@@ -189,7 +179,7 @@ def _bow_heights(curve: SurfaceCurve, nodes: Array) -> Array:
     inner = own[own.searchsorted(nodes[0], "right") : own.searchsorted(nodes[-1])]
     step = nodes.searchsorted(inner, "right") - 1
     np.maximum.at(away, step, _away(curve.positions(inner) - origins[step], chords[step]))
-    return np.sqrt(away)
+    return np.asarray(np.sqrt(away))
 
 
 def _away(points: Array, chords: Array) -> Array:
@@ -198,4 +188,4 @@ def _away(points: Array, chords: Array) -> Array:
     square = np.maximum(np.sum(chords * chords, axis=-1), np.finfo(float).tiny)
     fraction = np.clip(np.sum(points * chords, axis=-1) / square, 0.0, 1.0)
     away = points - fraction[..., None] * chords
-    return np.sum(away * away, axis=-1)
+    return np.asarray(np.sum(away * away, axis=-1))

@@ -31,7 +31,7 @@ class SurfaceGrid:
 
 
 def sample_grid(surface: NurbsSurface) -> SurfaceGrid:
-    """Return a grid fine enough to tell the curves of a plane apart on any ordinary surface."""
+    """Return a grid fine enough to separate the curves of a plane on any ordinary surface."""
     (u0, v0), (u1, v1) = surface.domain
     u = _lines(np.clip(surface.knots_u, u0, u1), surface.degree_u)
     v = _lines(np.clip(surface.knots_v, v0, v1), surface.degree_v)
@@ -47,12 +47,9 @@ def _lines(knots: Array, degree: int) -> Array:
 
 
 def extent_along(surface: NurbsSurface, grid: SurfaceGrid, direction: Array) -> tuple[float, float]:
-    """Return the least and the largest d . S(u, v) in [m] over a surface.
+    """Return the least and the largest d . S(u, v) in [m] over a surface with its grid.
 
-    Args:
-        surface: The surface.
-        grid: Its grid, where the search starts.
-        direction: Unit direction d, shape (3,).
+    The direction d has unit length, shape (3,).
     """
     lower, upper = surface.domain
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh, winding_number
-from opl.geometry.passes import MachinedSurface, bounding_box
+from opl.geometry.passes import MachinedSurface, bounding_box, longest_side
 
 SMALLEST, LARGEST = 1e-3, 5.0  # [m] size of a part
 _FACTOR = 50.0  # between surface and solid; units differ by 1000 or 25.4
@@ -19,43 +21,58 @@ _DEPTH = 1e-3
 _SAMPLES = 12
 
 
+class SizeError(ValueError):
+    """A surface or a solid has a size or a place that it cannot have.
+
+    Attributes:
+        of: Which of them is to blame.
+    """
+
+    def __init__(self, of: Literal["part", "surface"], message: str) -> None:
+        super().__init__(message)
+        self.of = of
+
+
 def check_sizes(surface: MachinedSurface, part: TriangleMesh) -> None:
     """Refuse sizes that no part has, and a surface that is not on its solid.
 
     Raises:
-        ValueError: If something is too small, too large, or elsewhere; the message begins with
-            ``part`` or ``surface``.
+        SizeError: If something is too small, too large, or elsewhere.
     """
     own = bounding_box(surface)
     solid = np.array([part.vertices.min(axis=0), part.vertices.max(axis=0)])
-    for name, box in (("part", solid), ("surface", own)):
+    boxes: dict[Literal["part", "surface"], Array] = {"part": solid, "surface": own}
+    for of, box in boxes.items():
         size = _size(box)
         if not SMALLEST <= size <= LARGEST:
-            raise ValueError(
-                f"{name}: is {1e3 * size:g} mm long; a part is {1e3 * SMALLEST:g} to "
-                f"{1e3 * LARGEST:g} mm; is the unit right?"
+            raise SizeError(
+                of,
+                f"is {1e3 * size:g} mm long; a part is {1e3 * SMALLEST:g} to "
+                f"{1e3 * LARGEST:g} mm; is the unit right?",
             )
     ratio = _size(own) / _size(solid)
     if not 1.0 / _FACTOR <= ratio <= _FACTOR:
-        raise ValueError(
-            f"surface: is {1e3 * _size(own):g} mm long, the solid in the mesh "
-            f"{1e3 * _size(solid):g} mm; is the unit of one of them wrong?"
+        raise SizeError(
+            "surface",
+            f"is {1e3 * _size(own):g} mm long, the solid in the mesh "
+            f"{1e3 * _size(solid):g} mm; is the unit of one of them wrong?",
         )
     gap = np.maximum(own[0] - solid[1], solid[0] - own[1]).max()
     if gap > 0.05 * _size(solid):
-        raise ValueError(
-            f"surface: lies {1e3 * gap:.4g} mm away from the solid in the mesh; both must be in "
-            "the workpiece frame"
+        raise SizeError(
+            "surface",
+            f"lies {1e3 * gap:.4g} mm away from the solid in the mesh; both must be in "
+            "the workpiece frame",
         )
 
 
 def facing_inward(surface: MachinedSurface, part: TriangleMesh) -> float:
     """Return the part of a surface whose normals point into the solid, 0 to 1.
 
-    Places where the solid lies on both sides of the surface or on neither tell nothing: it is
+    Places where the solid lies on both sides of the surface or on neither do not count: it is
     thinner there than the looks are deep, or stands off the surface.
     """
-    samples = surface.area_samples(_size(bounding_box(surface)) / _SAMPLES)
+    samples = surface.area_samples(longest_side(surface) / _SAMPLES)
     some = np.linspace(0, len(samples.points) - 1, _LOOKS).astype(int)
     points, normals = samples.points[some], samples.normals[some]
     ahead, behind = (

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, interpolate, read_only
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +30,8 @@ class CutterPoints:
     arc_length: Array
 
     def __post_init__(self) -> None:
-        Ts = np.array(self.Ts_workpiece_cutter, dtype=float)
-        pass_index = np.array(self.pass_index, dtype=np.int64)
-        arc_length = np.array(self.arc_length, dtype=float)
+        Ts, arc_length = read_only(self.Ts_workpiece_cutter), read_only(self.arc_length)
+        pass_index = read_only(self.pass_index, np.int64)
         n = len(Ts)
         if Ts.shape != (n, 4, 4) or pass_index.shape != (n,) or arc_length.shape != (n,):
             raise ValueError(
@@ -41,18 +40,27 @@ class CutterPoints:
             )
         if not np.isin(np.diff(pass_index, prepend=-1), (0, 1)).all() or pass_index[:1].any():
             raise ValueError("pass_index: must count up from 0 without a gap")
-        for name, array in (
-            ("Ts_workpiece_cutter", Ts),
-            ("pass_index", pass_index),
-            ("arc_length", arc_length),
-        ):
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        object.__setattr__(self, "Ts_workpiece_cutter", Ts)
+        object.__setattr__(self, "pass_index", pass_index)
+        object.__setattr__(self, "arc_length", arc_length)
 
     def __len__(self) -> int:
         return len(self.pass_index)
 
     @property
+    def link_length(self) -> float:
+        """Return the sum of the straight links from each pass to the next in [m]."""
+        steps = np.linalg.norm(np.diff(self.Ts_workpiece_cutter[:, :3, 3], axis=0), axis=1)
+        return float(steps[np.diff(self.pass_index) != 0].sum())
+
+    @property
     def n_passes(self) -> int:
         """Return the number of passes."""
         return int(self.pass_index[-1]) + 1 if len(self) else 0
+
+    def frames_at(self, place: Array) -> Array:
+        """Return cutter frames at fractional cutter points, shape (..., 4, 4)."""
+        before = np.clip(place.astype(int), 0, len(self) - 1)
+        after = np.minimum(before + 1, len(self) - 1)
+        Ts = self.Ts_workpiece_cutter
+        return interpolate(Ts[before], Ts[after], place - before)

@@ -1,6 +1,6 @@
 """Contact frame 0 of a wheel from points that the robot touched with a calibrated tip.
 
-Each kind of point says how it lies in contact frame 0, where z points into the wheel and x along
+Each kind of point has its place in contact frame 0, where z points into the wheel and x along
 its axle to the left, as seen from the front with y up:
 
     left_edge, right_edge   corner of rim and side, at the height where the part shall touch
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from opl.geometry.frames import Array, inverse, pose, rotation_angle, transform
@@ -30,14 +30,13 @@ KINDS = ("left_edge", "right_edge", "front", "axle", "rim", "left_side", "right_
 DEGREES_OF_FREEDOM = 6
 # what a point may be off before it moves the frame by more than a hundred times as much
 _FEEBLE = 0.01
-MOST_STEPS = 40  # of a fit; from a start within 60 degrees ten are usual
 # [m], [rad] places of the wheel that are no nearer to each other are two
 _OTHER_PLACE = 1e-3
-_WAYS = [f"{how} {axis}" for how in ("turned about", "moved along") for axis in "xyz"]
+_MOTIONS = [f"{how} {axis}" for how in ("turned about", "moved along") for axis in "xyz"]
 
 
 class TouchedError(ValueError):
-    """Touched points do not tell where the wheel is."""
+    """Touched points do not determine where the wheel is."""
 
 
 @dataclass(frozen=True)
@@ -90,21 +89,21 @@ def fit_touched(
     best = int(np.argmin([np.square(residuals).sum() for residuals in off]))
     T_base_contact0, residuals = fits[best], off[best]
     p_contact0 = rows.seen_from(T_base_contact0)
-    # an undetermined frame is told first: what it fits by chance says nothing
+    # an undetermined frame is refused first: that it fits may be chance
     jacobian = rows.jacobian(p_contact0)
     scale = np.array([radius] * 3 + [1.0] * 3)
     _, strength, directions = np.linalg.svd(jacobian / scale)
     if strength[-1] < _FEEBLE:
-        free = _WAYS[int(np.abs(directions[-1]).argmax())]
+        free = _MOTIONS[int(np.abs(directions[-1]).argmax())]
         raise TouchedError(f"the points leave open how far the wheel is {free} of contact frame 0")
     worst = int(np.round(residuals, 9).argmax())  # of equal ones the first
     if residuals[worst] > largest_residual:
-        told = ", ".join(
+        listed = ", ".join(
             f"{label} {1e3 * away:.2f}" for label, away in zip(rows.labels, residuals, strict=True)
         )
         raise TouchedError(
             f"{rows.labels[worst]} is {1e3 * residuals[worst]:.2f} mm from where the other points "
-            f"put it, {1e3 * largest_residual:g} mm allowed; residuals in mm: {told}"
+            f"put it, {1e3 * largest_residual:g} mm allowed; residuals in mm: {listed}"
         )
     for other, residuals_there in zip(fits, off, strict=True):
         apart = max(
@@ -127,49 +126,39 @@ def fit_touched(
 
 
 class _Equations:
-    """What the points say: each row one value, 0 where the frame fits."""
+    """The equations of the points: each row one value, 0 where the frame fits."""
 
     def __init__(
         self, points: Mapping[str, Sequence[Sequence[float]]], width: float, radius: float
     ) -> None:
         self._half = half = width / 2.0
-        # offsets of x, y, z from the place of the point; None where it says nothing
-        self._places: dict[str, tuple[float | None, float | None, float | None]] = {
+        # offsets of x, y, z from the place of the point; None where it is free
+        self._places: dict[str, tuple[float | None, ...]] = {
             "left_edge": (half, 0.0, 0.0),
             "right_edge": (-half, 0.0, 0.0),
             "front": (None, 0.0, 0.0),
             "axle": (None, 0.0, radius),
-            "rim": (None, None, None),
+            "rim": (None, None, None, radius),
             "left_side": (half, None, None),
             "right_side": (-half, None, None),
         }
         self._radius = radius
-        labels: list[str] = []
-        touched: list[Sequence[float]] = []
-        of_point: list[int] = []
-        axis: list[int] = []
-        target: list[float] = []
-        for kind in KINDS:
-            for number, p_base in enumerate(points.get(kind, ()), 1):
-                for k, value in enumerate(self._places[kind]):
-                    if value is not None:
-                        of_point.append(len(labels))
-                        axis.append(k)
-                        target.append(value)
-                if kind == "rim":
-                    of_point.append(len(labels))
-                    axis.append(-1)
-                    target.append(radius)
-                labels.append(f"{kind} {number}")
-                touched.append(p_base)
-        self.labels = tuple(labels)
-        kinds = [label.split()[0] for label in labels]
+        kinds = [kind for kind in KINDS for _ in points.get(kind, ())]
+        numbers = [number for kind in KINDS for number, _ in enumerate(points.get(kind, ()), 1)]
+        self.labels = tuple(f"{kind} {n}" for kind, n in zip(kinds, numbers, strict=True))
         self._on_rim = np.isin(kinds, ("front", "rim"))
         self._on_side = np.isin(kinds, ("left_side", "right_side"))
+        touched = [p_base for kind in KINDS for p_base in points.get(kind, ())]
         self.p_base: Array = np.array(touched, dtype=float).reshape(-1, 3)
-        self.of_point: NDArray[np.intp] = np.array(of_point, dtype=np.intp)
-        self.axis = np.array(axis, dtype=int)
-        self.target = np.array(target, dtype=float)
+        rows = [
+            (point, axis, value)
+            for point, kind in enumerate(kinds)
+            for axis, value in enumerate(self._places[kind])
+            if value is not None
+        ]
+        # axis 3 stands for the distance from the axle
+        self.of_point, self.axis = np.array([row[:2] for row in rows], dtype=int).reshape(-1, 2).T
+        self.target = np.array([value for _, _, value in rows])
 
     @property
     def count(self) -> int:
@@ -180,14 +169,14 @@ class _Equations:
         radial = p_contact0[self.of_point] - [0.0, 0.0, self._radius]
         radial[:, 0] = 0.0
         radial /= np.maximum(np.linalg.norm(radial, axis=1, keepdims=True), 1e-12)
-        return np.where((self.axis < 0)[:, None], radial, np.eye(3)[self.axis])
+        return np.asarray(np.where((self.axis == 3)[:, None], radial, np.eye(4, 3)[self.axis]))
 
     def values(self, p_contact0: Array) -> Array:
         """Return how far each row is from 0 in [m], shape (count,)."""
         p = p_contact0[self.of_point]
         from_axle = np.hypot(p[:, 1], p[:, 2] - self._radius)
-        along = np.take_along_axis(p, np.maximum(self.axis, 0)[:, None], axis=1)[:, 0]
-        return np.where(self.axis < 0, from_axle, along) - self.target
+        measured = np.column_stack([p, from_axle])
+        return np.asarray(measured[np.arange(self.count), self.axis] - self.target)
 
     def jacobian(self, p_contact0: Array) -> Array:
         """Return the change of each value with turns about and moves along x, y, z: (count, 6)."""
@@ -202,17 +191,17 @@ class _Equations:
         """Return how far each point is from its place in [m], shape (n,).
 
         A point on the rim lies within the width, one on a side within the radius. That is no
-        equation, but tells the two sides of a plane apart.
+        equation, but distinguishes the two sides of a plane.
         """
         squares = np.bincount(self.of_point, np.square(self.values(p_contact0)), len(self.labels))
         beside = np.abs(p_contact0[:, 0]) - self._half
         beyond = np.hypot(p_contact0[:, 1], p_contact0[:, 2] - self._radius) - self._radius
         outside = np.select([self._on_rim, self._on_side], [beside, beyond], 0.0)
-        return np.sqrt(squares + np.square(np.maximum(outside, 0.0)))
+        return np.asarray(np.sqrt(squares + np.square(np.maximum(outside, 0.0))))
 
 
 def _starts(rows: _Equations) -> list[Array]:
-    """Return 24 poses to start from: frames along the axes, their origins as the points say."""
+    """Return 24 poses to start from: frames along the axes, their origins from the points."""
     starts = []
     for order, signs in product(
         ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)),
@@ -221,7 +210,7 @@ def _starts(rows: _Equations) -> list[Array]:
         R = np.eye(3)[list(order)] * np.array(signs)[:, None]
         if np.linalg.det(R) < 0.0:
             continue
-        plain = rows.axis >= 0
+        plain = rows.axis < 3
         normals = np.eye(3)[rows.axis[plain]] @ R.T
         wanted = np.einsum("ij,ij->i", normals, rows.p_base[rows.of_point[plain]])
         p = np.linalg.lstsq(normals, wanted - rows.target[plain], rcond=None)[0]
@@ -229,26 +218,14 @@ def _starts(rows: _Equations) -> list[Array]:
     return starts
 
 
-def _fit(rows: _Equations, T_base_contact0: Array) -> Array:
-    """Return the pose that a least-squares fit ends at (Levenberg and Marquardt)."""
-    p_contact0 = rows.seen_from(T_base_contact0)
-    values, damping = rows.values(p_contact0), 1e-3
-    for _ in range(MOST_STEPS):
-        jacobian = rows.jacobian(p_contact0)
-        normal = jacobian.T @ jacobian
-        damped = normal + damping * np.diag(np.diag(normal) + 1e-9)
-        change = -np.linalg.solve(damped, jacobian.T @ values)
+def _fit(rows: _Equations, T_base_start: Array) -> Array:
+    """Return the pose that a least-squares fit ends at."""
+
+    def moved(change: Array) -> Array:
         turn = Rotation.from_rotvec(change[:3]).as_matrix()
-        T_ahead = T_base_contact0 @ pose(turn, change[3:])
-        p_ahead = rows.seen_from(T_ahead)
-        ahead = rows.values(p_ahead)
-        if ahead @ ahead <= values @ values:
-            T_base_contact0, p_contact0, values = T_ahead, p_ahead, ahead
-            damping = max(damping / 10.0, 1e-12)
-            if np.abs(change).max() < 1e-10:
-                break
-        else:
-            damping *= 10.0
-            if damping > 1e9:
-                break
-    return T_base_contact0
+        return T_base_start @ pose(turn, change[3:])
+
+    def values(change: Array) -> Array:
+        return rows.values(rows.seen_from(moved(change)))
+
+    return moved(least_squares(values, np.zeros(6), method="lm", xtol=1e-12, ftol=1e-15).x)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from opl.geometry.curves import SurfaceCurve, clipped
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, read_only
+from opl.geometry.section_curves import FaceCurve
 
 # loops with less than this fraction of the area of all parameters enclose nothing
 _LEAST_AREA = 1e-12
@@ -35,27 +36,21 @@ class Trim:
     def __post_init__(self) -> None:
         loops = []
         for loop in self.loops:
-            own = np.array(loop, dtype=float)
+            own = read_only(loop)
             if own.ndim != 2 or own.shape[1] != 2 or len(own) < 3 or not np.isfinite(own).all():
                 raise ValueError(f"a loop must be three or more (u, v), got shape {own.shape}")
-            own.flags.writeable = False
             loops.append(own)
         object.__setattr__(self, "loops", tuple(loops))
 
     def check_against(self, domain: Array) -> None:
-        """Refuse loops that leave nothing of a surface.
-
-        Args:
-            domain: Smallest and largest (u, v) of the surface, shape (2, 2).
+        """Refuse loops that leave nothing of a surface with a domain, as in `NurbsSurface.domain`.
 
         Raises:
             ValueError: If no loop has an area, or none reaches into the domain.
         """
-        areas = [
-            0.5 * abs(float(np.sum(u * np.roll(v, -1) - np.roll(u, -1) * v)))
-            for u, v in (loop.T for loop in self.loops)
-        ]
-        if not max(areas) > _LEAST_AREA * float(np.ptp(domain, axis=0).prod()):
+        if not max(map(polygon_area, self.loops)) > _LEAST_AREA * float(
+            np.ptp(domain, axis=0).prod()
+        ):
             raise ValueError("trim_loops: enclose no area")
         low, high = (of(np.concatenate(self.loops), axis=0) for of in (np.min, np.max))
         if (low >= domain[1]).any() or (high <= domain[0]).any():
@@ -82,24 +77,22 @@ class Trim:
         return inside.reshape(np.asarray(uv).shape[:-1])
 
 
-def parts_inside(
-    curve: SurfaceCurve, parameters: Callable[[Array], Array], trim: Trim
-) -> Sequence[SurfaceCurve]:
-    """Return the parts of a curve that lie inside a trim, in order.
+def polygon_area(loop: Array) -> float:
+    """Return the area inside a closed polygon in a plane, corners of shape (k, 2)."""
+    x, y = loop.T
+    return 0.5 * abs(float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)))
 
-    Args:
-        curve: The curve.
-        parameters: Its exact (u, v) at arc lengths in [m].
-        trim: What is inside.
-    """
+
+def parts_inside(curve: FaceCurve, trim: Trim) -> Sequence[SurfaceCurve]:
+    """Return the parts of a curve that lie inside a trim, in order."""
     count = int(np.clip(np.ceil(curve.length / _LOOK), 8, _MAX_LOOKS))
     looks = np.linspace(0.0, curve.length, count + 1)
-    inside = trim.contains(parameters(looks))
+    inside = trim.contains(curve.parameters(looks))
     changes = np.flatnonzero(inside[1:] != inside[:-1])
     left, right, state = looks[changes], looks[changes + 1], inside[changes]
     for _ in range(_HALVINGS if len(changes) else 0):
         middle = 0.5 * (left + right)
-        same = trim.contains(parameters(middle)) == state
+        same = trim.contains(curve.parameters(middle)) == state
         left, right = np.where(same, middle, left), np.where(same, right, middle)
     # the side that is inside
     ends = np.where(state, left, right).tolist()

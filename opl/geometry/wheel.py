@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, read_only
 
 MM_PER_M = 1000.0
 
@@ -34,9 +34,7 @@ class ContactWheel:
     T_base_contact0: Array
 
     def __post_init__(self) -> None:
-        T = self.T_base_contact0.copy()
-        T.setflags(write=False)
-        object.__setattr__(self, "T_base_contact0", T)
+        object.__setattr__(self, "T_base_contact0", read_only(self.T_base_contact0))
 
     @property
     def flat_end(self) -> float:
@@ -56,10 +54,7 @@ class ContactWheel:
         """Return the contact frame at contact position t (equations 6 to 13 of the paper).
 
         On the flat the frame slides by -t along x; past +-w/2 it rolls about the edge that it has
-        reached, so the frame is continuous in t.
-
-        Args:
-            t: Contact positions, shape (...).
+        reached, so the frame is continuous in t. Shape (...) gives (..., 4, 4).
         """
         t = np.asarray(t, dtype=float)
         slide = np.clip(t, -self.flat_end, self.flat_end)
@@ -77,12 +72,9 @@ class ContactWheel:
         return self.T_base_contact0 @ self.T_contact0_contact(t)
 
     def signed_distance(self, p_contact0: Array) -> Array:
-        """Return the signed distance of points to the wheel in [m], negative inside.
+        """Return the signed distance of points in contact frame 0, shape (..., 3), to the wheel.
 
-        Exact for the finite cylinder of this width and radius.
-
-        Args:
-            p_contact0: Points in contact frame 0 in [m], shape (..., 3).
+        In [m], negative inside; exact for the finite cylinder of this width and radius.
         """
         beside = np.abs(p_contact0[..., 0]) - self.width / 2.0
         beyond = np.hypot(p_contact0[..., 1], p_contact0[..., 2] - self.radius) - self.radius

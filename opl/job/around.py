@@ -1,25 +1,24 @@
-"""What is around the part: told by the job itself, or by the cell file that it names.
+"""What is around the part: given by the job itself, or by the cell file that it names.
 
-With a cell file, robot, wheel, obstacles and clearance are the cell's to say, and home is either's:
-what two files say would have to be looked up in both.
+With a cell file, robot, wheel, obstacles and clearance stand only there, and home in one of the
+two: what both give would have to be looked up in both.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from opl.cell.joint_limits import JointLimit
-from opl.cell.robot import Robot
 from opl.cell.workcell import PairRules, WorkCell
 from opl.errors import InputError
 from opl.geometry.frames import Array
-from opl.geometry.shapes import Body
+from opl.job import keys
 from opl.job.bodies import MM, bodies_in_si
 from opl.job.cell import Cell, load_cell, robot_of
 from opl.job.file import JobFile
+from opl.job.pairs import NO_PAIRS
+from opl.job.source import Source
 from opl.job.wheel import PlacedWheel
 
 
@@ -28,109 +27,86 @@ class Surroundings:
     """What is around the part: from the job file, or from the cell file that it names.
 
     Attributes:
-        cell: The cell file's content, None without one.
-        robot: The arm.
+        cell: The cell; that of a job without a cell file has no path.
         placed: The wheel, and how it was found.
-        obstacles: What stands around, in the base frame.
-        gripper: Bodies of the cell that are fixed to the flange.
-        clearance: Distance to keep in [m].
         pairs: The pairs that keep another distance, or none.
-        limits: Limits of joints beside the robot's own.
         home: Joint positions in [rad], shape (6,).
-        home_key: File and key that say so.
-        wheel_key: What says where the wheel is.
+        home_key: File and key that give them.
+        wheel_key: What gives the place of the wheel.
     """
 
-    cell: Cell | None
-    robot: Robot
+    cell: Cell
     placed: PlacedWheel
-    obstacles: tuple[Body, ...]
-    gripper: tuple[Body, ...]
-    clearance: float
     pairs: PairRules
-    limits: tuple[JointLimit, ...]
     home: Array
     home_key: str
     wheel_key: str
 
 
-def surroundings(path: Path, file: JobFile) -> Surroundings:
+def surroundings(source: Source, file: JobFile) -> Surroundings:
     """Return what is around the part.
 
     Args:
-        path: The job file.
+        source: The job file or mapping.
         file: Its content.
 
     Raises:
-        InputError: If something is missing, told twice or unusable; names file and key path.
+        InputError: If something is missing, given twice or unusable; names file and key path.
     """
-    return _own(path, file) if file.cell is None else _from_cell(path, file)
+    return _own(source, file) if file.cell is None else _from_cell(source, file.cell, file)
 
 
-def _own(path: Path, file: JobFile) -> Surroundings:
-    """Return what a job without a cell file says of everything but the part."""
-    missing = [key for key in ("robot", "wheel") if getattr(file, key) is None]
-    missing += ["process.home_deg"] if file.process.home_deg is None else []
-    if missing:
-        raise InputError(f"{path}: {missing[0]}", "is missing, and there is no cell file to say it")
+def _own(source: Source, file: JobFile) -> Surroundings:
+    """Return the surroundings in a job without a cell file."""
+    wheel, home = file.wheel, file.process.home_deg
+    for key, value in (("robot", file.robot), ("wheel", wheel), (keys.PROCESS_HOME, home)):
+        if value is None:
+            raise InputError(source.at(key), "is missing, and there is no cell file to say it")
     if file.wheel_name is not None:
-        raise InputError(f"{path}: wheel_name", "goes with a cell file, whose wheels have names")
-    assert file.robot is not None and file.wheel is not None and file.process.home_deg is not None
-    robot = robot_of(path, file.robot)
-    return Surroundings(
-        cell=None,
+        raise InputError(source.at("wheel_name"), "goes with a cell file, whose wheels have names")
+    assert file.robot is not None and wheel is not None and home is not None
+    robot = robot_of(source, file.robot)
+    placed = wheel.in_si(source, "wheel", robot, np.eye(4))
+    cell = Cell(
+        path=None,
         robot=robot,
-        placed=file.wheel.in_si(path, "wheel", robot, np.eye(4)),
-        obstacles=bodies_in_si(path, "obstacles", file.obstacles),
+        T_cell_base=np.eye(4),
+        wheels=(placed,),
+        obstacles=bodies_in_si(source, "obstacles", file.obstacles),
         gripper=(),
         clearance=file.clearance_mm * MM,
-        pairs=PairRules(),
+        pairs=NO_PAIRS,
         limits=(),
-        home=np.deg2rad(file.process.home_deg),
-        home_key=f"{path}: process.home_deg",
-        wheel_key="wheel.T_base_contact0_mm",
+        home=np.deg2rad(home),
     )
+    home_key = source.at(keys.PROCESS_HOME)
+    return Surroundings(cell, placed, PairRules(), np.deg2rad(home), home_key, keys.WHEEL_POSE)
 
 
-_OF_THE_CELL = ("robot", "wheel", "obstacles", "clearance_mm")  # with a cell file, only there
-
-
-def _from_cell(path: Path, file: JobFile) -> Surroundings:
-    """Return what the cell file of a job says of everything but the part."""
-    cell_path = path.parent / str(file.cell)
-    cell = load_cell(cell_path)
-    for key in _OF_THE_CELL:
+def _from_cell(source: Source, cell_name: str, file: JobFile) -> Surroundings:
+    """Return the surroundings in the cell file that a job names."""
+    path = source.file(cell_name)
+    cell = load_cell(path)
+    for key in ("robot", "wheel", "obstacles", keys.CLEARANCE):
         if key in file.model_fields_set:
-            raise InputError(f"{path}: {key}", f"is for the cell file, {cell_path}, to say")
-    of_job = file.process.home_deg
-    if (of_job is None) == (cell.home is None):
-        both = f"is given here and as home_deg in {cell_path}; leave one out"
-        told = both if of_job is not None else f"is missing here, and home_deg in {cell_path}"
-        raise InputError(f"{path}: process.home_deg", told)
-    placed = cell.pick(file.wheel_name, f"{path}: wheel_name")
+            raise InputError(source.at(key), f"is for the cell file, {path}, to say")
+    own_home, home_key = file.process.home_deg, source.at(keys.PROCESS_HOME)
+    if own_home is None:
+        if cell.home is None:
+            raise InputError(home_key, f"is missing here, and home_deg in {path}")
+        home, home_key = cell.home, Source.of_file(path).at("home_deg")
+    elif cell.home is None:
+        home = np.deg2rad(own_home)
+    else:
+        raise InputError(home_key, f"is given here and as home_deg in {path}; leave one out")
+    placed = cell.pick(file.wheel_name, source.at("wheel_name"))
     held = tuple(body.name for body in file.fixture.bodies)
     for place, name in enumerate(held):
-        if name in cell.said.names.known or name in held[:place]:
-            where = f"{path}: fixture.bodies.{place}.name"
-            raise InputError(where, f"{name!r} is something else in {cell_path} or here")
-    return Surroundings(
-        cell=cell,
-        robot=cell.robot,
-        placed=placed,
-        obstacles=cell.around(placed),
-        gripper=cell.gripper,
-        clearance=cell.clearance,
-        pairs=cell.said.rules(placed.name, held),
-        limits=cell.limits,
-        home=np.deg2rad(of_job) if of_job is not None else _given(cell.home),
-        home_key=f"{cell_path}: home_deg" if of_job is None else f"{path}: process.home_deg",
-        wheel_key=f"where the wheel is in {cell_path}",
-    )
-
-
-def _given(home: Array | None) -> Array:
-    assert home is not None
-    return home
+        if name in cell.pairs.names.known or name in held[:place]:
+            where = source.at(f"fixture.bodies.{place}.name")
+            raise InputError(where, f"{name!r} is something else in {path} or here")
+    rules = cell.pairs.rules(placed.name, held)
+    return Surroundings(cell, placed, rules, home, home_key, f"where the wheel is in {path}")
 
 
 def check_home(key: str, cell: WorkCell, home: Array) -> None:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, field_validator, model_validator
 
 from opl.cell.workcell import PART, WHEEL
-from opl.documents import Document
 from opl.errors import InputError
+from opl.files.documents import Document
 from opl.geometry.frames import Array, NotARotationError, from_roll_pitch_yaw, nearest_pose
 from opl.geometry.mesh import TriangleMesh, load_shell
 from opl.geometry.shapes import Body, Box, Cylinder
+from opl.job.source import Source
 
 MM = 1e-3
 # [m] a body outside of this is one in the wrong unit
@@ -46,15 +46,35 @@ def pose_of(matrix_mm: list[list[float]]) -> Array:
 
 
 class BodySection(Document):
-    """A named solid."""
+    """A named solid: exactly one of box_mm, cylinder_mm and mesh."""
 
-    name: Annotated[str, Field(min_length=1)]
-    at_mm: Triple
-    rotation_deg: Triple = Field(default=[0.0, 0.0, 0.0])
-    box_mm: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = None
-    cylinder_mm: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = None
-    mesh: str | None = None
-    mesh_unit: Literal["mm", "m"] | None = None
+    model_config = ConfigDict(title="Body")
+
+    name: Annotated[str, Field(min_length=1)] = Field(
+        description="Name of the body, for messages and pairs."
+    )
+    at_mm: Triple = Field(
+        description="Position of the body's origin (x, y, z) in the frame of its section; the "
+        "origin of a box or a cylinder is its centre."
+    )
+    rotation_deg: Triple = Field(
+        default=[0.0, 0.0, 0.0],
+        description="Roll, pitch, yaw: turns about the fixed axes x, then y, then z.",
+    )
+    box_mm: Annotated[list[Positive], Field(min_length=3, max_length=3)] | None = Field(
+        default=None, description="A box: its edges along x, y and z."
+    )
+    cylinder_mm: Annotated[list[Positive], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="A cylinder: its radius, and its length along z."
+    )
+    mesh: str | None = Field(
+        default=None,
+        description="A mesh file (STL, PLY, OBJ); it need not be closed. Relative names are looked "
+        "up beside this file.",
+    )
+    mesh_unit: Literal["mm", "m"] | None = Field(
+        default=None, description="Unit of the mesh file, which does not carry one."
+    )
 
     @model_validator(mode="after")
     def _one_shape(self) -> BodySection:
@@ -74,11 +94,11 @@ class BodySection(Document):
             raise ValueError("is the name of something else in the cell")
         return name
 
-    def in_si(self, path: Path, key: str) -> Body:
+    def in_si(self, source: Source, key: str) -> Body:
         """Return the body.
 
         Args:
-            path: The file that it stands in.
+            source: Where it stands.
             key: Its place there.
 
         Raises:
@@ -90,24 +110,24 @@ class BodySection(Document):
         elif self.cylinder_mm is not None:
             shape = Cylinder(*(edge * MM for edge in self.cylinder_mm))
         else:
-            shape = self._load(path, key)
+            shape = self._load(source, key)
         origin = np.array(self.at_mm) * MM
         return Body(self.name, shape, from_roll_pitch_yaw(np.deg2rad(self.rotation_deg), origin))
 
-    def _load(self, path: Path, key: str) -> TriangleMesh:
+    def _load(self, source: Source, key: str) -> TriangleMesh:
         try:
-            mesh = load_shell(path.parent / str(self.mesh), self.mesh_unit or "mm")
+            mesh = load_shell(source.file(str(self.mesh)), self.mesh_unit or "mm")
         except InputError as error:
-            raise InputError(f"{path}: {key}.mesh", str(error)) from error
+            raise InputError(source.at(f"{key}.mesh"), str(error)) from error
         size = float(np.ptp(mesh.vertices, axis=0).max())
         if not SMALLEST <= size <= LARGEST:
             raise InputError(
-                f"{path}: {key}.mesh_unit",
+                source.at(f"{key}.mesh_unit"),
                 f"{self.mesh_unit} makes {self.name} {size / MM:g} mm long, which nothing is",
             )
         return mesh
 
 
-def bodies_in_si(path: Path, key: str, bodies: list[BodySection]) -> tuple[Body, ...]:
+def bodies_in_si(source: Source, key: str, bodies: list[BodySection]) -> tuple[Body, ...]:
     """Return the bodies of a list; arguments and errors as of `BodySection.in_si`."""
-    return tuple(body.in_si(path, f"{key}.{place}") for place, body in enumerate(bodies))
+    return tuple(body.in_si(source, f"{key}.{place}") for place, body in enumerate(bodies))

@@ -1,8 +1,8 @@
 """The cell file: what many jobs share. YAML in, values in the robot's base frame out.
 
-Everything that stands in the cell is given in the frame of the cell. ``stands`` says where the
-robot's mounting face is in it, so another arm needs no other line than its name: its base frame
-comes to lie as high above the face as its axis 2. Without ``stands`` the frame of the cell is the
+Everything that stands in the cell is given in the frame of the cell. ``mounting_face`` says where
+the robot's mounting face is in it, so another arm needs no other line than its name: its base frame
+comes to lie as high above the face as its axis 2. Without it the frame of the cell is the
 robot's base frame.
 """
 
@@ -10,70 +10,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
 
-from opl.cell.joint_limits import JointLimit
 from opl.cell.robot import Robot, link_names, load_robot
-from opl.cell.workcell import PART, WHEEL, wheel_solid
-from opl.documents import Document, read
+from opl.cell.workcell import PART, WHEEL, JointLimit, wheel_solid
 from opl.errors import InputError
+from opl.files.documents import read
 from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, pose
 from opl.geometry.shapes import Body
-from opl.job.bodies import MM, BodySection, NotNegative, Six, Triple, bodies_in_si
-from opl.job.pairs import FIXTURE, ROBOT, PairNames, SaidOfPairs, said_of_pairs
-from opl.job.wheel import CellWheelSection, PlacedWheel
-
-CLEARANCE_MM = 5.0
-_TwoNames = Annotated[list[str], Field(min_length=2, max_length=2)]
-
-
-class _Stands(Document):
-    at_mm: Triple
-    rotation_deg: Triple = Field(default=[0.0, 0.0, 0.0])
-
-
-class _Range(Document):
-    lower_deg: float
-    upper_deg: float
-
-    @model_validator(mode="after")
-    def _in_order(self) -> _Range:
-        if self.lower_deg >= self.upper_deg:
-            raise ValueError(f"lower_deg must be below upper_deg {self.upper_deg:g}")
-        return self
-
-
-class _JointLimit(_Range):
-    joint: str
-
-
-class _CoupledLimit(_Range):
-    name: Annotated[str, Field(min_length=1)] | None = None
-    coefficients: Annotated[dict[str, float], Field(min_length=1)]
-
-
-class _PairClearance(Document):
-    pair: _TwoNames
-    clearance_mm: NotNegative
-
-
-class CellFile(Document):
-    """The keys of a cell file; `opl schema --cell` prints them for editors."""
-
-    robot: str
-    stands: _Stands | None = None
-    wheels: Annotated[list[CellWheelSection], Field(min_length=1)]
-    obstacles: list[BodySection] = Field(default=[])
-    gripper: list[BodySection] = Field(default=[])
-    clearance_mm: NotNegative = CLEARANCE_MM
-    clearances: list[_PairClearance] = Field(default=[])
-    allowed_contacts: list[_TwoNames] = Field(default=[])
-    joint_limits: list[_JointLimit] = Field(default=[])
-    coupled_limits: list[_CoupledLimit] = Field(default=[])
-    home_deg: Six | None = None
+from opl.job.bodies import MM, bodies_in_si
+from opl.job.cell_file import CellFile, MountingFace, Range
+from opl.job.pairs import FIXTURE, ROBOT, GivenPairs, PairNames, given_pairs
+from opl.job.source import Source
+from opl.job.wheel import PlacedWheel
 
 
 @dataclass(frozen=True)
@@ -81,26 +31,26 @@ class Cell:
     """What a cell file says, validated, in SI, in the base frame of its robot.
 
     Attributes:
-        path: The file.
+        path: The file, None if a job gives all this itself.
         robot: The arm.
         T_cell_base: Where its base frame is in the frame of the cell, shape (4, 4).
         wheels: The wheels.
         obstacles: What stands around, in the base frame.
         gripper: Bodies fixed to the flange, in the flange frame.
-        clearance: Distance to keep where nothing else is said, in [m].
-        said: What is said of single pairs.
+        clearance: Distance to keep where no pair says otherwise, in [m].
+        pairs: The pairs that may touch or keep another distance.
         limits: Limits of joints and sums of joints beside the robot's own.
         home: Joint positions in [rad], shape (6,); None if the job says them.
     """
 
-    path: Path
+    path: Path | None
     robot: Robot
     T_cell_base: Array
     wheels: tuple[PlacedWheel, ...]
     obstacles: tuple[Body, ...]
     gripper: tuple[Body, ...]
     clearance: float
-    said: SaidOfPairs
+    pairs: GivenPairs
     limits: tuple[JointLimit, ...]
     home: Array | None
 
@@ -137,18 +87,18 @@ def load_cell(path: Path) -> Cell:
     Raises:
         InputError: If anything in it is unusable; names file and key path.
     """
-    file = read(path, CellFile)
-    robot = robot_of(path, file.robot)
-    T_cell_base = _base(file.stands, robot)
+    file, source = read(path, CellFile), Source.of_file(path)
+    robot = robot_of(source, file.robot)
+    T_cell_base = _base(file.mounting_face, robot)
     T_base_cell = inverse(T_cell_base)
-    _require_names(path, file, robot)
+    _require_names(source, file, robot)
     obstacles = tuple(
         Body(body.name, body.shape, T_base_cell @ body.T_parent_body)
-        for body in bodies_in_si(path, "obstacles", file.obstacles)
+        for body in bodies_in_si(source, "obstacles", file.obstacles)
     )
-    gripper = bodies_in_si(path, "gripper", file.gripper)
+    gripper = bodies_in_si(source, "gripper", file.gripper)
     wheels = tuple(
-        wheel.in_si(path, f"wheels.{place}", robot, T_cell_base)
+        wheel.in_si(source, f"wheels.{place}", robot, T_cell_base)
         for place, wheel in enumerate(file.wheels)
     )
     names = PairNames(
@@ -157,11 +107,11 @@ def load_cell(path: Path) -> Cell:
         wheels=tuple(wheel.name for wheel in wheels),
         obstacles=tuple(body.name for body in obstacles),
     )
-    said = said_of_pairs(
-        path,
+    pairs = given_pairs(
+        source,
         names,
         [tuple(pair) for pair in file.allowed_contacts],
-        [(tuple(one.pair), one.clearance_mm * MM) for one in file.clearances],
+        [(tuple(one.pair), one.clearance_mm * MM) for one in file.pair_clearances],
     )
     return Cell(
         path=path,
@@ -171,35 +121,35 @@ def load_cell(path: Path) -> Cell:
         obstacles=obstacles,
         gripper=gripper,
         clearance=file.clearance_mm * MM,
-        said=said,
-        limits=_limits(path, file, robot),
+        pairs=pairs,
+        limits=_limits(source, file, robot),
         home=None if file.home_deg is None else np.deg2rad(file.home_deg),
     )
 
 
-def robot_of(path: Path, name: str) -> Robot:
+def robot_of(source: Source, name: str) -> Robot:
     """Load the robot that a file names.
 
     Raises:
         InputError: If there is none of the name, or its own file is unusable.
     """
     try:
-        return load_robot(name, path.parent)
+        return load_robot(name, source.folder)
     except InputError as error:
-        # what is wrong with a robot's own file is told with that file's name
-        where = f"{path}: robot" if error.where == "robot" else error.where
+        # a fault in a robot's own file is reported with that file's name
+        where = source.at("robot") if error.where == "robot" else error.where
         raise InputError(where, error.message) from error
 
 
-def _base(stands: _Stands | None, robot: Robot) -> Array:
+def _base(face: MountingFace | None, robot: Robot) -> Array:
     """Return T_cell_base: the base frame lies straight above the mounting face."""
-    if stands is None:
+    if face is None:
         return np.eye(4)
-    T_cell_face = from_roll_pitch_yaw(np.deg2rad(stands.rotation_deg), np.array(stands.at_mm) * MM)
+    T_cell_face = from_roll_pitch_yaw(np.deg2rad(face.rotation_deg), np.array(face.at_mm) * MM)
     return T_cell_face @ pose(np.eye(3), np.array([0.0, 0.0, robot.base_height]))
 
 
-def _require_names(path: Path, file: CellFile, robot: Robot) -> None:
+def _require_names(source: Source, file: CellFile, robot: Robot) -> None:
     """Refuse two things of one name: a pair would not tell which is meant."""
     taken = {PART: "the part", ROBOT: "all links of the robot", FIXTURE: "the job's fixture"}
     taken.update(dict.fromkeys(link_names(robot), "a link of the robot"))
@@ -208,18 +158,18 @@ def _require_names(path: Path, file: CellFile, robot: Robot) -> None:
         places += [(f"{key}.{place}.name", body.name) for place, body in enumerate(bodies)]
     for where, name in places:
         if name in taken:
-            raise InputError(f"{path}: {where}", f"{name!r} is the name of {taken[name]} already")
+            raise InputError(source.at(where), f"{name!r} is the name of {taken[name]} already")
         taken[name] = where
     if len(file.wheels) > 1 and WHEEL in (wheel.name for wheel in file.wheels):
         raise InputError(
-            f"{path}: wheels", f"each of several needs a name of its own, other than {WHEEL!r}"
+            source.at("wheels"), f"each of several needs a name of its own, other than {WHEEL!r}"
         )
 
 
-def _limits(path: Path, file: CellFile, robot: Robot) -> tuple[JointLimit, ...]:
+def _limits(source: Source, file: CellFile, robot: Robot) -> tuple[JointLimit, ...]:
     limits = []
     for place, one in enumerate(file.joint_limits):
-        where = f"{path}: joint_limits.{place}"
+        where = source.at(f"joint_limits.{place}")
         joint = _joint(robot, one.joint, f"{where}.joint")
         if one.joint in (other.joint for other in file.joint_limits[:place]):
             raise InputError(f"{where}.joint", f"joint {one.joint} is given twice")
@@ -228,7 +178,7 @@ def _limits(path: Path, file: CellFile, robot: Robot) -> tuple[JointLimit, ...]:
             raise InputError(where, f"leaves nothing of {lower:g} to {upper:g}, the robot's own")
         limits.append(_limit(one.joint, np.eye(6)[joint], one))
     for place, sums in enumerate(file.coupled_limits):
-        where = f"{path}: coupled_limits.{place}.coefficients"
+        where = source.at(f"coupled_limits.{place}.coefficients")
         coefficients = np.zeros(6)
         for name, value in sums.coefficients.items():
             coefficients[_joint(robot, name, where)] = value
@@ -244,7 +194,7 @@ def _joint(robot: Robot, name: str, where: str) -> int:
     return robot.joint_names.index(name)
 
 
-def _limit(name: str, coefficients: Array, limits: _Range) -> JointLimit:
+def _limit(name: str, coefficients: Array, limits: Range) -> JointLimit:
     lower, upper = np.deg2rad([limits.lower_deg, limits.upper_deg])
     return JointLimit(name, coefficients, float(lower), float(upper))
 

@@ -1,22 +1,29 @@
-"""The job file: YAML in, values in SI out. Keys, units and defaults are known only here.
+"""The job file: YAML in, values in SI out. Keys, units and defaults are known only in this room.
 
-Its sections, and the cell file that many jobs share, are the modules named ``job_...``.
+Its sections, and the cell file that many jobs share, are the other modules of the room.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from opl.cell.workcell import WorkCell
-from opl.documents import read
 from opl.errors import InputError
+from opl.files.documents import check, content_of
+from opl.geometry.mesh import TriangleMesh
+from opl.geometry.nurbs import NurbsSurface
 from opl.geometry.passes import MachinedSurface, Passes
+from opl.geometry.patchwork import Face, Patchwork
 from opl.job.around import Surroundings, check_home, surroundings
 from opl.job.bodies import bodies_in_si, pose_of
 from opl.job.file import JobFile
 from opl.job.search import Method, Search
-from opl.motion.timing import Pace
+from opl.job.source import Source
+from opl.job.workpiece import GIVEN
+from opl.motion.process_settings import ProcessSettings
 from opl.program.settings import ProgramSettings
 
 
@@ -25,77 +32,107 @@ class Job:
     """Everything a job file says, validated, in SI.
 
     Attributes:
-        path: The file, as the user named it.
+        source: The file or mapping; for messages.
         name: Name of the program.
         cell: Robot, wheel, part and surroundings.
         around: Where the surroundings come from.
         surface: The surface to be ground, in the workpiece frame.
         passes: How the surface is cut.
-        search: How the path is sought.
-        pace: Speeds, approach and home.
+        search: How the path is searched.
+        process: Speeds, approach and home.
         program: How the program is written.
     """
 
-    path: Path
+    source: Source
     name: str
     cell: WorkCell
     around: Surroundings
     surface: MachinedSurface
     passes: Passes
     search: Search
-    pace: Pace
+    process: ProcessSettings
     program: ProgramSettings
 
 
-def load(path: Path, method: str | None = None) -> Job:
-    """Read and validate a job file and the files it names, relative to its folder.
+def load_job(
+    source: Path | str | Mapping[str, Any],
+    *,
+    folder: Path | None = None,
+    method: str | None = None,
+    surface: NurbsSurface | MachinedSurface | None = None,
+    part: TriangleMesh | None = None,
+) -> Job:
+    """Read and validate a job and the files that it names.
 
     Args:
-        path: The file.
+        source: A job file, or a mapping of the same keys.
+        folder: Where the relative file names in it are looked up; else the folder of the file, or
+            the current folder for a mapping.
         method: Search to use instead of the job's own.
+        surface: The surface to be ground, in the workpiece frame, instead of the one that
+            ``workpiece`` names. The outside of a `NurbsSurface` is that of du x dv.
+        part: The solid for collisions, in the workpiece frame, instead of the one that
+            ``workpiece`` names.
 
     Raises:
-        InputError: If anything in it is unusable; names file and key path.
+        InputError: If anything in it is unusable; names file and key path. Messages on a mapping
+            begin with ``job``.
     """
-    file = read(path, JobFile)
-    around = surroundings(path, file)
-    robot = file.program.robot_as_counted(path, around.robot)
+    content: object
+    if isinstance(source, Mapping):
+        origin, content = Source("job", folder or Path()), dict(source)
+    else:
+        origin, content = Source.of_file(Path(source)), content_of(Path(source))
+        origin = replace(origin, folder=folder or origin.folder)
+    given = {key for key, value in (("surface", surface), ("part", part)) if value is not None}
+    if len(given) == 2 and isinstance(content, dict):
+        content = {"workpiece": {}, **content}  # nothing is left for it to say
+    file = check(content, JobFile, origin.label, {GIVEN: given})
+    if isinstance(surface, NurbsSurface):
+        surface = Patchwork((Face(surface),))
+    return _in_si(file, origin, method, surface, part)
+
+
+def _in_si(file: JobFile, source: Source, method: str | None,
+           surface: MachinedSurface | None, part: TriangleMesh | None) -> Job:  # fmt: skip
+    around = surroundings(source, file)
+    robot = file.program.robot_as_counted(source, around.cell.robot)
     robot = file.process.robot_as_limited(robot)
-    fixture = (*around.gripper, *bodies_in_si(path, "fixture.bodies", file.fixture.bodies))
-    if file.search.max_contact_error_mm <= file.passes.bow_height_mm:
+    fixture = (*around.cell.gripper, *bodies_in_si(source, "fixture.bodies", file.fixture.bodies))
+    if file.search.max_contact_error_mm <= file.passes.max_chord_error_mm:
         raise InputError(
-            f"{path}: search.max_contact_error_mm",
-            f"must be larger than passes.bow_height_mm, which is part of it, "
-            f"got {file.search.max_contact_error_mm:g} and {file.passes.bow_height_mm:g}",
+            source.at("search.max_contact_error_mm"),
+            f"must be larger than passes.max_chord_error_mm, which is part of it, "
+            f"got {file.search.max_contact_error_mm:g} and {file.passes.max_chord_error_mm:g}",
         )
-    part = file.workpiece.load_part(path)
-    surface = file.workpiece.load_surface(path)
-    file.workpiece.check_sizes(path, surface, part)
-    file.workpiece.check_outside(path, surface, part)
+    part = file.workpiece.load_part(source) if part is None else part
+    surface = file.workpiece.load_surface(source) if surface is None else surface
+    file.workpiece.check_sizes(source, surface, part)
+    file.workpiece.check_outside(source, surface, part)
     cell = WorkCell(
         robot=robot,
         wheel=around.placed.wheel,
-        obstacles=around.obstacles,
+        obstacles=around.cell.around(around.placed),
         part=part,
         fixture=fixture,
         T_flange_workpiece=pose_of(file.fixture.T_flange_workpiece_mm),
-        contact_allowance=around.placed.contact_allowance,
-        required_clearance=around.clearance,
+        max_belt_penetration=around.placed.max_belt_penetration,
+        required_clearance=around.cell.clearance,
         pairs=around.pairs,
-        limits=around.limits,
+        limits=around.cell.limits,
     )
     check_home(around.home_key, cell, around.home)
-    search = file.search.in_si(file.passes.bow_height_mm)
+    search = file.search.in_si(file.passes.max_chord_error_mm)
     if method is not None:
         search = replace(search, method=Method(method))
     return Job(
-        path=path,
+        source=source,
         name=file.name,
         cell=cell,
         around=around,
         surface=surface,
-        passes=file.passes.in_si(path, surface, cell.wheel.radius),
+        passes=file.passes.in_si(source, surface, cell.wheel.radius),
         search=search,
-        pace=file.process.in_si(around.home),
-        program=file.program.in_si(path, file.name, robot, around.home),
+        process=file.process.in_si(around.home),
+        program=file.program.in_si(source, file.name, robot, around.home),
     )

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
 
 from opl.cell.workcell import PART, WHEEL, PairRules
 from opl.errors import InputError
+from opl.job.source import Source
 
 ROBOT = "robot"  # every link
 FIXTURE = "fixture"  # every body of the job's own fixture
 
 Names = tuple[str, ...]
-Said = tuple[Names, float | None]  # None: may touch
+Given = tuple[Names, float | None]  # None: may touch
 
 
 @dataclass(frozen=True)
@@ -60,21 +60,21 @@ class PairNames:
 
 
 @dataclass(frozen=True)
-class SaidOfPairs:
-    """What a cell file says of pairs, by its own names.
+class GivenPairs:
+    """The pairs that a cell file gives, by its own names.
 
     Attributes:
         names: What there is to be named.
-        said: Pairs and the distance to keep between them in [m], None if they may touch.
+        given: Pairs and the distance to keep between them in [m], None if they may touch.
     """
 
     names: PairNames
-    said: tuple[Said, ...]
+    given: tuple[Given, ...]
 
     def rules(self, wheel: str, fixture: Names) -> PairRules:
-        """Return the rules by the names that collisions are told by.
+        """Return the rules by the names that collisions are reported with.
 
-        What is said of a single pair goes before what is said of all links or the whole fixture.
+        A single pair goes before one of all links or of the whole fixture.
 
         Args:
             wheel: The wheel that is picked.
@@ -82,7 +82,7 @@ class SaidOfPairs:
         """
         names = replace(self.names, fixture=fixture)
         needed: dict[frozenset[str], float | None] = {}
-        for pair, distance in sorted(self.said, key=lambda said: is_single(said[0])):
+        for pair, distance in sorted(self.given, key=lambda one: is_single(one[0])):
             for both in product(*map(names.meant, pair)):
                 needed[frozenset(WHEEL if name == wheel else name for name in both)] = distance
         return PairRules(
@@ -91,55 +91,58 @@ class SaidOfPairs:
         )
 
 
+NO_PAIRS = GivenPairs(PairNames((), (), (), ()), ())
+
+
 def is_single(pair: Names) -> bool:
     """Return whether both names stand for one body each."""
     return not {ROBOT, FIXTURE} & set(pair)
 
 
-def said_of_pairs(
-    path: Path,
+def given_pairs(
+    source: Source,
     names: PairNames,
     allowed: Sequence[Names],
     clearances: Sequence[tuple[Names, float]],
-) -> SaidOfPairs:
-    """Check what a cell file says of pairs.
+) -> GivenPairs:
+    """Check the pairs of a cell file.
 
     Args:
-        path: The cell file.
+        source: The cell file or mapping.
         names: What there is to be named.
         allowed: Of ``allowed_contacts``.
-        clearances: Of ``clearances``, in [m].
+        clearances: Of ``pair_clearances``, in [m].
 
     Raises:
         InputError: If a name is unknown, or a pair is given twice or makes no sense.
     """
-    said: list[tuple[str, Names, float | None]] = [
+    given: list[tuple[str, Names, float | None]] = [
         (f"allowed_contacts.{place}", pair, None) for place, pair in enumerate(allowed)
     ]
-    said += [
-        (f"clearances.{place}.pair", pair, distance)
+    given += [
+        (f"pair_clearances.{place}.pair", pair, distance)
         for place, (pair, distance) in enumerate(clearances)
     ]
     seen: dict[frozenset[str], str] = {}
-    for key, pair, distance in said:
-        where = f"{path}: {key}"
+    for key, pair, distance in given:
+        where = source.at(key)
         for name in pair:
             if name not in names.known:
                 known = ", ".join(names.known)
                 raise InputError(where, f"no body {name!r} in the cell; have: {known}")
-        told, fault = " and ".join(pair), ""
+        fault = ""
         if frozenset(pair) in seen:
             fault = f"are given in {seen[frozenset(pair)]} already"
         elif pair[0] == pair[1]:
             fault = "are one and the same"
         elif distance is None and PART in pair and set(pair) & set(names.wheels):
-            fault = "how deep a part may sink into the belt is the wheel's contact_allowance_mm"
+            fault = "how deep a part may sink into the belt is the wheel's max_belt_penetration_mm"
         elif distance is not None and is_single(pair) and not names.move_apart(*pair):
             fault = (
                 "do not move against each other, or share a bearing: no distance between them is "
                 "looked at"
             )
         if fault:
-            raise InputError(where, f"{told}: {fault}")
+            raise InputError(where, f"{' and '.join(pair)}: {fault}")
         seen[frozenset(pair)] = key
-    return SaidOfPairs(names, tuple((pair, distance) for _, pair, distance in said))
+    return GivenPairs(names, tuple((pair, distance) for _, pair, distance in given))

@@ -2,109 +2,150 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from opl.cell.robot import Robot
 from opl.cell.spherical_wrist import SphericalWristArm
-from opl.documents import Document
-from opl.errors import InputError, OplError
-from opl.geometry.frames import Array, nearest_pose
-from opl.job.bodies import Matrix
-from opl.program.actions import Action, Actions, Call, Dwell, Remark, SetOutput, WaitInput
+from opl.errors import InputError, OplError, SettingError
+from opl.files.documents import Document
+from opl.geometry.frames import Array
+from opl.job import keys
+from opl.job.actions import ActionSection
+from opl.job.bodies import Matrix, pose_of
+from opl.job.refusals import keys_named
+from opl.job.source import Source
+from opl.program.actions import Actions
+from opl.program.export import try_out
 from opl.program.posts import Post, find_post, known_posts
-from opl.program.pulses import require_accepted, require_known
 from opl.program.ratios import with_ratios
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
-from opl.program.write import try_out
 
 _MAY_COUNT_PULSES = ("Yaskawa", "unknown")  # makers
+_YASKAWA_ONLY = (
+    *("positions", "user_frame"),
+    *("position_levels", "acceleration_percent", "deceleration_percent"),
+)
 
-_Signal = Annotated[int, Field(ge=0)]
-_Seconds = Annotated[float, Field(gt=0.0)]
 _Level = Annotated[int, Field(ge=0, le=8)]
-_Percent = Annotated[int, Field(ge=1, le=100)]
+_Percent = Annotated[int, Field(ge=1, le=100, json_schema_extra={"unit": "%"})]
 
 
-class _Action(Document):
-    """One line of a list of actions: exactly one of its main keys."""
+class _PositionLevels(Document):
+    """Position level (PL) of each kind of move: how far its corners may be rounded.
 
-    comment: str | None = None
-    output: _Signal | None = None
-    wait_input: _Signal | None = None
-    state: bool | None = None
-    timeout_s: _Seconds | None = None
-    dwell_s: _Seconds | None = None
-    call: str | None = None
+    At 0 the robot stops at the position, at 8 it rounds most.
+    """
 
-    @model_validator(mode="after")
-    def _one_action(self) -> _Action:
-        main = ("comment", "output", "wait_input", "dwell_s", "call")
-        given = [key for key in main if getattr(self, key) is not None]
-        if len(given) != 1:
-            raise ValueError(f"needs exactly one of {', '.join(main)}")
-        signal = given[0] in ("output", "wait_input")
-        if signal != (self.state is not None):
-            raise ValueError("state (on or off) goes with output and wait_input, and only there")
-        if self.timeout_s is not None and given[0] != "wait_input":
-            raise ValueError("timeout_s goes with wait_input only")
-        return self
+    model_config = ConfigDict(title="Position levels")
+    renamed: ClassVar[Mapping[str, str]] = {"air": "free_move"}
 
-    def in_si(self) -> Action:
-        if self.comment is not None:
-            return Remark(self.comment)
-        if self.output is not None:
-            return SetOutput(self.output, bool(self.state))
-        if self.wait_input is not None:
-            return WaitInput(self.wait_input, bool(self.state), self.timeout_s)
-        if self.dwell_s is not None:
-            return Dwell(self.dwell_s)
-        return Call(str(self.call))
-
-
-class _Levels(Document):
-    on_wheel: _Level = 1
-    lead: _Level = 1
-    air: _Level = 1
+    on_wheel: _Level = Field(default=1, description="While grinding.")
+    lead: _Level = Field(default=1, description="Approach and retract.")
+    free_move: _Level = Field(default=1, description="From and to home, and between passes.")
 
 
 class _Percents(Document):
-    on_wheel: _Percent | None = None
-    lead: _Percent | None = None
-    air: _Percent | None = None
+    """A ramp for each kind of move, in percent of the controller's own; else the controller's."""
+
+    model_config = ConfigDict(title="Ramp percents")
+    renamed: ClassVar[Mapping[str, str]] = {"air": "free_move"}
+
+    on_wheel: _Percent | None = Field(default=None, description="While grinding.")
+    lead: _Percent | None = Field(default=None, description="Approach and retract.")
+    free_move: _Percent | None = Field(
+        default=None, description="From and to home, and between passes."
+    )
 
     def in_si(self) -> ByKind:
-        return ByKind(self.on_wheel, self.lead, self.air)
+        return ByKind(self.on_wheel, self.lead, self.free_move)
 
 
 class _UserFrame(Document):
-    number: Annotated[int, Field(ge=1)]
-    T_base_user_mm: Matrix
+    """A user frame as it is set on the controller."""
+
+    model_config = ConfigDict(title="User frame")
+
+    number: Annotated[int, Field(ge=1)] = Field(description="Number of the user frame.")
+    T_base_user_mm: Matrix = Field(
+        description="Pose of the user frame in the robot's base frame, 4x4 with its origin in mm."
+    )
+
+    def in_si(self) -> UserFrame:
+        return UserFrame(self.number, pose_of(self.T_base_user_mm))
 
 
 class ProgramSection(Document):
-    """The keys of the section ``program``."""
+    """The controller, and how the program is written."""
 
-    controller: str = "DX200"
-    tool: Annotated[int, Field(ge=0)] = 0
-    T_flange_tool_mm: Matrix | None = None
-    motion: Literal["joint", "straight"] = "joint"
-    positions: Literal["pulses", "base", "robot", "user"] = "pulses"
-    user_frame: _UserFrame | None = None
-    pulse_ratios: str | None = None
-    accept_unverified_pulses: list[str] = Field(default=[])
-    levels: _Levels = _Levels()
-    acceleration_percent: _Percents = _Percents()
-    deceleration_percent: _Percents = _Percents()
-    comment: str | None = None
-    at_start: list[_Action] = Field(default=[])
-    before_pass: list[_Action] = Field(default=[])
-    after_pass: list[_Action] = Field(default=[])
-    at_end: list[_Action] = Field(default=[])
-    template: str | None = None
+    model_config = ConfigDict(title="Program")
+    renamed: ClassVar[Mapping[str, str]] = {"levels": "position_levels"}
+
+    controller: str = Field(
+        default="DX200",
+        description="A Yaskawa controller (NX100, DX100, DX200, YRC1000), another language (RAPID, "
+        "KRL, FANUC, URSCRIPT), or a post of your own.",
+    )
+    tool: Annotated[int, Field(ge=0)] = Field(
+        default=0, description="Number of the tool that positions are written for."
+    )
+    T_flange_tool_mm: Matrix | None = Field(
+        default=None,
+        description="Pose of that tool in the flange frame as it is set on the controller, 4x4 "
+        "with its origin in mm; else the flange itself.",
+    )
+    motion: Literal["joint", "straight"] = Field(
+        default="joint",
+        description="Moves on the wheel, approach and retract as joint moves, or straight where "
+        "that stays near the verified path.",
+    )
+    positions: Literal["pulses", "base", "robot", "user"] = Field(
+        default="pulses",
+        description="Positions as encoder pulses, or as poses in the base, robot or user frame. "
+        "For Yaskawa controllers.",
+    )
+    user_frame: _UserFrame | None = Field(
+        default=None, description="The frame of `positions: user`; needed there, and only there."
+    )
+    pulse_ratios: str | None = Field(
+        default=None,
+        description="File with the pulse ratios of your robot, from `opl robots import-params`; "
+        "else those of the robot's data.",
+    )
+    accept_unverified_pulses: list[str] = Field(
+        default=[],
+        description="Names of joints whose pulse ratios nobody has verified and you accept.",
+    )
+    position_levels: _PositionLevels = Field(
+        default=_PositionLevels(),
+        description="Position level (PL) of each kind of move. For Yaskawa controllers.",
+    )
+    acceleration_percent: _Percents = Field(
+        default=_Percents(),
+        description="Acceleration (ACC) of each kind of move. For Yaskawa controllers.",
+    )
+    deceleration_percent: _Percents = Field(
+        default=_Percents(),
+        description="Deceleration (DEC) of each kind of move. For Yaskawa controllers.",
+    )
+    comment: str | None = Field(default=None, description="A line about the program, in its head.")
+    at_start: list[ActionSection] = Field(
+        default=[], description="Actions at home, before anything else."
+    )
+    before_pass: list[ActionSection] = Field(
+        default=[], description="Actions in front of the wheel, before each approach."
+    )
+    after_pass: list[ActionSection] = Field(
+        default=[], description="Actions in front of the wheel, after each retract."
+    )
+    at_end: list[ActionSection] = Field(default=[], description="Actions at home, at the end.")
+    template: str | None = Field(
+        default=None,
+        description="A template of your own for the layout of the program, relative to this file.",
+    )
 
     @model_validator(mode="after")
     def _fits(self) -> ProgramSection:
@@ -118,7 +159,7 @@ class ProgramSection(Document):
             )
         return self
 
-    def robot_as_counted(self, path: Path, robot: Robot) -> Robot:
+    def robot_as_counted(self, source: Source, robot: Robot) -> Robot:
         """Return the robot with the pulse ratios and soft limits that the job names.
 
         Raises:
@@ -127,15 +168,15 @@ class ProgramSection(Document):
         if self.pulse_ratios is None:
             return robot
         try:
-            return with_ratios(robot, path.parent / self.pulse_ratios)
+            return with_ratios(robot, source.file(self.pulse_ratios))
         except InputError as error:
-            raise InputError(f"{path}: program.pulse_ratios", str(error)) from error
+            raise InputError(source.at(keys.PROGRAM_PULSE_RATIOS), str(error)) from error
 
-    def in_si(self, path: Path, name: str, robot: Robot, home: Array) -> ProgramSettings:
+    def in_si(self, source: Source, name: str, robot: Robot, home: Array) -> ProgramSettings:
         """Return the settings, tried out on a program that only goes home.
 
         Args:
-            path: The job file.
+            source: The job file or mapping.
             name: The program's name.
             robot: Whose program.
             home: Joint positions in [rad], shape (6,).
@@ -143,81 +184,60 @@ class ProgramSection(Document):
         Raises:
             InputError: If something in it is unknown, or the controller does not take it.
         """
-        post = find_post(self.controller, f"{path}: program.controller")
-        self._require_possible(path, post, robot)
-        where = f"{path}: program.accept_unverified_pulses"
-        for joint in self.accept_unverified_pulses:
-            if joint not in robot.joint_names:
-                known = ", ".join(robot.joint_names)
-                raise InputError(where, f"no such joint {joint!r}; have: {known}")
-        if post.counts_pulses and self.positions == "pulses":
-            require_known(robot, f"{path}: program.pulse_ratios")
-            require_accepted(robot.unverified_pulses, self.accept_unverified_pulses, where)
-        settings = self._settings(path)
-        try:
-            try_out(name, home, robot, settings)
-        except OplError as error:
-            raise InputError(str(path), str(error)) from error
+        with keys_named(source):
+            self._require_possible(source, find_post(self.controller), robot)
+            for joint in self.accept_unverified_pulses:
+                if joint not in robot.joint_names:
+                    known = ", ".join(robot.joint_names)
+                    raise SettingError("accepted_pulses", f"no such joint {joint!r}; have: {known}")
+            settings = self._settings(source)
+            try:
+                try_out(name, home, robot, settings)
+            except SettingError:
+                raise
+            except OplError as error:
+                raise InputError(source.label, str(error)) from error
         return settings
 
-    def _settings(self, path: Path) -> ProgramSettings:
-        levels = self.levels
-        frame = self.user_frame
+    def _settings(self, source: Source) -> ProgramSettings:
+        levels, frame, tool = self.position_levels, self.user_frame, self.T_flange_tool_mm
+        actions = (self.at_start, self.before_pass, self.after_pass, self.at_end)
         return ProgramSettings(
             controller=self.controller,
             tool=self.tool,
-            T_flange_tool=_pose(self.T_flange_tool_mm),
+            T_flange_tool=np.eye(4) if tool is None else pose_of(tool),
             motion=MotionForm(self.motion),
             positions=PositionForm(self.positions),
-            user_frame=None
-            if frame is None
-            else UserFrame(frame.number, _pose(frame.T_base_user_mm)),
-            levels=ByKind(levels.on_wheel, levels.lead, levels.air),
+            user_frame=None if frame is None else frame.in_si(),
+            levels=ByKind(levels.on_wheel, levels.lead, levels.free_move),
             acceleration=self.acceleration_percent.in_si(),
             deceleration=self.deceleration_percent.in_si(),
-            actions=Actions(
-                *(
-                    tuple(action.in_si() for action in some)
-                    for some in (self.at_start, self.before_pass, self.after_pass, self.at_end)
-                )
-            ),
+            actions=Actions(*(tuple(action.in_si() for action in some) for some in actions)),
             accepted_pulses=tuple(self.accept_unverified_pulses),
             title=self.comment,
-            template=None if self.template is None else path.parent / self.template,
+            template=None if self.template is None else source.file(self.template),
         )
 
-    def _require_possible(self, path: Path, post: Post, robot: Robot) -> None:
+    def _require_possible(self, source: Source, post: Post, robot: Robot) -> None:
         """Refuse another maker's arm, and keys that the post would pass over in silence."""
         if post.counts_pulses:
             if robot.missing_pulses and robot.maker not in _MAY_COUNT_PULSES:
+                others = [name for name in known_posts() if not find_post(name).counts_pulses]
                 raise InputError(
-                    f"{path}: program.controller",
+                    source.at(keys.PROGRAM_CONTROLLER),
                     f"{self.controller} counts pulses, of which {robot.title} (robot: "
                     f"{robot.name}, made by {robot.maker}) has none; name the controller of that "
-                    f"arm: {', '.join(_without_pulses())}",
+                    f"arm: {', '.join(others)}",
                 )
             if self.positions != "pulses" and not isinstance(robot.arm, SphericalWristArm):
                 raise InputError(
-                    f"{path}: program.positions",
-                    f"must be pulses: poses of {self.controller} name a posture as that of an arm "
-                    f"with a spherical wrist, which {robot.title} has not",
+                    source.at("program.positions"),
+                    f"must be pulses: poses of {self.controller} name a configuration as that of "
+                    f"an arm with a spherical wrist, which {robot.title} has not",
                 )
             return
-        own = ("positions", "user_frame", "levels", "acceleration_percent", "deceleration_percent")
-        for key in own:
+        for key in _YASKAWA_ONLY:
             if key in self.model_fields_set:
                 raise InputError(
-                    f"{path}: program.{key}", f"is for Yaskawa controllers, not for {post.title}"
+                    source.at(f"program.{key}"), f"is for Yaskawa controllers, not for {post.title}"
                 )
-
-
-def _without_pulses() -> list[str]:
-    return [name for name in known_posts() if not find_post(name).counts_pulses]
-
-
-def _pose(matrix_mm: list[list[float]] | None) -> Array:
-    if matrix_mm is None:
-        return np.eye(4)
-    matrix = np.array(matrix_mm)
-    matrix[:3, 3] *= 1e-3
-    return nearest_pose(matrix)

@@ -1,26 +1,65 @@
-"""Refusals of a planned path in words that name the keys of the job."""
+"""Refusals of the rooms below, which know no keys, in words that name the keys of the job."""
 
 from __future__ import annotations
 
-from opl.errors import NoPathError
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from opl.errors import (
+    InputError,
+    NoPathError,
+    OplError,
+    PassTimeError,
+    SettingError,
+    TimeLawError,
+    UnsafeError,
+)
+from opl.job import keys
+from opl.job.source import Source
 from opl.motion.feed import SlowStretch
-from opl.motion.timing import Pace
+from opl.motion.process_settings import ProcessSettings
 
 
-def dwell_refusal(stretches: tuple[SlowStretch, ...], pace: Pace) -> NoPathError | None:
+@contextmanager
+def keys_named(source: Source) -> Iterator[None]:
+    """Name file and keys in what is refused while a motion is timed or a program is written.
+
+    Args:
+        source: The job file or mapping.
+
+    Raises:
+        InputError: Instead of a `SettingError`.
+        OplError: Instead of a `PassTimeError`; names the keys that help.
+        UnsafeError: Instead of a `TimeLawError`; names the key that helps.
+    """
+    try:
+        yield
+    except SettingError as error:
+        raise InputError(source.at(keys.OF_PROGRAM[error.where]), error.message) from error
+    except PassTimeError as error:
+        advice = f"raise {keys.PROCESS_FEED}, or write {keys.PROGRAM_MOTION}: straight"
+        raise OplError(f"{error}; {advice}") from error
+    except TimeLawError as error:
+        advice = f"raise {keys.PROCESS_MAX_ACCELERATION} if the robot can do more"
+        raise UnsafeError(f"{error}; {advice}") from error
+
+
+def dwell_refusal(
+    stretches: tuple[SlowStretch, ...], process: ProcessSettings
+) -> NoPathError | None:
     """Return why a path is refused on which the belt would dwell too long, None if it is not.
 
     Args:
         stretches: Where the path is slower than the feed.
-        pace: For the longest dwell allowed.
+        process: For the longest dwell allowed.
     """
-    too_long = [one for one in stretches if one.dwell > pace.max_dwell]
+    too_long = [one for one in stretches if one.dwell > process.max_dwell]
     if not too_long:
         return None
     return NoPathError(
-        f"the belt would dwell on one spot for more than {pace.max_dwell:g} s beyond the time at "
-        "the feed (process.max_dwell_s); raise process.contact_speed or lower process.feed_mm_s, "
-        "or let the contact move less (search.weights.contact)",
+        f"the belt would dwell on one spot for more than {process.max_dwell:g} s beyond the time "
+        f"at the feed ({keys.PROCESS_MAX_DWELL}); raise {keys.PROCESS_CONTACT_SPEED} or lower "
+        f"{keys.PROCESS_FEED}, or let the contact move less ({keys.SEARCH_CONTACT_WEIGHT})",
         [
             f"pass {one.pass_index + 1}, cutter point {one.dwell_at:.2f}: {one.dwell:.2f} s"
             for one in too_long

@@ -1,30 +1,26 @@
-"""The search and process sections of a job file: how the path is sought, how fast it is run."""
+"""The section ``search`` of a job file: how the path is searched."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import Enum
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
-from opl.cell.robot import Robot
-from opl.documents import Document
-from opl.geometry.frames import Array
-from opl.motion.timing import Pace
-from opl.planning.optimal import OptimalSettings
+from opl.files.documents import Document
+from opl.job.bodies import MM, NotNegative, Positive
 from opl.planning.costs import CostWeights, ObjectiveWeights
 from opl.planning.filling import Interpolation
-from opl.planning.starts import Start
+from opl.planning.multi_start import Start
+from opl.planning.optimal import OptimalSettings
 
-MM = 1e-3
+# contact positions are in mm on the wheel's flat and in degrees of roll about its edges
+_BeltUnits = Annotated[float, Field(gt=0.0, json_schema_extra={"unit": "mm or deg"})]
 MAX_JOINT_STEP = np.deg2rad(15.0)  # between adjacent nodes; more is a jump through a singularity
 
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
-Six = Annotated[list[float], Field(min_length=6, max_length=6)]
-SixPositive = Annotated[list[Positive], Field(min_length=6, max_length=6)]
 SixNotNegative = Annotated[list[NotNegative], Field(min_length=6, max_length=6)]
 
 
@@ -45,22 +41,50 @@ class Objective(str, Enum):
 
 
 class WeightsSection(Document):
-    """What a track is charged for, in radians of joint travel."""
+    """Costs of a path inside the box of least joint range sum, in radians of joint travel."""
 
-    joints: SixNotNegative = Field(default=[1.0] * 6)
-    contact: NotNegative = 0.01
-    limits: NotNegative = 0.05
-    singularities: NotNegative = 0.05
-    push_away_mm: NotNegative = 10.0
-    push_away: NotNegative = 0.02
+    model_config = ConfigDict(title="Cost weights")
+    renamed: ClassVar[Mapping[str, str]] = {
+        "push_away_mm": "extra_clearance_mm",
+        "push_away": "extra_clearance",
+    }
+
+    joints: SixNotNegative = Field(
+        default=[1.0] * 6, description="Cost of each radian that a joint turns, by joint."
+    )
+    contact: NotNegative = Field(
+        default=0.01,
+        description="Cost of each mm or degree that the contact position moves on the wheel.",
+    )
+    limits: NotNegative = Field(
+        default=0.05,
+        description="Cost of a node at a joint limit; falls to 0 at 10 degrees from it.",
+    )
+    singularities: NotNegative = Field(
+        default=0.05, description="Cost of a node in a singularity; falls to 0 away from it."
+    )
+    extra_clearance_mm: NotNegative = Field(
+        default=10.0,
+        description="A node with less clearance than this beyond the required one is charged; 0 "
+        "charges none.",
+    )
+    extra_clearance: NotNegative = Field(
+        default=0.02, description="Cost of a node with less extra clearance than that."
+    )
 
 
 class ObjectiveWeightsSection(Document):
-    """What the weighted objective charges: per radian of range sum and of travel, per second."""
+    """Weights of the objective `weighted`; at least one must be above 0."""
 
-    range: NotNegative = 1.0
-    travel: NotNegative = 0.1
-    time: NotNegative = 0.0
+    model_config = ConfigDict(title="Objective weights")
+
+    range: NotNegative = Field(
+        default=1.0, description="Weight of each radian of the joint range sum."
+    )
+    travel: NotNegative = Field(
+        default=0.1, description="Weight of each radian that a joint turns on the wheel."
+    )
+    time: NotNegative = Field(default=0.0, description="Weight of each second on the wheel.")
 
     @model_validator(mode="after")
     def _not_nothing(self) -> ObjectiveWeightsSection:
@@ -70,23 +94,70 @@ class ObjectiveWeightsSection(Document):
 
 
 class SearchSection(Document):
-    """How the path is sought."""
+    """How the path is searched.
 
-    method: Literal["recursive", "optimal"] = "optimal"
-    objective: Literal["range", "travel", "time", "weighted"] = "range"
-    objective_weights: ObjectiveWeightsSection = ObjectiveWeightsSection()
-    start: Literal["best", "nearest"] = "best"
-    contact_positions: Annotated[int, Field(ge=2)]
-    max_contact_step: Positive
-    max_contact_error_mm: Positive = 0.1
-    max_contact_change: Positive = 100.0
-    widen_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 0.1
-    seconds: Positive = 60.0
-    refine_tolerance_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 0.1
-    weights: WeightsSection = WeightsSection()
+    A contact position says where on the wheel a point is ground: in mm across the flat, then in
+    degrees of roll about the edge.
+    """
 
-    def in_si(self, bow_height_mm: float) -> Search:
-        """Return the section's values; the bow height is part of the contact error allowed."""
+    model_config = ConfigDict(title="Search")
+    renamed: ClassVar[Mapping[str, str]] = {
+        "widen_percent": "range_tolerance_percent",
+    }
+
+    method: Literal["recursive", "optimal"] = Field(
+        default="optimal",
+        description="`optimal` finds the best path there is, with a proven bound; `recursive` is "
+        "the search of Zhang et al. (2019).",
+    )
+    objective: Literal["range", "travel", "time", "weighted"] = Field(
+        default="range",
+        description="What the optimal method makes small: the joint range sum, the joint travel, "
+        "the time on the wheel, or a weighted sum of the three.",
+    )
+    objective_weights: ObjectiveWeightsSection = Field(
+        default=ObjectiveWeightsSection(), description="Weights of the objective `weighted`."
+    )
+    start: Literal["best", "nearest"] = Field(
+        default="best",
+        description="Start node of the recursive method: the best of all, or the one nearest to "
+        "home.",
+    )
+    contact_positions: Annotated[int, Field(ge=2)] = Field(
+        description="Number of contact positions that each cutter point may have on the wheel, "
+        "evenly spaced."
+    )
+    max_contact_step: _BeltUnits = Field(
+        description="Largest change of the contact position between neighbouring positions of the "
+        "path; more positions are put in between to keep it.",
+    )
+    max_contact_error_mm: Positive = Field(
+        default=0.1,
+        description="Largest distance of the ground point from where it touches the wheel, between "
+        "two positions of the path as well; larger than passes.max_chord_error_mm, which is part "
+        "of it.",
+    )
+    max_contact_change: _BeltUnits = Field(
+        default=100.0,
+        description="Largest change of the contact position between neighbouring cutter points.",
+    )
+    range_tolerance_percent: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
+        default=0.1,
+        description="How far the joint range sum may exceed its lower bound for the sake of a "
+        "smoother path.",
+    )
+    max_subproblems: Annotated[int, Field(ge=1)] = Field(
+        default=4000,
+        description="Subproblems of the proof of the least joint range sum that are looked at, at "
+        "the most.",
+    )
+    weights: WeightsSection = Field(
+        default=WeightsSection(),
+        description="Costs of a path where the joint range sum leaves a choice.",
+    )
+
+    def in_si(self, chord_error_mm: float) -> Search:
+        """Return the section's values; the chord error is part of the contact error allowed."""
         weights = self.weights
         costs = CostWeights(
             joint_weights=np.array(weights.joints),
@@ -94,8 +165,8 @@ class SearchSection(Document):
             time_weight=0.0,
             limit_weight=weights.limits,
             singularity_weight=weights.singularities,
-            push_away=weights.push_away_mm * MM,
-            push_weight=weights.push_away,
+            push_away=weights.extra_clearance_mm * MM,
+            push_weight=weights.extra_clearance,
         )
         return Search(
             method=Method(self.method),
@@ -110,55 +181,21 @@ class SearchSection(Document):
             max_contact_error=self.max_contact_error_mm * MM,
             interpolation=Interpolation(
                 self.max_contact_step,
-                (self.max_contact_error_mm - bow_height_mm) * MM,
+                (self.max_contact_error_mm - chord_error_mm) * MM,
                 float(MAX_JOINT_STEP),
             ),
             optimal=OptimalSettings(
-                widen=self.widen_percent / 100.0,
+                widen=self.range_tolerance_percent / 100.0,
                 max_contact_change=self.max_contact_change,
                 costs=costs,
-                seconds=self.seconds,
+                max_subproblems=self.max_subproblems,
             ),
-        )
-
-
-class ProcessSection(Document):
-    """How fast the robot moves, and where it starts and ends."""
-
-    feed_mm_s: Positive
-    home_deg: Six | None = None  # else the cell file says it
-    approach_mm: Positive = 50.0
-    approach_turn_deg: Annotated[float, Field(ge=0.0, le=90.0)] = 0.0  # 0: straight
-    approach_mm_s: Positive = 50.0
-    air_speed_percent: Annotated[float, Field(gt=0.0, le=100.0)] = 10.0
-    contact_speed: Positive = 40.0
-    max_dwell_s: Positive = 3.0
-    max_acceleration_deg_s2: SixPositive | None = None
-
-    def robot_as_limited(self, robot: Robot) -> Robot:
-        """Return the robot with the joint accelerations that the job names, if it does."""
-        if self.max_acceleration_deg_s2 is None:
-            return robot
-        limits = np.deg2rad(self.max_acceleration_deg_s2)
-        return replace(robot, max_acceleration=limits, acceleration_assumed=False)
-
-    def in_si(self, home: Array) -> Pace:
-        """Return the section's values; home in [rad], shape (6,)."""
-        return Pace(
-            feed=self.feed_mm_s * MM,
-            approach_length=self.approach_mm * MM,
-            approach_turn=float(np.deg2rad(self.approach_turn_deg)),
-            approach_speed=self.approach_mm_s * MM,
-            air_speed=self.air_speed_percent / 100.0,
-            contact_speed=self.contact_speed,
-            max_dwell=self.max_dwell_s,
-            home=home,
         )
 
 
 @dataclass(frozen=True)
 class Search:
-    """How the path is sought.
+    """How the path is searched.
 
     Attributes:
         method: The search.
@@ -181,6 +218,6 @@ class Search:
     optimal: OptimalSettings
 
     @property
-    def weights_asked(self) -> ObjectiveWeights | None:
+    def requested_weights(self) -> ObjectiveWeights | None:
         """The weights of the objective, if it is a weighted sum."""
         return self.objective_weights if self.objective is Objective.WEIGHTED else None

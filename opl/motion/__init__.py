@@ -1,1 +1,1 @@
-"""Whole motions: ways on the wheel and in the air, whether they are free, their times."""
+"""Whole motions: on the wheel and off it, whether they are free, their times."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.motion.timing import Cause, Pace, Timing
+from opl.motion.process_settings import ProcessSettings
+from opl.motion.timing import Cause, Timing
 
 # The belt dwells where the ground point is slower than this part of the feed.
 HARDLY_MOVES = 0.5
@@ -15,7 +16,7 @@ HARDLY_MOVES = 0.5
 
 @dataclass(frozen=True)
 class Share:
-    """What one cause costs in a slow stretch.
+    """What one cause costs on a slow part of a pass.
 
     Attributes:
         cause: The cause.
@@ -30,7 +31,7 @@ class Share:
 
 @dataclass(frozen=True)
 class SlowStretch:
-    """A stretch of a pass on which the ground point is slower than the feed.
+    """A part of a pass on which the ground point is slower than the feed.
 
     Attributes:
         pass_index: The pass, counted from 0.
@@ -59,18 +60,14 @@ class SlowStretch:
         return sum(share.longer for share in self.shares)
 
 
-def slow_stretches(timing: Timing, pace: Pace) -> tuple[SlowStretch, ...]:
-    """Return the stretches of the passes that are slower than the feed by a hundredth or more.
+def slow_stretches(timing: Timing, process: ProcessSettings) -> tuple[SlowStretch, ...]:
+    """Return the parts of the passes that are slower than the feed by a hundredth or more.
 
     The ramps at both ends of a pass are not among them: the robot has to rest there.
-
-    Args:
-        timing: A motion with its times.
-        pace: What is asked for.
     """
     slow = np.array([cause is not Cause.NONE for cause in timing.cause])
-    index = timing.motion.pass_index
-    return tuple(_stretch(timing, pace, moves) for moves in _runs(slow, index))
+    index = timing.timed.motion.pass_index
+    return tuple(_stretch(timing, process, moves) for moves in _runs(slow, index))
 
 
 def _runs(wanted: np.ndarray, index: np.ndarray) -> Iterator[np.ndarray]:
@@ -80,19 +77,18 @@ def _runs(wanted: np.ndarray, index: np.ndarray) -> Iterator[np.ndarray]:
     yield from (run for run in np.split(moves, np.flatnonzero(breaks) + 1) if len(run))
 
 
-def _stretch(timing: Timing, pace: Pace, moves: np.ndarray) -> SlowStretch:
-    motion = timing.motion
-    speed = timing.way / np.maximum(motion.duration, 1e-12)
-    longer = motion.duration - timing.way / pace.feed
+def _stretch(timing: Timing, process: ProcessSettings, moves: np.ndarray) -> SlowStretch:
+    motion, duration = timing.timed.motion, timing.timed.duration
+    speed = timing.surface_distance / np.maximum(duration, 1e-12)
+    longer = duration - timing.surface_distance / process.feed
     shares: dict[tuple[Cause, int], float] = {}
     for move in moves:
         key = (timing.cause[move], int(timing.joint[move]))
         shares[key] = shares.get(key, 0.0) + float(longer[move])
     slowest = int(moves[speed[moves].argmin()])
-    hardly = np.zeros(len(motion), dtype=bool)
-    hardly[moves] = speed[moves] < HARDLY_MOVES * pace.feed
-    dwells = list(_runs(hardly, motion.pass_index))
-    longest = max(dwells, key=lambda run: longer[run].sum(), default=None)
+    hardly = np.isin(np.arange(len(motion)), moves) & (speed < HARDLY_MOVES * process.feed)
+    dwells = _runs(hardly, motion.pass_index)
+    dwell = max(dwells, key=lambda run: longer[run].sum(), default=moves[:0])
     return SlowStretch(
         pass_index=int(motion.pass_index[slowest]),
         start=float(motion.cutter_point[moves[0] - 1]),
@@ -103,10 +99,8 @@ def _stretch(timing: Timing, pace: Pace, moves: np.ndarray) -> SlowStretch:
             Share(cause, joint if joint >= 0 else None, time)
             for (cause, joint), time in sorted(shares.items(), key=lambda item: -item[1])
         ),
-        dwell=0.0 if longest is None else float(longer[longest].sum()),
+        dwell=float(longer[dwell].sum()),
         dwell_at=(
-            float("nan")
-            if longest is None
-            else float(motion.cutter_point[longest[speed[longest].argmin()]])
+            float(motion.cutter_point[dwell[speed[dwell].argmin()]]) if len(dwell) else np.nan
         ),
     )

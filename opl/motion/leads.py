@@ -11,25 +11,24 @@ from __future__ import annotations
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.motion.motion import Stretch
+from opl.motion.motion import MoveKind
 
-LEAD_SPACING = 0.005  # [m] between postures of a lead: joint lines stay near it
-LEAD_TURN = np.deg2rad(5.0)  # between postures of an arc: chords stay within 0.06 mm of it
+LEAD_SPACING = 0.005  # [m] between configurations of a lead: joint lines stay near it
+LEAD_TURN = np.deg2rad(5.0)  # between configurations of an arc: chords stay within 0.06 mm of it
 
 
 def lead_count(length: float, turn: float) -> int:
     """Return into how many moves an approach or retract is cut.
 
-    Args:
-        length: Of it in [m].
-        turn: What its direction turns by in [rad], 0 if it is straight.
+    `length` is in [m]; `turn` is the angle in [rad] by which its direction turns, 0 if it is
+    straight.
     """
     # a whole number of steps is not to become one more by rounding
     turns = int(np.ceil(turn / LEAD_TURN - 1e-9))
     return max(int(np.ceil(length / LEAD_SPACING)), turns, 1)
 
 
-def lead_offsets(length: float, turn: float, stretch: Stretch) -> Array:
+def lead_offsets(length: float, turn: float, kind: MoveKind) -> Array:
     """Return where the part is moved to in the contact frame, from the wheel on, shape (k, 3).
 
     Args:
@@ -37,7 +36,7 @@ def lead_offsets(length: float, turn: float, stretch: Stretch) -> Array:
         turn: What its direction turns by in [rad], a quarter of a circle at most. 0 is straight
             along the normal; else it is along the belt at the contact, this much off it at the far
             end.
-        stretch: Whether it is the approach or the retract.
+        kind: Whether it is the approach or the retract.
     """
     count = lead_count(length, turn)
     offsets = np.zeros((count, 3))
@@ -46,7 +45,7 @@ def lead_offsets(length: float, turn: float, stretch: Stretch) -> Array:
         offsets[:, 2] = -length * np.arange(1, count + 1) / count
         return offsets
     radius, angle = length / turn, turn * np.arange(1, count + 1) / count
-    side = -1.0 if stretch is Stretch.APPROACH else 1.0
+    side = -1.0 if kind is MoveKind.APPROACH else 1.0
     offsets[:, 1] = side * radius * np.sin(angle)
     offsets[:, 2] = -radius * 2.0 * np.square(np.sin(angle / 2.0))  # 1 - cos, small angles too
     return offsets

@@ -1,9 +1,9 @@
-"""A line through postures with its corners rounded, as a controller goes through it.
+"""A line through configurations with its corners rounded, as a controller goes through it.
 
-Straight from posture to posture, the joints would change their speeds in no time. A controller
-overlaps the end of a move with the beginning of the next; so does this line: around each posture
-the speeds change evenly, for half of the shorter of its two moves on either side. It leaves the
-straight line by no more than an eighth of what the two moves differ, and never swings beyond it.
+Straight from configuration to configuration, joint speeds would jump. A controller overlaps
+the end of a move with the beginning of the next; so does this line: around each configuration the
+speeds change evenly, for half of the shorter of its two moves on either side. It leaves the
+straight line by no more than an eighth of what the two moves differ, and never overshoots it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, read_only
 
 # How far a corner is cut at most, in [rad] of any joint: some tenths of a millimetre at the end of
 # an arm, as the finest rounding of a controller.
@@ -27,7 +27,7 @@ class RoundedLine:
     Between knots the speeds change linearly, so positions are parabolas.
 
     Attributes:
-        nodes: Place of each posture, shape (n,).
+        nodes: Place of each configuration, shape (n,).
         knots: Where the speeds begin or end to change, ascending, shape (m,).
         q: Joint positions at the knots in [rad], shape (m, 6).
         slope: Their change with the place at the knots in [rad/s], shape (m, 6).
@@ -40,42 +40,35 @@ class RoundedLine:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            copy = np.array(getattr(self, field.name), dtype=float)
-            copy.setflags(write=False)
-            object.__setattr__(self, field.name, copy)
+            object.__setattr__(self, field.name, read_only(getattr(self, field.name)))
 
     def slopes(self, place: Array) -> Array:
         """Return the change of the joint positions with the place in [rad/s], shape (k, 6)."""
         return np.stack([np.interp(place, self.knots, joint) for joint in self.slope.T], axis=-1)
 
-    def postures(self, place: Array) -> Array:
+    def configurations(self, place: Array) -> Array:
         """Return the joint positions at places in [rad], shape (k, 6)."""
         last = np.clip(np.searchsorted(self.knots, place, side="right") - 1, 0, len(self.knots) - 1)
-        way = (np.asarray(place) - self.knots[last])[:, None]
-        return self.q[last] + (self.slope[last] + self.slopes(place)) / 2.0 * way
+        ahead = (np.asarray(place) - self.knots[last])[:, None]
+        return self.q[last] + (self.slope[last] + self.slopes(place)) / 2.0 * ahead
 
     def extended(self, before: float, after: float) -> RoundedLine:
         """Return the line with its ends drawn on straight, each for a wanted time in [s] > 0."""
+        first = self.q[0] - before * self.slope[0]
+        last = self.q[-1] + after * self.slope[-1]
         return RoundedLine(
             self.nodes,
             np.concatenate([[self.knots[0] - before], self.knots, [self.knots[-1] + after]]),
-            np.vstack(
-                [
-                    self.q[0] - before * self.slope[0],
-                    self.q,
-                    self.q[-1] + after * self.slope[-1],
-                ]
-            ),
+            np.vstack([first, self.q, last]),
             np.vstack([self.slope[0], self.slope, self.slope[-1]]),
         )
 
 
 def rounded_line(q: Array, times: Array) -> RoundedLine:
-    """Round the corners between postures.
+    """Round the corners between configurations.
 
-    Args:
-        q: Joint positions in [rad], shape (n, 6), n >= 2.
-        times: Wanted time of each move in [s], all positive, shape (n - 1,).
+    `q` is in [rad], shape (n, 6), n >= 2; `times`, the wanted times of the moves in [s], are
+    positive, shape (n - 1,).
     """
     nodes = np.concatenate([[0.0], np.cumsum(times)])
     speed = np.diff(q, axis=0) / times[:, None]

@@ -1,4 +1,4 @@
-"""The fastest way along a line of postures that its wanted times and the joints allow.
+"""The fastest law of time along a line of configurations that wanted times and joints allow.
 
 The law is TOPP-RA's (Pham and Pham, 2018, by toppra): the path speed is as high as its own limit
 (the wanted times) and the speed and acceleration of each joint permit. Between two places of its
@@ -17,7 +17,7 @@ from toppra.algorithm import TOPPRA
 from toppra.constraint import LinearConstraint
 from toppra.interpolator import AbstractGeometricPath
 
-from opl.errors import UnsafeError
+from opl.errors import TimeLawError, UnsafeError
 from opl.geometry.frames import Array
 from opl.motion.rounded import SAME_PLACE, RoundedLine
 
@@ -33,12 +33,7 @@ SHORT = 1e-3  # [s]: a straight piece not longer than this is halved only
 
 @dataclass(frozen=True, eq=False)
 class JointLimits:
-    """What the joints can do.
-
-    Attributes:
-        speed: Largest speeds in [rad/s], shape (6,).
-        acceleration: Largest accelerations in [rad/s^2], shape (6,).
-    """
+    """Largest speeds in [rad/s] and accelerations in [rad/s^2] of the joints, shape (6,) each."""
 
     speed: Array
     acceleration: Array
@@ -51,7 +46,8 @@ class TimeLaw:
     Attributes:
         line: The line.
         place: Places on it in [s], ascending, shape (g,).
-        pace: Change of the place with time there, 1 where the wanted times are kept, shape (g,).
+        path_speed: Change of the place with time there, 1 where the wanted times are kept, shape
+            (g,).
         speed_load: Largest part of its speed limit that each joint uses up on the piece that ends
             at each place but the first, shape (g - 1, 6).
         acceleration_load: The same of its acceleration limit.
@@ -59,71 +55,62 @@ class TimeLaw:
 
     line: RoundedLine
     place: Array
-    pace: Array
+    path_speed: Array
     speed_load: Array
     acceleration_load: Array
 
     @property
     def time(self) -> Array:
         """When it gets to each place in [s], from 0, shape (g,)."""
-        steps = 2.0 * np.diff(self.place) / (self.pace[:-1] + self.pace[1:])
+        steps = 2.0 * np.diff(self.place) / (self.path_speed[:-1] + self.path_speed[1:])
         return np.concatenate([[0.0], np.cumsum(steps)])
 
     @property
     def node_index(self) -> np.ndarray:
-        """Which place is that of each posture of the line, shape (n,)."""
+        """Which place is that of each configuration of the line, shape (n,)."""
         return np.searchsorted(self.place, self.line.nodes - 1e-12)
 
     @property
     def node_times(self) -> Array:
-        """When it gets to each posture of the line in [s], shape (n,)."""
-        return self.time[self.node_index]
+        """When it gets to each configuration of the line in [s], shape (n,)."""
+        times: Array = self.time[self.node_index]
+        return times
 
-    def postures(self, time: Array) -> Array:
+    def configurations(self, time: Array) -> Array:
         """Return the joint positions at times in [rad], shape (k, 6)."""
         at = self.time
         piece = np.clip(np.searchsorted(at, time, side="right") - 1, 0, len(at) - 2)
         spent = time - at[piece]
-        change = np.diff(self.pace) / np.diff(at)
-        return self.line.postures(
-            self.place[piece] + (self.pace[piece] + change[piece] * spent / 2.0) * spent
+        change = np.diff(self.path_speed) / np.diff(at)
+        return self.line.configurations(
+            self.place[piece] + (self.path_speed[piece] + change[piece] * spent / 2.0) * spent
         )
 
 
 def fastest_law(line: RoundedLine, limits: JointLimits, at_rest: bool) -> TimeLaw:
     """Return the fastest law along a line.
 
-    Args:
-        line: The line.
-        limits: What the joints can do.
-        at_rest: Whether the robot rests at both ends. If not, it comes and goes on straight on, as
-            fast as the line lets it.
+    If the robot is not `at_rest` at both ends, it comes and goes on straight on, as fast as the
+    line lets it.
 
     Raises:
         UnsafeError: If no law is found, or what is found does not keep the limits.
     """
-    if at_rest:
-        whole = line
-    else:
-        whole = line.extended(*(_run_up(slope, limits) for slope in line.slope[[0, -1]]))
+    # wanted times in which full path speed is reached from rest, straight on, in [s]
+    run_up = 0.51 * np.max(np.abs(line.slope[[0, -1]]) / limits.acceleration, axis=1) + 1e-3
+    whole = line if at_rest else line.extended(*run_up.tolist())
     place = _grid(whole, limits)
     slope = whole.slopes(place)
     bend = np.diff(slope, axis=0) / np.diff(place)[:, None]
-    pace = _pace(place, slope, bend, limits, at_rest)
-    inside = slice(
-        int(np.searchsorted(place, line.knots[0] - 1e-12)),
-        int(np.searchsorted(place, line.knots[-1] - 1e-12)) + 1,
+    path_speed = _path_speed(place, slope, bend, limits, at_rest)
+    first, last = np.searchsorted(place, line.knots[[0, -1]] - 1e-12).tolist()
+    inside = slice(first, last + 1)
+    speed, acceleration = (
+        load[first:last] for load in _loads(slope, bend, place, path_speed, limits)
     )
-    loads = _loads(slope, bend, place, pace, limits)
-    pieces = slice(inside.start, inside.stop - 1)
-    law = TimeLaw(line, place[inside], pace[inside], loads[0][pieces], loads[1][pieces])
+    law = TimeLaw(line, place[inside], path_speed[inside], speed, acceleration)
     require_limits(law, limits)
     return law
-
-
-def _run_up(slope: Array, limits: JointLimits) -> float:
-    """Return the wanted time in which the whole pace is reached from rest, straight on, in [s]."""
-    return float(0.51 * np.max(np.abs(slope) / limits.acceleration)) + 1e-3
 
 
 def _grid(line: RoundedLine, limits: JointLimits) -> Array:
@@ -134,7 +121,7 @@ def _grid(line: RoundedLine, limits: JointLimits) -> Array:
     graded = straight & (length > SHORT)
     places = [knots, knots[:-1][~graded] + length[~graded] / 2.0]
     places.append((knots[:-1, None] + length[:, None] * GRADES)[graded].ravel())
-    # from rest to the whole pace on a straight piece, and back
+    # from rest to full path speed on a straight piece, and back
     for end, inwards in ((0, 1.0), (-1, -1.0)):
         ramp = 0.5 * np.max(np.abs(line.slope[end]) / limits.acceleration)
         if straight[end] and 0.0 < ramp < length[end]:
@@ -148,11 +135,11 @@ def _grid(line: RoundedLine, limits: JointLimits) -> Array:
 
 
 def _loads(
-    slope: Array, bend: Array, place: Array, pace: Array, limits: JointLimits
+    slope: Array, bend: Array, place: Array, path_speed: Array, limits: JointLimits
 ) -> tuple[Array, Array]:
     """Return what a law uses up of speed and acceleration on each piece, shape (g - 1, 6) each."""
-    speed = np.abs(slope) * pace[:, None] / limits.speed
-    squared = pace[:, None] ** 2
+    speed = np.abs(slope) * path_speed[:, None] / limits.speed
+    squared = path_speed[:, None] ** 2
     gain = np.diff(squared, axis=0) / (2.0 * np.diff(place)[:, None])
     at_start = slope[:-1] * gain + bend * squared[:-1]
     at_end = slope[1:] * gain + bend * squared[1:]
@@ -160,11 +147,13 @@ def _loads(
     return np.maximum(speed[:-1], speed[1:]), acceleration
 
 
-def _pace(place: Array, slope: Array, bend: Array, limits: JointLimits, at_rest: bool) -> Array:
-    """Return the highest pace at each place, shape (g,).
+def _path_speed(
+    place: Array, slope: Array, bend: Array, limits: JointLimits, at_rest: bool
+) -> Array:
+    """Return the highest path speed at each place, shape (g,).
 
-    The whole pace is kept but around the pieces that do not allow it. They are solved one by one,
-    with as much before and after as it takes to come down to their pace and up again.
+    Full path speed is kept but around the pieces that do not allow it. They are solved one by one,
+    with as much before and after as it takes to come down to their path speed and up again.
     """
     steady = np.ones(len(place))
     hot = np.maximum(*_loads(slope, bend, place, steady, limits)).max(axis=1) > 1.0
@@ -173,72 +162,61 @@ def _pace(place: Array, slope: Array, bend: Array, limits: JointLimits, at_rest:
     while True:
         near = maximum_filter1d(hot.astype(int), 2 * around + 1, mode="constant")
         edges = np.flatnonzero(np.diff(near, prepend=0, append=0))
-        pace = steady.copy()
+        path_speed: Array = steady.copy()
         for start, end in edges.reshape(-1, 2):
             part = slice(start, end + 1)
-            found = _fastest_pace(
+            found = _fastest_path_speed(
                 place[part], slope[part], bend[start:end], limits, start > 0, end < last
             )
             if found is None:
                 break
-            pace[part] = found
+            path_speed[part] = found
         else:
-            return pace
+            return path_speed
         if around >= last:
-            raise UnsafeError(
-                "no time law keeps the joints' speeds and accelerations; raise "
-                "process.max_acceleration_deg_s2 if the robot can do more"
-            )
+            raise TimeLawError("no time law keeps the joints' speeds and accelerations")
         around = min(4 * around, last)
 
 
-def _fastest_pace(
+def _fastest_path_speed(
     place: Array, slope: Array, bend: Array, limits: JointLimits, enters: bool, leaves: bool
 ) -> Array | None:
-    """Return the highest pace over some pieces, None if toppra finds none.
+    """Return the highest path speed over some pieces, None if toppra finds none.
 
-    Args:
-        place: Where the pieces end, shape (g,).
-        slope: There, shape (g, 6).
-        bend: Of each piece, shape (g - 1, 6).
-        limits: What the joints can do.
-        enters: Whether it comes at the whole pace, not from rest.
-        leaves: Whether it goes on at the whole pace, not at rest.
+    Where it does not enter or leave at full path speed, it is at rest. `place` and `slope` have
+    shapes (g,) and (g, 6), `bend`, of the pieces, (g - 1, 6).
     """
     constraint = _Limits(place, slope, bend, limits)
     search = TOPPRA([constraint], _Place(place), gridpoints=place, solver_wrapper="seidel")
     search.compute_parameterization(float(enters), float(leaves))
-    pace = search.problem_data.sd_vec
-    if pace is None or np.isnan(pace).any() or (np.maximum(pace[:-1], pace[1:]) <= 0.0).any():
+    found = search.problem_data.sd_vec
+    if found is None or np.isnan(found).any() or (np.maximum(found[:-1], found[1:]) <= 0.0).any():
         return None
-    return np.asarray(pace)
+    return np.asarray(found)
 
 
 def require_limits(law: TimeLaw, limits: JointLimits) -> None:
-    """Refuse a law whose postures, sampled, show more than the limits.
+    """Refuse a law whose configurations, sampled, show more than the limits.
 
     Nothing but positions is looked at: differences of samples never exceed what lies between.
     """
     duration = float(law.time[-1])
     step = min(SAMPLE, duration / 100.0)
-    q = law.postures(np.arange(0.0, duration, step))
+    q = law.configurations(np.arange(0.0, duration, step))
     # what is left of round-off in positions of some radians
     slack = 1e-14 / step ** np.arange(1, 3)
-    for order, limit, what in (
-        (1, limits.speed, "speed"),
-        (2, limits.acceleration, "acceleration"),
-    ):
+    for order, what in ((1, "speed"), (2, "acceleration")):
         found = np.abs(np.diff(q, order, axis=0)).max(axis=0) / step**order
-        over = (found - slack[order - 1]) / limit
+        over = (found - slack[order - 1]) / getattr(limits, what)
         if over.max() > 1.0 + TOLERANCE:
             raise UnsafeError(
-                f"the time law asks for {100.0 * over.max():.2f} % of the {what} of joint "
+                f"the time law uses {100.0 * over.max():.2f} % of the {what} of joint "
                 f"{int(over.argmax()) + 1}"
             )
 
 
-class _Place(AbstractGeometricPath):
-    """All that toppra asks of a path whose constraint brings its own derivatives."""
+class _Place(AbstractGeometricPath):  # type: ignore[misc]
+    """All that toppra needs of a path whose constraint brings its own derivatives."""
 
     def __init__(self, place: Array) -> None:
         self._ends = place[[0, -1]]
@@ -252,7 +230,7 @@ class _Place(AbstractGeometricPath):
         return self._ends
 
 
-class _Limits(LinearConstraint):
+class _Limits(LinearConstraint):  # type: ignore[misc]
     """Speed and acceleration of all joints, at both ends of each piece of the grid.
 
     toppra's own constraint takes second derivatives at the grid alone; where they jump, it would
@@ -263,7 +241,7 @@ class _Limits(LinearConstraint):
         super().__init__()
         self.identical = True
         length = np.diff(place)[:, None]
-        # u: half the change of the squared pace with the place, x: the squared pace at the start
+        # u: half the change of the squared path speed with the place, x: its square at the start
         at_start, at_end = slope[:-1], slope[1:] + 2.0 * length * bend
         scale = np.tile(limits.acceleration, 2)
         self._of_u = np.hstack([at_start, at_end]) / scale

@@ -1,6 +1,6 @@
 """How long each move of a motion takes: at the set feed, and no faster than the joints can follow.
 
-On the wheel and on the way to and from it the time law of `opl.motion.time_law` is asked what the
+On the wheel, on approaches and on retracts the time law of `opl.motion.time_law` says what the
 joints can follow; a free move turns at its share of top speed. The ramps with which a robot leaves
 and comes to rest are no part of these times, nor are they of the speeds of a program: the
 controller adds them. `opl.program.cycle` counts them.
@@ -8,10 +8,8 @@ controller adds them. `opl.program.cycle` counts them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
-from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +18,12 @@ from opl.cell.robot import Robot
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.leads import lead_count
-from opl.motion.motion import Motion, Stretch
+from opl.motion.motion import Motion, Phase, TimedMotion
+from opl.motion.process_settings import ProcessSettings
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, TimeLaw, fastest_law
 
-# Wanted time of a move in [s] below which its end is no posture of its own for the time law.
+# Wanted time of a move in [s] below which its end is no configuration of its own for the time law.
 SHORTEST = 1e-6
 FOLLOWED = 1.01  # a move that takes no longer than this times what is wanted keeps it
 
@@ -38,120 +37,79 @@ class Cause(str, Enum):
     ACCELERATION = "acceleration"  # a joint speeds up or slows down as fast as it can
 
 
-@dataclass(frozen=True)
-class Pace:
-    """How fast, and how far off the wheel.
-
-    Attributes:
-        feed: Speed of the ground point along the surface in [m/s].
-        approach_length: Length of approach and retract in [m].
-        approach_turn: What their direction turns by in [rad]; 0 for straight along the contact
-            normal.
-        approach_speed: Speed of both in [m/s].
-        contact_speed: Largest speed of the contact position on the wheel in belt units per second:
-            pivoting takes time even where the ground point hardly moves.
-        max_dwell: Longest that the belt may stay on one spot beyond the time at the feed in [s].
-        air_speed: Fraction of each joint's largest speed used for free moves, 0 to 1.
-        home: Joint positions at the start and the end in [rad], shape (6,).
-    """
-
-    feed: float
-    approach_length: float
-    approach_turn: float
-    approach_speed: float
-    contact_speed: float
-    max_dwell: float
-    air_speed: float
-    home: Array
-
-
 @dataclass(frozen=True, eq=False)
 class Timing:
     """A motion with its times, and what sets them.
 
     Attributes:
-        motion: The motion with the time of every move.
-        way: Way of the ground point along the surface in [m], shape (n,); NaN where the move does
-            not stay on the wheel.
+        timed: The motion with the time of every move.
+        surface_distance: What the ground point moves along the surface in [m], shape (n,); NaN
+            where the move does not stay on the wheel.
         cause: Why it is slower than the feed on each move, n items.
-        joint: The joint to blame, shape (n,); -1 where none is.
+        joint: The joint that limits it, shape (n,); -1 where none does.
     """
 
-    motion: Motion
-    way: Array
+    timed: TimedMotion
+    surface_distance: Array
     cause: tuple[Cause, ...]
     joint: NDArray[np.int64]
 
 
-def timed(motion: Motion, points: CutterPoints, pace: Pace, robot: Robot) -> Motion:
-    """Return a motion with the time of every move; arguments as of `time_motion`."""
-    return time_motion(motion, points, pace, robot).motion
-
-
-def time_motion(motion: Motion, points: CutterPoints, pace: Pace, robot: Robot) -> Timing:
+def time_motion(
+    motion: Motion, points: CutterPoints, process: ProcessSettings, robot: Robot
+) -> Timing:
     """Return how long the moves of a motion take, and why.
 
     The ground point passes along the surface at the feed, or slower where the contact position
-    moves fast over the wheel; approach and retract run at their speed; on free moves the joint with
-    the longest way runs at its share of its largest speed. Where a joint cannot follow, moves take
-    as long as it needs.
-
-    Args:
-        motion: The motion; its durations are not looked at.
-        points: Its cutter points.
-        pace: The speeds.
-        robot: Whose motion.
+    moves fast over the wheel; approach and retract run at their speed; on free moves the joint that
+    takes longest runs at its share of its largest speed. Where a joint cannot follow, moves take as
+    long as it needs.
 
     Raises:
         UnsafeError: If the time law does not keep the limits it was given.
     """
-    kinds = _kinds(motion)
+    grinding = motion.grinding
     turned = np.abs(np.diff(motion.q, axis=0, prepend=motion.q[:1]))
     fastest = (turned / robot.max_speed).max(axis=1)
     arc = np.interp(motion.cutter_point, np.arange(len(points)), points.arc_length)
-    on_wheel = np.array([kind == _WHEEL for kind, _ in kinds])
-    way = np.where(on_wheel, np.abs(np.diff(arc, prepend=np.nan)), np.nan)
-    over_wheel = np.abs(np.diff(motion.contact_position, prepend=np.nan)) / pace.contact_speed
-    count = lead_count(pace.approach_length, pace.approach_turn)
-    lead = pace.approach_length / count / pace.approach_speed
-    air = np.array([kind == _AIR for kind, _ in kinds])
-    wanted = np.where(air, fastest / pace.air_speed, lead)
-    wanted[on_wheel] = np.maximum(way / pace.feed, over_wheel)[on_wheel]
+    distance = np.where(grinding, np.abs(np.diff(arc, prepend=np.nan)), np.nan)
+    over_wheel = np.abs(np.diff(motion.contact_position, prepend=np.nan)) / process.contact_speed
+    count = lead_count(process.approach_length, process.approach_turn)
+    lead = process.approach_length / count / process.approach_speed
+    wanted = np.where(motion.free, fastest / process.air_speed, lead)
+    wanted[grinding] = np.maximum(distance / process.feed, over_wheel)[grinding]
 
     duration = np.maximum(wanted, fastest)
     duration[0] = 0.0
     joint = np.where(fastest > wanted, (turned / robot.max_speed).argmax(axis=1), -1)
     by_acceleration = np.zeros(len(motion), dtype=bool)
-    for moves in _pieces(kinds):
+    for phase, moves in motion.runs():  # between two of them the robot rests
         kept = moves[duration[moves] > SHORTEST]
-        if not len(kept):
+        if phase is Phase.FREE or not len(kept):
             continue
-        postures = np.concatenate([[moves[0] - 1], kept])
-        law = _law(motion.q[postures], duration[kept], robot)
+        rows = np.concatenate([[moves[0] - 1], kept])
+        law = _law(motion.q[rows], duration[kept], robot)
         needed = np.diff(law.node_times)
         slowed = needed > FOLLOWED * duration[kept]
-        to_blame, accelerating = _blamed(law)
-        joint[kept[slowed]] = to_blame[slowed]
+        limiting, accelerating = _limiting_joint(law)
+        joint[kept[slowed]] = limiting[slowed]
         by_acceleration[kept[slowed]] = accelerating[slowed]
         duration[kept] = np.maximum(needed, duration[kept])
     cause = [Cause.NONE] * len(motion)
-    for move in np.flatnonzero(on_wheel):
-        if duration[move] * pace.feed > FOLLOWED * way[move]:
+    for move in np.flatnonzero(grinding):
+        if duration[move] * process.feed > FOLLOWED * distance[move]:
             slow = Cause.ACCELERATION if by_acceleration[move] else Cause.SPEED
             cause[move] = Cause.PIVOTING if joint[move] < 0 else slow
-    return Timing(replace(motion, duration=duration), way, tuple(cause), joint)
+    return Timing(TimedMotion(motion, duration), distance, tuple(cause), joint)
 
 
 def followed(q: Array, times: Array, robot: Robot) -> Array:
     """Return the times of moves that run on without a rest, longer where the joints need it.
 
-    Args:
-        q: Joint positions in [rad], shape (n, 6).
-        times: Wanted times of the moves in [s], shape (n - 1,).
-        robot: Whose moves.
+    `q` is in [rad], shape (n, 6); `times` are the wanted times of the moves in [s], shape (n - 1,).
     """
     kept = np.flatnonzero(times > SHORTEST)
-    found = times.copy()
+    found: Array = times.copy()
     if len(kept):
         law = _law(q[np.concatenate([kept[:1], kept + 1])], times[kept], robot)
         found[kept] = np.maximum(np.diff(law.node_times), times[kept])
@@ -163,32 +121,7 @@ def _law(q: Array, times: Array, robot: Robot) -> TimeLaw:
     return fastest_law(rounded_line(q, times), limits, at_rest=False)
 
 
-_WHEEL, _IN, _OUT, _AIR = "wheel", "in", "out", "air"
-
-
-def _kinds(motion: Motion) -> list[tuple[str, int]]:
-    """Return what each move is part of, and of which pass; the first posture has no move."""
-    on_wheel = [stretch in (Stretch.GRIND, Stretch.BETWEEN) for stretch in motion.stretch]
-    kinds = []
-    for k, stretch in enumerate(motion.stretch):
-        index = int(motion.pass_index[k])
-        if on_wheel[k] and k and on_wheel[k - 1] and motion.pass_index[k - 1] == index:
-            kinds.append((_WHEEL, index))
-        elif on_wheel[k] or stretch is Stretch.APPROACH:
-            kinds.append((_IN, index))  # the move onto the first cutter point ends the approach
-        else:
-            kinds.append((_OUT if stretch is Stretch.RETRACT else _AIR, index))
-    return kinds
-
-
-def _pieces(kinds: list[tuple[str, int]]) -> Iterator[NDArray[np.intp]]:
-    """Yield the moves of each pass, approach and retract: between two of them the robot rests."""
-    for (kind, _), moves in groupby(range(1, len(kinds)), key=kinds.__getitem__):
-        if kind != _AIR:
-            yield np.fromiter(moves, dtype=np.intp)
-
-
-def _blamed(law: TimeLaw) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+def _limiting_joint(law: TimeLaw) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Return which joint is nearest to a limit of its own on each move, and whether to which."""
     starts = law.node_index[:-1]
     speed = np.maximum.reduceat(law.speed_load, starts, axis=0)

@@ -1,9 +1,9 @@
-"""What is learnt from a track that is not free: the nodes and edges that no other track need try.
+"""What a track that is not free rules out: the nodes and edges that no other track need try.
 
-A free move that was not found rules out all nodes that are no better off than those it joins. Two
-configurations off the wheel that a free straight move joins can be left and come to in the same
-ways. So where a search from one of them was in vain, the other need not be tried; and mostly all
-contact positions of a matrix are joined in this manner.
+A free move that was not found rules out all nodes that are no better off than those it joins. From
+two configurations off the wheel that a free straight move joins, the same others can be reached. So
+where a search from one of them was in vain, the other need not be tried; and mostly all contact
+positions of a matrix are joined like this.
 """
 
 from __future__ import annotations
@@ -12,29 +12,25 @@ import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
-from opl.motion.air import UnreachableApproachError, lead
-from opl.motion.check import Fault
-from opl.motion.motion import Motion, Stretch
+from opl.motion.collision_check import CollidingMove
+from opl.motion.motion import Motion, MoveKind
+from opl.motion.whole_motion import UnreachableApproachError, lead
 from opl.planning.filling import BrokenEdgeError
 from opl.planning.open_matrix import FreeMove, OpenMatrix
 from opl.planning.problem import GrindingProblem
-from opl.planning.track_check import Blocked, Collides, NoLink
+from opl.planning.track_check import Blocked, Collides, NoFreeMove
 
 
 def block(problem: GrindingProblem, matrix: OpenMatrix, rows: np.ndarray, blocked: Blocked) -> None:
     """Take out of a matrix what is known not to be free.
 
-    Args:
-        problem: What is to be planned.
-        matrix: The matrix of the track.
-        rows: The row in each column, shape (N,).
-        blocked: What was found on the track.
+    `rows` are those of the track that was checked, shape (N,).
     """
     track = rows.tolist()
     if isinstance(blocked, Collides):
         for fault in blocked.faults:
             _block_fault(problem, matrix, track, blocked.motion, fault)
-    elif isinstance(blocked, NoLink):
+    elif isinstance(blocked, NoFreeMove):
         _block_link(problem, matrix, track, blocked)
     elif isinstance(blocked.error, BrokenEdgeError):
         _block_edge(matrix, track, blocked.error.column, blocked.error.cause)
@@ -48,14 +44,18 @@ def _block_edge(matrix: OpenMatrix, track: list[int], column: int, cause: str) -
 
 
 def _block_fault(
-    problem: GrindingProblem, matrix: OpenMatrix, track: list[int], motion: Motion, fault: Fault
+    problem: GrindingProblem,
+    matrix: OpenMatrix,
+    track: list[int],
+    motion: Motion,
+    fault: CollidingMove,
 ) -> None:
     """Block the node or the edge that a colliding move belongs to."""
     cause = " and ".join(fault.pair)
-    stretch, index = motion.stretch[fault.move], int(motion.pass_index[fault.move])
+    kind, index = motion.kind[fault.move], int(motion.pass_index[fault.move])
     on_pass = np.flatnonzero(problem.points.pass_index == index)
     first, last = int(on_pass[0]), int(on_pass[-1])
-    if stretch in (Stretch.GRIND, Stretch.BETWEEN):
+    if kind.on_wheel:
         point = motion.cutter_point[fault.move]
         end = int(np.ceil(point))
         if point == end and fault.at_end and fault.pair != (PART, WHEEL):
@@ -64,21 +64,21 @@ def _block_fault(
             matrix.block_node(end, track[end], cause)
         elif matrix.free[end, track[end]]:
             _block_edge(matrix, track, end - 1, cause)
-    elif stretch is Stretch.RETRACT:
+    elif kind is MoveKind.RETRACT:
         matrix.block_node(last, track[last], f"retract: {cause}")
     else:  # a free move ends where the approach begins
         matrix.block_node(first, track[first], f"approach: {cause}")
 
 
 def _block_link(
-    problem: GrindingProblem, matrix: OpenMatrix, track: list[int], blocked: NoLink
+    problem: GrindingProblem, matrix: OpenMatrix, track: list[int], blocked: NoFreeMove
 ) -> None:
     """Block what a free move that was not found rules out."""
     motion, move, error = blocked.motion, blocked.error.move, blocked.error.error
     index = int(motion.pass_index[move])
     after = len(track) if index < 0 else int(np.argmax(problem.points.pass_index == index))
     before = after - 1  # the cutter points on either side of the free move
-    if motion.stretch[move] is Stretch.LINK:
+    if motion.kind[move] is MoveKind.LINK:
         kind, cause, home_end = FreeMove.BETWEEN_PASSES, str(error), None
     else:
         kind = FreeMove.TO_HOME if index < 0 else FreeMove.FROM_HOME
@@ -86,64 +86,53 @@ def _block_link(
     if error.end in (None, home_end):
         matrix.cut_off[kind, error.pair] += 1
     if kind is FreeMove.TO_HOME:
-        for row in _joined(problem, matrix, Stretch.RETRACT, before, track[before]):
+        for row in _joined(problem, matrix, MoveKind.RETRACT, before, track[before]):
             matrix.block_node(before, row, cause)
     elif kind is FreeMove.FROM_HOME:
-        for row in _joined(problem, matrix, Stretch.APPROACH, after, track[after]):
+        for row in _joined(problem, matrix, MoveKind.APPROACH, after, track[after]):
             matrix.block_node(after, row, cause)
     elif error.end == 0:
         matrix.block_node(before, track[before], f"retract: {cause}")
     elif error.end == 1:
         matrix.block_node(after, track[after], f"approach: {cause}")
     else:
-        from_rows = _joined(problem, matrix, Stretch.RETRACT, before, track[before])
-        to_rows = _joined(problem, matrix, Stretch.APPROACH, after, track[after])
+        from_rows = _joined(problem, matrix, MoveKind.RETRACT, before, track[before])
+        to_rows = _joined(problem, matrix, MoveKind.APPROACH, after, track[after])
         matrix.block_edges(before, from_rows, to_rows, f"link: {cause}")
 
 
 def _joined(
-    problem: GrindingProblem, matrix: OpenMatrix, stretch: Stretch, column: int, row: int
+    problem: GrindingProblem, matrix: OpenMatrix, kind: MoveKind, column: int, row: int
 ) -> list[int]:
     """Return the rows whose configurations off the wheel are joined to one of them by free moves.
 
-    Args:
-        problem: What is to be planned.
-        matrix: The matrix.
-        stretch: Whether they are off the wheel before it, approach, or after it, retract.
-        column: The cutter point.
-        row: A row, which is among those returned.
+    Off the wheel before it, where the approach begins, or after it, where the retract ends. The row
+    itself is among them.
     """
     t = matrix.nodes.contact_position[column]
     free = np.flatnonzero(matrix.free[column])
-    found, q_row = [row], _away(problem, matrix, stretch, column, row)
+    found, q_row = [row], _away(problem, matrix, kind, column, row)
     # outwards on either side, from each to the next that is joined
     for side in (free[t[free] > t[row]], free[t[free] < t[row]], free[t[free] == t[row]]):
         last = q_row
         for other in side[np.argsort(np.abs(t[side] - t[row]), kind="stable")].tolist():
-            q = _away(problem, matrix, stretch, column, other)
+            q = _away(problem, matrix, kind, column, other)
             if other == row or q is None or last is None:
                 continue
-            if problem.scene.links.joined(last, q):
+            if problem.scene.free_moves.joined(last, q):
                 found.append(other)
                 last = q
     return found
 
 
 def _away(
-    problem: GrindingProblem, matrix: OpenMatrix, stretch: Stretch, column: int, row: int
+    problem: GrindingProblem, matrix: OpenMatrix, kind: MoveKind, column: int, row: int
 ) -> Array | None:
     """Return where approach or retract of a node is farthest off, None if it cannot be made."""
+    cell, points, process, nodes = problem.cell, problem.points, problem.process, matrix.nodes
+    t, q = nodes.contact_position[column, row], nodes.q[column, row]
     try:
-        q: Array = lead(
-            problem.cell,
-            problem.points,
-            problem.pace,
-            stretch,
-            matrix.nodes.ik_branch,
-            column,
-            matrix.nodes.contact_position[column, row],
-            matrix.nodes.q[column, row],
-        )
+        away = lead(cell, points, process, kind, nodes.ik_branch, column, t, q)
     except UnreachableApproachError:
         return None
-    return np.asarray(q[-1])
+    return np.asarray(away[-1])

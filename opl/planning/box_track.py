@@ -17,12 +17,11 @@ from opl.geometry.toolpath import CutterPoints
 from opl.planning.columns import Seams, wrist_flips
 from opl.planning.costs import CostWeights, track_cost
 from opl.planning.families import GROWN, JUMP, Placement
-from opl.planning.filling import BrokenEdgeError, cutter_frames, fill_in
+from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
 from opl.planning.open_matrix import Track, open_matrices
 from opl.planning.plan import Found, Plan, propose_and_check
-from opl.planning.problem import GrindingProblem, wheel_layer
-from opl.planning.refine import RefinedProblem
+from opl.planning.problem import GrindingProblem, wheel_distances
 from opl.planning.symmetry import twins
 from opl.search.box import JointBox
 from opl.search.outside import outside
@@ -75,7 +74,7 @@ class BoxTracks:
         problem = self._problem
         before, points = places.astype(int), problem.points
         there = CutterPoints(
-            cutter_frames(points, places),
+            points.frames_at(places),
             points.pass_index[before],
             np.interp(places, np.arange(len(points)), points.arc_length),
         )
@@ -90,10 +89,12 @@ class BoxTracks:
         cuts[whole] = problem.cuts[before[whole]]
         if not whole.all():
             between = CutterPoints(
-                there.Ts_workpiece_cutter[~whole], np.zeros(np.sum(~whole), dtype=int), places[~whole]
+                there.Ts_workpiece_cutter[~whole],
+                np.zeros(np.sum(~whole), dtype=int),
+                places[~whole],
             )
-            layer = wheel_layer(problem.scene, between, positions)
-            cuts[~whole] = layer < -problem.cell.planned_allowance
+            layer = wheel_distances(problem.scene, between, positions)
+            cuts[~whole] = layer < -problem.cell.planned_penetration
         grid = np.broadcast_to(positions, q.shape[:2])
         coarse = self._placed(there, q, placements)
         free = ~cuts & ~np.isnan(coarse[..., 0])
@@ -109,9 +110,9 @@ class BoxTracks:
         """Return the postures of places at contact positions, shape (n, m)."""
         problem = self._problem
         q = inverse_solutions(problem.cell, there.Ts_workpiece_cutter[:, None], t)
-        layer = wheel_layer(problem.scene, there, t)
+        layer = wheel_distances(problem.scene, there, t)
         q = self._placed(there, q, placements)
-        free = ~np.isnan(q[..., 0]) & ~(layer < -problem.cell.planned_allowance)
+        free = ~np.isnan(q[..., 0]) & ~(layer < -problem.cell.planned_penetration)
         return Columns(places, there, tuple(placements), t, q, free, layer)
 
     def _placed(self, there: CutterPoints, q: Array, placements: Sequence[Placement]) -> Array:
@@ -141,7 +142,9 @@ class BoxTracks:
         """
         inner = box.widened(room / 2.0)
         t, spacing = _sampled(columns.t, columns.q, columns.free, inner, SAMPLES)
-        sampled = _Sampled(self, self._at(columns.places, columns.points, columns.placements, t), inner)
+        sampled = _Sampled(
+            self, self._at(columns.places, columns.points, columns.placements, t), inner
+        )
         track = sampled.smoothest()
         if track is None:
             return None
@@ -188,7 +191,7 @@ class Columns:
         t: Contact positions, shape (n, m).
         q: Placed postures in [rad], NaN where there are none, shape (n, m, 6).
         free: Which are within reach and do not cut into the wheel, shape (n, m).
-        wheel_clearance: Signed distance of the part to the wheel in [m], shape (n, m).
+        wheel_distance: Signed distance of the part to the wheel in [m], shape (n, m).
     """
 
     places: Array
@@ -197,7 +200,7 @@ class Columns:
     t: Array
     q: Array
     free: np.ndarray
-    wheel_clearance: Array
+    wheel_distance: Array
 
     def without(
         self, box: JointBox, place: float, t: float, back: bool, above: bool
@@ -240,12 +243,14 @@ class _Sampled:
         self._columns = columns
         self._box = box
         problem = search._problem
-        q = np.where((columns.free & _near(columns.q, columns.free, box))[..., None], columns.q, np.nan)
+        q = np.where(
+            (columns.free & _near(columns.q, columns.free, box))[..., None], columns.q, np.nan
+        )
         self.problem = replace(
             problem,
             points=columns.points,
             field=NodeField(columns.t[0], problem.field.q[:0], tuple(self._images(q))),
-            wheel_clearance=columns.wheel_clearance,
+            wheel_distance=columns.wheel_distance,
         )
         self.matrices = open_matrices(self.problem)
 
@@ -313,18 +318,18 @@ class _Sampled:
 
     def check(self, track: Track) -> Plan | None:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free."""
-        search, found = self._search, RefinedProblem(self.problem, self._columns.places)
+        search, places = self._search, self._columns.places
         for _ in range(MOST_CHECKS):
             proposals = twins(self.matrices, track, self.problem.cell.robot)
             outcome = propose_and_check(self.problem, self.matrices, proposals, search.checks)
             if isinstance(outcome, Found):
                 plan = outcome.plan
                 search.checks = plan.checks
-                return replace(
-                    plan,
-                    path=found.original_path(plan.path),
-                    motion=found.original_motion(plan.motion),
-                )
+                path, motion = plan.path, plan.motion
+                columns = np.arange(len(places))
+                original = np.interp(path.cutter_point, columns, places)
+                motion = motion.renumbered(np.interp(motion.cutter_point, columns, places))
+                return replace(plan, path=replace(path, cutter_point=original), motion=motion)
             search.checks += len(proposals)
             following = self.smoothest()
             if following is None:
@@ -337,7 +342,7 @@ class _Sampled:
         problem = self._search._problem
         robot = problem.cell.robot
         flips = [(4 * k, *flip) for k, flip in enumerate(wrist_flips(robot.arm))]
-        found = []
+        found: list[tuple[float, int, NodeMatrix]] = []
         family = self._columns.placements[0].family
         index = np.arange(q.shape[1])
         for slot, sign, shift in flips:
@@ -406,7 +411,7 @@ def _missing(q: Array, box: JointBox) -> Array:
 
 
 def _near(q: Array, free: np.ndarray, box: JointBox) -> np.ndarray:
-    """Return which free postures are in a box, the nearest where a column has none, shape (n, m)."""
+    """Return which free postures are in a box, or the nearest of a column, shape (n, m)."""
     missing = np.where(free, _missing(q, box), np.inf)
     least = missing.min(axis=1, keepdims=True)
     return np.asarray((missing <= least + 1e-12) & np.isfinite(missing))

@@ -1,4 +1,4 @@
-"""The track that costs least over the whole field: least travel, or least time."""
+"""The track with the least cost over the whole field: least travel, or least time."""
 
 from __future__ import annotations
 
@@ -20,10 +20,8 @@ def plan_cheapest(
     Exact over the field and all its matrices: what a proposed motion collides with is taken out,
     and the least of what is left is proposed next.
 
-    Args:
-        problem: What is to be planned.
-        weights: The prices.
-        max_contact_change: Largest change of t between neighbouring cutter points in belt units.
+    `max_contact_change` is the largest change of t between neighbouring cutter points in belt
+    units.
 
     Raises:
         NoPathError: If there is none, as in `first_free`.

@@ -15,17 +15,16 @@ from functools import cached_property
 
 import numpy as np
 
-from opl.cell.wheel_distance import TOLERANCE, PartTree, signed_wheel_distance
-from opl.cell.inverse_kinematics import Arm, inverse_kinematics
 from opl.cell.inverse_jets import Axes, FlangeJets, joint_derivatives
+from opl.cell.inverse_kinematics import Arm, inverse_kinematics
 from opl.cell.spherical_wrist import SphericalWristArm
+from opl.cell.wheel_distance import TOLERANCE, PartTree, signed_wheel_distance
 from opl.cell.workcell import WorkCell
 from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.geometry.jets import Interval, Jet, constant, variable, wave
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import MM_PER_M, ContactWheel
-from opl.planning.filling import cutter_frames
 from opl.planning.nodes import SEAM_GAP
 from opl.search.walls import UNKNOWN, Image, Line, Piece, Wall
 
@@ -183,9 +182,9 @@ class ColumnWalls:
             sign, shift = self.flips[flip]
             low, high = seams.low[family], seams.high[family]
             for joint, counts in enumerate(found):
-                ends = sorted(sign[joint] * np.array([low[joint], high[joint]]) + shift[joint])
+                images = sorted(sign[joint] * np.array([low[joint], high[joint]]) + shift[joint])
                 for n in list(counts):
-                    turned = ends[0] + 2.0 * np.pi * n, ends[1] + 2.0 * np.pi * n
+                    turned = images[0] + 2.0 * np.pi * n, images[1] + 2.0 * np.pi * n
                     if max(turned[0] - high[joint], low[joint] - turned[1]) >= self._largest:
                         counts.remove(n)
             relative.append([np.array(sorted(counts), dtype=int) for counts in found])
@@ -203,7 +202,7 @@ class ColumnWalls:
 
     def walls(self, places: Sequence[float]) -> list[Wall]:
         """Return the walls at fractional cutter points."""
-        Ts_workpiece_cutter = cutter_frames(self._points, np.asarray(places, dtype=float))
+        Ts_workpiece_cutter = self._points.frames_at(np.asarray(places, dtype=float))
         grids = [self._borders(T) for T in Ts_workpiece_cutter]
         cells = self._cells(Ts_workpiece_cutter, grids)
         parts = cells.parts()
@@ -260,7 +259,7 @@ class ColumnWalls:
         flange = path_jets(
             self._points, T_base_contact, self._cell.T_flange_workpiece, middle, radius
         )
-        q = inverse_kinematics(arm, self._cell.Ts_base_flange(t, cutter_frames(self._points, grid)))
+        q = inverse_kinematics(arm, self._cell.Ts_base_flange(t, self._points.frames_at(grid)))
         cells = self._enclosed(q, flange, radius, [grid], np.empty((1, 4, 4)))
         yield from self._pieces(cells, 0, t)
 
@@ -341,13 +340,12 @@ class ColumnWalls:
             float(np.hypot(wheel.width, 2.0 * wheel.radius)),
         )
         rolled = np.abs(middle) > wheel.flat_end
-        moved = np.where(
-            rolled, 2.0 * np.sin(np.deg2rad(radius) / 2.0) * lever, radius / MM_PER_M
-        )
+        moved = np.where(rolled, 2.0 * np.sin(np.deg2rad(radius) / 2.0) * lever, radius / MM_PER_M)
         Ts_contact0_workpiece = wheel.T_contact0_contact(middle) @ T_cutter_workpiece
-        allowed = -cell.planned_allowance
+        allowed = -cell.planned_penetration
         clearance = signed_wheel_distance(self._part, wheel, Ts_contact0_workpiece, allowed)
-        return clearance + moved + TOLERANCE < allowed, clearance < allowed
+        deep = np.asarray(clearance < allowed)
+        return np.asarray(clearance + moved + TOLERANCE < allowed), deep
 
     def _cells(self, Ts_workpiece_cutter: Array, grids: list[Array]) -> _Cells:
         """Enclose the postures over all cells of some places."""
@@ -422,7 +420,7 @@ class _Cells:
         wanted = np.ceil(np.sqrt(pads / COARSE))  # pads fall with the square
         wanted = np.where(self.known[self.families].all(axis=1), wanted, MOST_PARTS)
         wanted = np.where(self.none[self.families], 1, wanted)
-        return np.minimum(wanted.max(axis=0), MOST_PARTS).astype(int)
+        return np.asarray(np.minimum(wanted.max(axis=0), MOST_PARTS), dtype=int)
 
 
 def path_jets(
@@ -499,7 +497,9 @@ def _above(piece: Piece, t: float) -> list[Piece]:
     return [piece.part(first, len(piece.pad_low))] if first < len(piece.pad_low) else []
 
 
-def contact_jets(wheel: ContactWheel, Ts_cutter_flange: Array, t: Array, radius: Array) -> FlangeJets:
+def contact_jets(
+    wheel: ContactWheel, Ts_cutter_flange: Array, t: Array, radius: Array
+) -> FlangeJets:
     """Enclose the motion of the flange while a place of the part moves over the wheel.
 
     Args:

@@ -9,7 +9,7 @@ import numpy as np
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import singularity_margins
 from opl.geometry.frames import Array
-from opl.motion.figures import Figures
+from opl.motion.path import Figures
 from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
 from opl.search.smooth import TrackCost
@@ -44,13 +44,7 @@ class CostWeights:
 
 @dataclass(frozen=True)
 class ObjectiveWeights:
-    """What a path is charged for as a whole.
-
-    Attributes:
-        joint_range: For each radian of the joint range sum.
-        travel: For each radian that a joint turns on the wheel.
-        time: For each second on the wheel.
-    """
+    """Prices of a radian of joint range sum, a radian of joint travel, a second on the wheel."""
 
     joint_range: float
     travel: float
@@ -70,11 +64,7 @@ def track_cost(
 ) -> TrackCost:
     """Return the cost of every edge and node of a matrix.
 
-    Args:
-        problem: For limits, speeds and the scene.
-        nodes: The matrix.
-        weights: The prices.
-        inside: The nodes that matter, shape (n_columns, n_rows); the others cost nothing.
+    Only the nodes `inside` matter, shape (n_columns, n_rows); the others cost nothing.
     """
     robot = problem.cell.robot
     node_cost = np.zeros(inside.shape)
@@ -92,8 +82,8 @@ def track_cost(
         joint_weights=weights.joint_weights,
         contact_weight=weights.contact_weight,
         time_weight=weights.time_weight,
-        step_seconds=np.where(problem.off_wheel, 0.0, arc_step / problem.pace.feed),
+        edge_seconds=np.where(problem.off_wheel, 0.0, arc_step / problem.process.feed),
         max_speed=robot.max_speed,
-        contact_speed=problem.pace.contact_speed,
+        contact_speed=problem.process.contact_speed,
         node_cost=node_cost,
     )

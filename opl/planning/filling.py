@@ -10,7 +10,7 @@ from opl.cell.full_turns import nearest_turn
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.cell.workcell import WorkCell
-from opl.geometry.frames import Array, interpolate, transform
+from opl.geometry.frames import Array, transform
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.path import GrindingPath
 from opl.planning.nodes import NodeMatrix
@@ -38,7 +38,7 @@ class Interpolation:
     Attributes:
         max_contact_step: Largest difference of t between adjacent configurations, delta T.
         max_contact_error: Largest distance of the ground point from where it should touch the
-            wheel, half-way between two configurations, in [m]. More are put in to keep it.
+            wheel, in the middle between two configurations, in [m]. More are put in to keep it.
         max_joint_step: Largest change of a joint between adjacent configurations in [rad].
     """
 
@@ -56,62 +56,45 @@ def fill_in(
     """Put intermediate nodes between the nodes of a track.
 
     Contact position, origin, axis z and axis x of the cutter frame are interpolated linearly, and
-    the inverse kinematics is solved on the same branch, nearest to the joint interpolation.
+    the inverse kinematics is solved on the same IK branch, nearest to the joint interpolation.
 
-    Args:
-        cell: The cell.
-        points: N cutter points, the columns.
-        nodes: The node matrix.
-        rows: The row chosen in each column, shape (N,).
-        rule: How dense.
+    `rows` are those of the track in each column, one for each cutter point, shape (N,).
 
     Raises:
-        BrokenEdgeError: If an edge leaves reach, limits or branch between its ends.
+        BrokenEdgeError: If an edge leaves reach, limits or IK branch between its ends.
     """
     columns = np.arange(len(rows))
     q_node, t_node = nodes.along(rows), nodes.t_along(rows)
-    on_wheel = np.diff(points.pass_index) == 0
     counts = [
-        middle_count(step, rule.max_contact_step) if grinding else 0
-        for step, grinding in zip(np.diff(t_node), on_wheel, strict=True)
+        middle_count(change, rule.max_contact_step) if same_pass else 0
+        for change, same_pass in zip(np.diff(t_node), np.diff(points.pass_index) == 0, strict=True)
     ]
     places = [k + np.arange(n + 1) / (n + 1) for k, n in enumerate(counts)]
     place = np.concatenate([*places, columns[-1:].astype(float)])
     for _ in range(MOST_HALVINGS):
-        q = _solve(cell, points, nodes.ik_branch, q_node, t_node, place)
-        _refuse_jumps(q, place, points, rule.max_joint_step)
+        t = np.interp(place, columns, t_node)
+        q = _solve(cell, points, nodes.ik_branch, q_node, t, place)
+        pass_index = points.pass_index[place.astype(int)]
+        on_wheel = np.diff(pass_index) == 0
+        jumps = on_wheel & (np.abs(np.diff(q, axis=0)).max(axis=1) > rule.max_joint_step)
+        if jumps.any():
+            raise BrokenEdgeError(int(place[:-1][jumps][0]), "continuity")
         error = _contact_error_between(cell, points, t_node, place, q)
-        coarse = np.flatnonzero(error > rule.max_contact_error)
+        coarse = np.flatnonzero(on_wheel & (error > rule.max_contact_error))
         if not len(coarse):
-            t = np.interp(place, columns, t_node)
-            pass_index = points.pass_index[place.astype(int)]
             return GrindingPath(nodes.ik_branch, q, t, place, pass_index)
         halves = (place[coarse] + place[coarse + 1]) / 2.0
         place = np.insert(place, coarse + 1, halves)
     raise BrokenEdgeError(int(place[coarse[0]]), "continuity")
 
 
-def cutter_frames(points: CutterPoints, place: Array) -> Array:
-    """Return cutter frames at fractional cutter points, shape (n, 4, 4)."""
-    before = np.minimum(place.astype(int), len(points) - 1)
-    after = np.minimum(before + 1, len(points) - 1)
-    Ts = points.Ts_workpiece_cutter
-    return interpolate(Ts[before], Ts[after], place - before)
-
-
 def _solve(
-    cell: WorkCell,
-    points: CutterPoints,
-    ik_branch: int,
-    q_node: Array,
-    t_node: Array,
-    place: Array,
+    cell: WorkCell, points: CutterPoints, ik_branch: int, q_node: Array, t: Array, place: Array
 ) -> Array:
     """Return the configuration at each place, (n, 6); those of the nodes are kept to the bit."""
     columns = np.arange(len(q_node))
-    t = np.interp(place, columns, t_node)
     q_guess = np.stack([np.interp(place, columns, joint) for joint in q_node.T], axis=-1)
-    Ts_base_flange = cell.Ts_base_flange(t, cutter_frames(points, place))
+    Ts_base_flange = cell.Ts_base_flange(t, points.frames_at(place))
     q = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_guess)[:, ik_branch]
     q = nearest_turn(q, q_guess)
     at_node = place == np.floor(place)
@@ -126,33 +109,17 @@ def _solve(
     return q
 
 
-def _refuse_jumps(q: Array, place: Array, points: CutterPoints, max_joint_step: float) -> None:
-    on_wheel = np.diff(points.pass_index[place.astype(int)]) == 0
-    jumps = (np.abs(np.diff(q, axis=0)).max(axis=1) > max_joint_step) & on_wheel
-    if jumps.any():
-        raise BrokenEdgeError(int(place[:-1][jumps][0]), "continuity")
-
-
 def _contact_error_between(
     cell: WorkCell, points: CutterPoints, t_node: Array, place: Array, q: Array
 ) -> Array:
-    """Return how far the ground point is from its place on the wheel half-way to the next node.
+    """Return how far the ground point is from its place on the wheel in the middle of each move.
 
-    Args:
-        cell: The cell.
-        points: The cutter points.
-        t_node: Contact position at each cutter point, shape (N,).
-        place: Fractional cutter point of each configuration, shape (n,).
-        q: The configurations in [rad], shape (n, 6).
-
-    Returns:
-        Distances in [m], shape (n - 1,); 0 where the move leaves the wheel.
+    Distances in [m], shape (n - 1,), without meaning where the move leaves the wheel; of n
+    configurations at fractional cutter points, and the contact position at each of N cutter points.
     """
     middle = (place[:-1] + place[1:]) / 2.0
     T_base_flange = forward_kinematics(cell.robot, (q[:-1] + q[1:]) / 2.0)
-    p_workpiece = cutter_frames(points, middle)[:, :3, 3]
+    p_workpiece = points.frames_at(middle)[:, :3, 3]
     p_base = transform(T_base_flange @ cell.T_flange_workpiece, p_workpiece)
     t = np.interp(middle, np.arange(len(t_node)), t_node)
-    error = np.linalg.norm(p_base - cell.wheel.T_base_contact(t)[:, :3, 3], axis=1)
-    on_wheel = np.diff(points.pass_index[place.astype(int)]) == 0
-    return np.where(on_wheel, error, 0.0)
+    return np.asarray(np.linalg.norm(p_base - cell.wheel.T_base_contact(t)[:, :3, 3], axis=1))

@@ -1,9 +1,9 @@
 """The node matrix: every configuration that can grind each cutter point.
 
 A column is a cutter point, a row a contact position: a ladder graph whose rungs are the columns.
-Each branch of the inverse kinematics has its own matrices, because a track never changes it (a
-change passes a singularity). Joints that turn more than once give a configuration several counts of
-full turns; where the angles of a branch leave a gap that no edge could cross, each count is a
+Each IK branch has its own matrices, because a track never changes it (a change passes a
+singularity). Joints that turn more than once give a configuration several counts of
+full turns; where the angles of an IK branch leave a gap that no edge could cross, each count is a
 matrix of its own, elsewhere the counts are more rows of one matrix. Where nearly every joint turns
 twice, that would be hundreds of matrices that make the same motions: then the one in the middle of
 the limits stands for all.
@@ -25,7 +25,7 @@ from opl.geometry.toolpath import CutterPoints
 
 @dataclass(frozen=True)
 class NodeMatrix:
-    """The nodes of one branch of the inverse kinematics, or of one count of full turns in it.
+    """The nodes of one IK branch, or of one count of full turns in it.
 
     Attributes:
         ik_branch: Slot of the inverse kinematics, 0 to 7.
@@ -53,6 +53,10 @@ class NodeMatrix:
         """Return the contact positions of a track, its row in each column given."""
         return np.asarray(self.contact_position[np.arange(len(rows)), rows])
 
+    def range_sum(self, rows: np.ndarray) -> float:
+        """Return the joint range sum of a track at its nodes in [rad]."""
+        return float(np.ptp(self.along(rows), axis=0).sum())
+
 
 @dataclass(frozen=True)
 class NodeField:
@@ -78,13 +82,7 @@ MOST_SHEETS = 9
 
 
 def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) -> NodeField:
-    """Solve the inverse kinematics of every cutter point at every contact position.
-
-    Args:
-        cell: The cell.
-        points: N cutter points.
-        contact_positions: M values of t.
-    """
+    """Solve the inverse kinematics of every cutter point at every contact position."""
     robot = cell.robot
     frames = points.Ts_workpiece_cutter[:, None]
     q = inverse_solutions(cell, frames, contact_positions)  # (N, M, 8, 6)
@@ -112,10 +110,7 @@ def inverse_solutions(
 ) -> Array:
     """Return every inverse solution in [rad], NaN where there is none, shape (..., 8, 6).
 
-    Args:
-        cell: The cell.
-        Ts_workpiece_cutter: The cutter frames, shape (..., 4, 4).
-        contact_positions: Where on the wheel each is ground, shape (...).
+    Cutter frames have shape (..., 4, 4), the contact position at which each is ground (...).
     """
     return inverse_kinematics(
         cell.robot.arm, cell.Ts_base_flange(contact_positions, Ts_workpiece_cutter)
@@ -123,12 +118,10 @@ def inverse_solutions(
 
 
 def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
-    """Unroll the angles of one branch of the inverse kinematics where they leave a gap.
+    """Unroll the angles of one IK branch where they leave a gap.
 
-    Args:
-        q: Principal angles in [rad], NaN where there are none, shape (N, M, 6).
-        lower: Lower joint limits in [rad], shape (6,).
-        upper: Upper joint limits in [rad], shape (6,).
+    `q` are principal angles in [rad], NaN where there are none, shape (N, M, 6); limits are in
+    [rad], shape (6,).
 
     Returns:
         Angles that are continuous over the whole field wherever there is a gap, shape (N, M, 6);
@@ -136,9 +129,7 @@ def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
         nodes of one sheet are repeated, shape (n_copies, 6); both in [rad].
     """
     lifted = q.copy()
-    sheet_turns: list[Array] = [np.zeros(1)] * 6
-    copy_turns: list[Array] = [np.zeros(1)] * 6
-    central: list[Array] = [np.zeros(1)] * 6
+    sheet_turns, copy_turns, central = ([np.zeros(1)] * 6 for _ in range(3))
     all_turns = full_turns(lower, upper)
     for joint in range(6):
         counts = np.unique(all_turns[:, joint])

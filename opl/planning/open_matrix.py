@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 
 from opl.cell.collision import CollisionScene
-from opl.motion.links import Blocker
+from opl.motion.free_move_search import Blocker
 from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
 from opl.search.box import JointBox
@@ -17,21 +17,16 @@ from opl.search.ladder import Ladder
 
 
 class FreeMove(str, Enum):
-    """Where a free move leads, in words."""
+    """Where a free move leads; the value is how messages name it."""
 
-    FROM_HOME = "way from home"
-    BETWEEN_PASSES = "way between passes"
-    TO_HOME = "way home"
+    FROM_HOME = "free move from home"
+    BETWEEN_PASSES = "free move between passes"
+    TO_HOME = "free move to home"
 
 
 @dataclass(frozen=True)
 class Track:
-    """One node per column.
-
-    Attributes:
-        matrix: Index of the matrix in the list that is searched.
-        rows: The row in each column, shape (n_columns,).
-    """
+    """One node per column: its row in each, shape (n_columns,), in a matrix given by its index."""
 
     matrix: int
     rows: np.ndarray
@@ -83,7 +78,7 @@ class OpenMatrix:
     ) -> None:
         """Block every edge from some rows of a column to some of the next."""
         self.blocked.update(
-            self.ladder.step_key(column, row, after) for row in from_rows for after in to_rows
+            self.ladder.edge_key(column, row, after) for row in from_rows for after in to_rows
         )
         self.causes[column, cause] += len(from_rows) * len(to_rows)
 
@@ -108,8 +103,7 @@ class OpenMatrix:
 
     def allows(self, rows: np.ndarray) -> bool:
         """Return whether nothing on a track is blocked."""
-        columns = np.arange(len(rows))
-        n_rows = self.free.shape[1]
+        columns, n_rows = np.arange(len(rows)), self.free.shape[1]
         keys = (columns[:-1] * n_rows + rows[:-1]) * n_rows + rows[1:]
         return bool(self.free[columns, rows].all()) and self.blocked.isdisjoint(keys.tolist())
 

@@ -25,7 +25,6 @@ from opl.search.smooth import Travel
 PROOF_SHARE = 0.9  # of the widening: how far the bound may stay below the path
 ROOM_SHARE = 0.4  # of the widening: how much larger than its box the path may be
 MISSED = 0.05  # of the widening: what a box may miss a cutter point by and still hold it
-MOST_SUBPROBLEMS = 4000
 RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for next
 MOST_ADDED = 3  # walls at once
 
@@ -39,12 +38,13 @@ class OptimalSettings:
             smoother track.
         max_contact_change: Largest change of t between neighbouring columns in belt units.
         costs: What a track is charged for inside the box.
+        max_subproblems: How many subproblems of the proof are looked at, at the most.
     """
 
     widen: float
     max_contact_change: float
     costs: CostWeights
-    seconds: float
+    max_subproblems: int
 
 
 class OptimalSearch:
@@ -56,30 +56,22 @@ class OptimalSearch:
         fallback: A motion that is known.
     """
 
-    def __init__(
-        self, problem: GrindingProblem, settings: OptimalSettings, fallback: Plan
-    ) -> None:
+    def __init__(self, problem: GrindingProblem, settings: OptimalSettings, fallback: Plan) -> None:
         self._points = problem.points
         self._settings = settings
         seams = seams_of(problem.field.q)
         found = fallback.path.joint_range_sum
-        self._walls = ColumnWalls(
-            problem.cell, problem.scene.part, problem.points, seams, found
-        )
+        self._walls = ColumnWalls(problem.cell, problem.scene.part, problem.points, seams, found)
         self._families = Families(
             self._walls, seams, problem.field.q, problem.cuts, problem.points.pass_index
         )
         most = Travel(fallback.path.joint_travel, fallback.path.contact_travel)
-        self._tracks = BoxTracks(
-            problem, seams, settings.costs, settings.max_contact_change, most
-        )
+        self._tracks = BoxTracks(problem, seams, settings.costs, settings.max_contact_change, most)
         self.plan = fallback
         self._proven = self._least_hope = 0.0
         self._spent = 0
         gap = PROOF_SHARE * settings.widen
-        self.proof = BoxProof(
-            self._walls.images, self._walls.finer, found, gap
-        )
+        self.proof = BoxProof(self._walls.images, self._walls.finer, found, gap)
         self._places: set[float] = set()
         self._sweeps: set[tuple[int, int, bool]] = set()
         self._columns = np.arange(len(problem.points), dtype=float)
@@ -89,7 +81,7 @@ class OptimalSearch:
     @property
     def finished(self) -> bool:
         """Whether there is nothing left to do."""
-        spent = self._spent + self.proof.subproblems >= MOST_SUBPROBLEMS
+        spent = self._spent + self.proof.subproblems >= self._settings.max_subproblems
         return spent or (self.proof.closed and self.proof.threshold >= self._value)
 
     @property

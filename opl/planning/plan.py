@@ -20,26 +20,6 @@ from opl.planning.track_check import Free, check_track
 
 
 @dataclass(frozen=True)
-class Refinement:
-    """What more contact positions than those of the field have gained.
-
-    Attributes:
-        joint_range_sum: Of the best path found at the field's contact positions in [rad].
-        lower_bound: The bound at these positions in [rad].
-        gain: By how much that of the refined path is smaller in [rad].
-        rounds: How often the contact positions around the path were halved with a gain.
-        bound_positions: How many contact positions the bound of the plan holds for: those of the
-            field, or more where the refined path is below what is possible at these.
-    """
-
-    joint_range_sum: float
-    lower_bound: float | None
-    gain: float
-    rounds: int
-    bound_positions: int
-
-
-@dataclass(frozen=True)
 class WeightedValue:
     """What is known of the least weighted sum.
 
@@ -65,18 +45,15 @@ class Plan:
         path: Configurations on the wheel.
         motion: The whole motion, free of collision as far as the planner knows.
         checks: How many motions were checked, this one included.
-        lower_bound: No path through the cutter points, at the contact positions that it holds for,
-            has a smaller joint range sum, in [rad]; None if no bound was wanted.
-        refinement: What contact positions between those of the field have gained; None if they were
-            not tried.
-        weighted: The weighted sum that was kept small; None if none was.
+        lower_bound: No motion through the cutter points has a smaller joint range sum, whatever the
+            contact positions, in [rad]; None if no bound was wanted.
+        weighted: The weighted sum that was kept small, if one was.
     """
 
     path: GrindingPath
     motion: Motion
     checks: int
     lower_bound: float | None = None
-    refinement: Refinement | None = None
     weighted: WeightedValue | None = None
 
     @property

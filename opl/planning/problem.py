@@ -12,7 +12,7 @@ from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.timing import Pace
+from opl.motion.process_settings import ProcessSettings
 from opl.planning.filling import Interpolation
 from opl.planning.nodes import NodeField, NodeMatrix, build_nodes
 from opl.planning.scene import PlanningScene
@@ -27,18 +27,18 @@ class GrindingProblem:
         scene: The cell and its geometry.
         points: N cutter points.
         field: The nodes of every matrix.
-        wheel_clearance: Signed distance of the part to the wheel in [m], exact where it is less
-            than the belt penetration permits, shape (N, M).
+        wheel_distance: Signed distance of the part to the wheel in [m], exact where it is less
+            than the largest belt penetration allows, shape (N, M).
         interpolation: How the path between nodes is filled in.
-        pace: Speeds, approach and home.
+        process: Speeds, approach and home.
     """
 
     scene: PlanningScene
     points: CutterPoints
     field: NodeField
-    wheel_clearance: Array
+    wheel_distance: Array
     interpolation: Interpolation
-    pace: Pace
+    process: ProcessSettings
 
     @property
     def cell(self) -> WorkCell:
@@ -53,7 +53,7 @@ class GrindingProblem:
     @property
     def cuts(self) -> np.ndarray:
         """Where the part would sink too deep into the wheel, shape (N, M)."""
-        return np.asarray(self.wheel_clearance < -self.cell.planned_allowance)
+        return np.asarray(self.wheel_distance < -self.cell.planned_penetration)
 
     def free_nodes(self, nodes: NodeMatrix) -> np.ndarray:
         """Return which nodes exist and do not cut into the wheel, shape (N, n_rows)."""
@@ -76,27 +76,21 @@ def build_problem(
     points: CutterPoints,
     contact_positions: Array,
     interpolation: Interpolation,
-    pace: Pace,
+    process: ProcessSettings,
     clock: Callable[[str], AbstractContextManager[object]] = nullcontext,
 ) -> GrindingProblem:
-    """Build the node matrices and the clearance layer.
+    """Build the node matrices, and the distances of part and wheel at every node.
 
-    Args:
-        scene: The cell and its geometry.
-        points: N cutter points.
-        contact_positions: M values of t.
-        interpolation: How the path between nodes is filled in.
-        pace: Speeds, approach and home.
-        clock: Measures the stages ``nodes`` and ``clearance``.
+    `clock` measures the stages ``nodes`` and ``clearance``.
     """
     with clock("nodes"):
         field = build_nodes(scene.cell, points, contact_positions)
     with clock("clearance"):
-        layer = wheel_layer(scene, points, contact_positions)
-    return GrindingProblem(scene, points, field, layer, interpolation, pace)
+        layer = wheel_distances(scene, points, contact_positions)
+    return GrindingProblem(scene, points, field, layer, interpolation, process)
 
 
-def wheel_layer(
+def wheel_distances(
     scene: PlanningScene,
     points: CutterPoints,
     contact_positions: Array,
@@ -106,20 +100,19 @@ def wheel_layer(
 
     As in `signed_wheel_distance`: exact where it is less than the belt penetration permits.
 
-    Args:
-        scene: The cell and its geometry.
-        points: N cutter points.
-        contact_positions: M values of t, shape (M,), or of each cutter point, shape (N, M).
-        at: Which nodes, shape (N, M), all if not given; the others are minus infinity, not free.
+    Contact positions are for all cutter points, shape (M,), or of each, shape (N, M). If `at` is
+    given, shape (N, M), all other nodes are minus infinity, not free.
     """
     cell = scene.cell
     if at is None:
         at = np.ones((len(points), contact_positions.shape[-1]), dtype=bool)
     columns, _ = np.nonzero(at)
-    Ts_contact0_contact = cell.wheel.T_contact0_contact(np.broadcast_to(contact_positions, at.shape)[at])
+    Ts_contact0_contact = cell.wheel.T_contact0_contact(
+        np.broadcast_to(contact_positions, at.shape)[at]
+    )
     # cutter and contact coincide, whatever robot brings the part there
     Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[columns]
     layer = np.full(at.shape, -np.inf)
-    allowed = -cell.planned_allowance
+    allowed = -cell.planned_penetration
     layer[at] = signed_wheel_distance(scene.part, cell.wheel, Ts_contact0_workpiece, allowed)
     return layer

@@ -1,25 +1,20 @@
-"""Why nothing is free: the cutter points that stop a path, and what stops them, in words."""
+"""What is not free and why: the state of each node; the cutter points that stop a path."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from enum import Enum
 
 import numpy as np
 
 from opl.cell.full_turns import full_turns
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.errors import NoFreeMoveError, NoPathError
-from opl.motion.links import Blocker
+from opl.motion.free_move_search import Blocker
 from opl.planning.open_matrix import FreeMove, OpenMatrix
 from opl.planning.problem import GrindingProblem
 from opl.search.impasse import impasses
-
-
-def unreachable_points(problem: GrindingProblem) -> np.ndarray:
-    """Return the cutter points that the arm reaches at no contact position at all."""
-    return np.flatnonzero(np.isnan(problem.field.q[..., 0]).all(axis=(1, 2)))
-
 
 MOST_RUNS = 8  # of cutter points listed one by one; a hundred lines would hide the first
 # columns and positions of a run that are looked at; the shares of causes change little with more
@@ -29,17 +24,54 @@ MOST_FREE_MOVES = 3  # blocked free moves listed
 MOST_ENDS = 3  # cutter points listed, where tracks came through but none was free
 
 
+class NodeState(str, Enum):
+    """The states, in the order of their codes 0, 1, ..."""
+
+    FREE = "free"
+    REACH = "out of reach"
+    LIMITS = "beyond joint limits"
+    WHEEL = f"{PART} cuts into {WHEEL}"
+    COLLISION = "robot or fixture collides"
+
+
+def node_states(problem: GrindingProblem, ik_branch: int) -> np.ndarray:
+    """Return the code of every cutter point and contact position, shape (N, M) of uint8."""
+    code = {state: number for number, state in enumerate(NodeState)}
+    states = np.full(problem.cuts.shape, code[NodeState.LIMITS], dtype=np.uint8)
+    for nodes in problem.field.matrices:
+        if nodes.ik_branch != ik_branch:
+            continue
+        free = problem.free_nodes(nodes)
+        # full turns of the wrist do not matter for collisions: one row for each t is checked
+        for position in np.unique(nodes.position_index):
+            rows = np.flatnonzero(nodes.position_index == position)
+            states[nodes.exists[:, rows].any(axis=1), position] = code[NodeState.FREE]
+            columns = np.flatnonzero(free[:, rows].any(axis=1))
+            last = rows[-1 - free[columns][:, rows[::-1]].argmax(axis=1)]
+            hit = problem.scene.collision.collides(nodes.q[columns, last])
+            states[columns[hit], position] = code[NodeState.COLLISION]
+    states[problem.cuts] = code[NodeState.WHEEL]
+    states[np.isnan(problem.field.q[:, :, ik_branch, 0])] = code[NodeState.REACH]
+    return states
+
+
+def unreachable_points(problem: GrindingProblem) -> np.ndarray:
+    """Return the cutter points that the arm reaches at no contact position at all."""
+    return np.flatnonzero(np.isnan(problem.field.q[..., 0]).all(axis=(1, 2)))
+
+
 def no_path(problem: GrindingProblem, matrices: list[OpenMatrix]) -> NoPathError:
     """Return the error with how far the searches came and what stopped them."""
     cut_off = sum((matrix.cut_off for matrix in matrices), Counter())
     if cut_off:
-        return NoFreeMoveError(
-            "no path: the passes can be ground, but there is no way through the air",
-            explain_free_moves(problem.cell, cut_off),
+        where = (
+            "no path: the passes can be ground, but no collision-free move to, from or between "
+            "them was found"
         )
+        return NoFreeMoveError(where, explain_free_moves(problem.cell, cut_off))
     n, reached = len(problem.points), max((matrix.reached for matrix in matrices), default=0)
     if reached == 0:
-        where = f"no path: no free posture at cutter point 0 (0 of {n} reached)"
+        where = f"no path: no free configuration at cutter point 0 (0 of {n} reached)"
     elif reached == n:
         where = f"no path: every track through the {n} cutter points collides"
     else:
@@ -48,11 +80,7 @@ def no_path(problem: GrindingProblem, matrices: list[OpenMatrix]) -> NoPathError
 
 
 def explain(problem: GrindingProblem, matrices: list[OpenMatrix]) -> list[str]:
-    """Say at which cutter points nothing is free, and why.
-
-    Args:
-        problem: What was to be planned.
-        matrices: What was searched, with all that was found to be blocked.
+    """Return lines on the cutter points where nothing is free, and why.
 
     Returns:
         One line for each run of cutter points where no configuration is free; if there is none,
@@ -70,18 +98,13 @@ def explain(problem: GrindingProblem, matrices: list[OpenMatrix]) -> list[str]:
 
 
 def explain_free_moves(cell: WorkCell, cut_off: Counter[tuple[FreeMove, Blocker]]) -> list[str]:
-    """Say which free moves are blocked, by what, and what would help.
-
-    Args:
-        cell: The cell.
-        cut_off: How many tracks were refused for each free move and pair of bodies; not empty.
-    """
+    """Return lines on the free moves that are blocked, by what, and what would help."""
     met = sorted(cut_off.items(), key=lambda item: (-item[1], item[0]))[:MOST_FREE_MOVES]
     lines = [f"{move.value}: {' and '.join(pair)} ({count} times)" for (move, pair), count in met]
     from_or_to_home = any(move is not FreeMove.BETWEEN_PASSES for (move, _), _ in met)
     movable = {body.name for body in cell.obstacles}
     elsewhere = sorted({name for (_, pair), _ in met for name in pair if name in movable})
-    helps = ["another home posture"] if from_or_to_home else ["a longer approach"]
+    helps = ["another home configuration"] if from_or_to_home else ["a longer approach"]
     helps += [f"{name} elsewhere or smaller" for name in elsewhere]
     lines.append(f"would help: {', or '.join(helps)}; no change of wheel or fixture was tried")
     return lines
@@ -106,7 +129,7 @@ def _describe_run(problem: GrindingProblem, first: int, last: int) -> str:
     pass_index = int(problem.points.pass_index[first])
     line = f"{_run(first, last)} (pass {pass_index + 1}): nothing is free: {', '.join(parts)}"
     if problem.cuts[first : last + 1].all():
-        at_best = -1e3 * float(problem.wheel_clearance[first : last + 1].max())
+        at_best = -1e3 * float(problem.wheel_distance[first : last + 1].max())
         line += f"; the part cuts {at_best:.2f} mm into the wheel at best"
     return line
 
@@ -129,7 +152,7 @@ def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
         if not len(q):
             counts["out of reach"] += 1
         elif not within.any():
-            # the configuration that breaks the fewest shows best what is in the way
+            # the configuration that breaks the fewest shows best what is wrong
             names = min(map(cell.broken_limits, turned.reshape(-1, 6)), key=len)
             counts[f"beyond the limits of {' '.join(names)}"] += 1
         elif cuts[position]:
@@ -146,7 +169,7 @@ def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
 
 
 def _where_it_ended(n_points: int, matrices: list[OpenMatrix]) -> list[str]:
-    """Every cutter point has a free configuration: say what stopped the edges between them."""
+    """Return what stopped the edges where every cutter point has a free configuration."""
     farthest = max(matrices, key=lambda matrix: matrix.reached)
     reached, causes = farthest.reached, sum((matrix.causes for matrix in matrices), Counter())
     lines = []
@@ -155,8 +178,8 @@ def _where_it_ended(n_points: int, matrices: list[OpenMatrix]) -> list[str]:
     if shut:
         first, last = min(shut, key=lambda run: run[1] - run[0])
         lines.append(
-            f"{_run(first, last)}: the shortest run that cannot be passed, on the branch that came "
-            "farthest"
+            f"{_run(first, last)}: the shortest run that cannot be passed, on the IK branch that "
+            "came farthest"
         )
         near = range(first, last + 1)
     if reached == n_points:  # it came through: what counts is what it met most often
@@ -170,10 +193,10 @@ def _where_it_ended(n_points: int, matrices: list[OpenMatrix]) -> list[str]:
         met.sort(key=lambda item: (-item[1], item[0]))
         if met:
             refused = ", ".join(f"{cause} ({count} times)" for cause, count in met[:4])
-            lines.append(f"cutter point {column}: steps refused: {refused}")
+            lines.append(f"cutter point {column}: edges refused: {refused}")
     if len(lines) == n_before:
         lines.append(
-            "no continuous step leads on: the arm would have to change its branch or jump; "
+            "no continuous edge leads on: the arm would have to change its IK branch or jump; "
             "a wider range of contact positions or a turned fixture may help"
         )
     return lines

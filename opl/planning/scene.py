@@ -8,7 +8,7 @@ from functools import cached_property
 from opl.cell.collision import CollisionScene
 from opl.cell.wheel_distance import PartTree, part_tree
 from opl.cell.workcell import WorkCell
-from opl.motion.links import Links
+from opl.motion.free_move_search import FreeMoveSearch
 
 
 @dataclass(frozen=True)
@@ -26,9 +26,9 @@ class PlanningScene:
     part: PartTree
 
     @cached_property
-    def links(self) -> Links:
+    def free_moves(self) -> FreeMoveSearch:
         """Free moves of this scene, and what has been learnt of them."""
-        return Links(self.cell, self.collision, self.part)
+        return FreeMoveSearch(self.cell, self.collision, self.part)
 
 
 def planning_scene(cell: WorkCell) -> PlanningScene:

@@ -17,68 +17,25 @@ from opl.planning.open_matrix import OpenMatrix, Track
 SAME_SUM = 1e-6  # [rad] two tracks whose joint range sums differ by less are equally good
 
 
-def undominated(matrices: list[OpenMatrix]) -> list[int]:
-    """Return the matrices of which no other one makes at least the same motions.
-
-    What is proven of the least joint range sum of these holds for the others too.
-    """
-    return [
-        k
-        for k, matrix in enumerate(matrices)
-        if not any(
-            _dominates(other, matrix) and (m < k or not _dominates(matrix, other))
-            for m, other in enumerate(matrices)
-            if m != k
-        )
-    ]
-
-
-def _dominates(matrix: OpenMatrix, other: OpenMatrix) -> bool:
-    """Return whether every track of ``other`` is one of ``matrix``, shifted or mirrored."""
-    positions = matrix.nodes.position_index
-    rows = np.minimum(np.searchsorted(positions, other.nodes.position_index), len(positions) - 1)
-    if matrix.blocked or len(np.unique(positions)) < len(positions):
-        return False
-    if not np.array_equal(positions[rows], other.nodes.position_index):
-        return False
-    if (other.free & ~matrix.free[:, rows]).any():
-        return False
-    q, q_other = matrix.nodes.q[:, rows][other.free], other.nodes.q[other.free]
-    if not len(q):
-        return True
-    shifted = np.ptp(q - q_other, axis=0) < SAME_SUM
-    mirrored = np.ptp(q + q_other, axis=0) < SAME_SUM
-    return bool((shifted | mirrored).all())
-
-
 def twins(matrices: list[OpenMatrix], track: Track, robot: Robot) -> list[Track]:
     """Return the tracks with the same contact positions and joint range sum, best margin first.
 
     The other flip of the wrist, or a full turn of a wrist axis, makes the same motion at another
     distance from the joint limits. ``track`` itself is among them.
-
-    Args:
-        matrices: All matrices.
-        track: The track.
-        robot: For its joint limits.
     """
     nodes = matrices[track.matrix].nodes
     positions = nodes.position_index[track.rows]
-    total = _range_sum(nodes, track.rows)
+    total = nodes.range_sum(track.rows)
     found = []
     for index, matrix in enumerate(matrices):
         for rows in _followers(matrix.nodes, positions):
-            if abs(_range_sum(matrix.nodes, rows) - total) < SAME_SUM and matrix.allows(rows):
+            if abs(matrix.nodes.range_sum(rows) - total) < SAME_SUM and matrix.allows(rows):
                 q = matrix.nodes.along(rows)
                 margins = np.minimum(q - robot.lower, robot.upper - q).min(axis=0)
                 nearness = float((1.0 / np.maximum(margins, 1e-3)).sum())
                 found.append((nearness, Track(index, rows)))
     found.sort(key=lambda item: item[0])
     return [twin for _, twin in found] or [track]
-
-
-def _range_sum(nodes: NodeMatrix, rows: np.ndarray) -> float:
-    return float(np.ptp(nodes.along(rows), axis=0).sum())
 
 
 def _followers(nodes: NodeMatrix, positions: np.ndarray) -> Iterator[np.ndarray]:

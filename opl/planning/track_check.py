@@ -1,4 +1,4 @@
-"""Is the whole motion of a track free of collision, and if not, what is in the way?"""
+"""Is the whole motion of a track free of collision, and if not, what blocks it?"""
 
 from __future__ import annotations
 
@@ -6,10 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.motion.air import BlockedLinkError, UnreachableApproachError, linked, whole_motion
-from opl.motion.check import Fault, find_faults
-from opl.motion.motion import FREE_MOVES, Motion
+from opl.motion.collision_check import CollidingMove, colliding_moves
+from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
+from opl.motion.whole_motion import (
+    BlockedMotionError,
+    UnreachableApproachError,
+    linked,
+    whole_motion,
+)
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
@@ -17,12 +22,7 @@ from opl.planning.problem import GrindingProblem
 
 @dataclass(frozen=True)
 class Free:
-    """The motion of a track is free.
-
-    Attributes:
-        path: The track with its intermediate nodes.
-        motion: The whole motion.
-    """
+    """The whole motion of a track is free."""
 
     path: GrindingPath
     motion: Motion
@@ -30,69 +30,52 @@ class Free:
 
 @dataclass(frozen=True)
 class NoMotion:
-    """A track becomes no motion.
-
-    Attributes:
-        error: The edge that cannot be filled in, or the approach or retract that does not exist.
-    """
+    """An edge of the track cannot be filled in, or an approach or retract does not exist."""
 
     error: BrokenEdgeError | UnreachableApproachError
 
 
 @dataclass(frozen=True)
 class Collides:
-    """The motion of a track collides.
-
-    Attributes:
-        motion: The motion, its free moves straight.
-        faults: The moves that collide.
-    """
+    """Moves of the motion collide; its free moves are straight."""
 
     motion: Motion
-    faults: tuple[Fault, ...]
+    faults: tuple[CollidingMove, ...]
 
 
 @dataclass(frozen=True)
-class NoLink:
-    """Nothing but a free move stops the motion of a track.
-
-    Attributes:
-        motion: The motion, its free moves straight.
-        error: Which of them was not found, and why.
-    """
+class NoFreeMove:
+    """Nothing but a free move that was not found stops the motion; its free moves are straight."""
 
     motion: Motion
-    error: BlockedLinkError
+    error: BlockedMotionError
 
 
-Blocked = NoMotion | Collides | NoLink
+Blocked = NoMotion | Collides | NoFreeMove
 
 
 def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -> Free | Blocked:
     """Return the motion of a track if it is free, else what blocks it.
 
-    Args:
-        problem: What is to be planned.
-        nodes: The matrix of the track.
-        rows: The row in each column, shape (N,).
+    `rows` are those of the track in each column, shape (N,).
     """
     scene, points = problem.scene, problem.points
     try:
         path = fill_in(scene.cell, points, nodes, rows, problem.interpolation)
-        motion = whole_motion(scene.cell, points, path, problem.pace)
+        motion = whole_motion(scene.cell, points, path, problem.process)
     except (BrokenEdgeError, UnreachableApproachError) as error:
         return NoMotion(error)
-    faults = find_faults(scene.cell, scene.collision, scene.part, motion)
-    # what is in the way of a free move is led around, unless it is where an approach begins
+    faults = colliding_moves(scene.cell, scene.collision, scene.part, motion)
+    # free moves are led around what blocks them, unless it is where an approach begins
     faults = [
         fault
         for fault in faults
-        if motion.stretch[fault.move] not in FREE_MOVES
+        if not motion.kind[fault.move].is_free
         or (fault.at_end and motion.pass_index[fault.move] >= 0)
     ]
     if faults:
         return Collides(motion, tuple(faults))
     try:
-        return Free(path, linked(motion, scene.links))
-    except BlockedLinkError as error:
-        return NoLink(motion, error)
+        return Free(path, linked(motion, scene.free_moves))
+    except BlockedMotionError as error:
+        return NoFreeMove(motion, error)

@@ -10,71 +10,63 @@ added up.
 from __future__ import annotations
 
 import heapq
-import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opl.motion.figures import figures_of_path
+from opl.motion.path import figures_of_path
 from opl.planning.costs import CostWeights, ObjectiveWeights, track_cost
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
+from opl.planning.optimal import OptimalSettings, plan_optimal
 from opl.planning.plan import Found, Plan, WeightedValue, propose_and_check
 from opl.planning.problem import GrindingProblem
-from opl.planning.symmetry import twins, undominated
+from opl.planning.symmetry import twins
 from opl.search.box import JointBox
-from opl.search.certificate import least_box
 from opl.search.ladder import Ladder
 from opl.search.smooth import TrackCost, smoothest
 
 # by which fraction of its size the least box is widened; at last not bounded at all
 WIDENINGS = (1e-6, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, np.inf)
-BOX_GAP = 1e-4  # fraction to which the least box is proven
 MOST_CHECKS = 40  # of motions: what is still blocked then leaves the fallback
 
 Entry = tuple[float, int, int, tuple[int, ...]]  # weighted sum, matrix, widening, rows of a track
 
 
 def plan_weighted(
-    problem: GrindingProblem,
-    weights: ObjectiveWeights,
-    max_contact_change: float,
-    seconds: float,
-    fallback: Plan,
+    problem: GrindingProblem, weights: ObjectiveWeights, settings: OptimalSettings, fallback: Plan
 ) -> Plan:
     """Find a collision-free motion with a small weighted sum, and a bound on the least one.
 
     Args:
         problem: What is to be planned.
         weights: What is charged for.
-        max_contact_change: Largest change of t between neighbouring cutter points in belt units.
-        seconds: After this time no further box is proven.
+        settings: What is wanted of the least joint range sum.
         fallback: A motion that is known; returned if none better is found.
 
     Returns:
         The plan with its weighted sum and what that can be at the least.
     """
-    deadline = time.monotonic() + seconds
     prices = CostWeights(np.full(6, weights.travel), 0.0, weights.time, 0.0, 0.0, 0.0, 0.0)
     matrices = open_matrices(problem)
+    smallest = plan_optimal(problem, settings, fallback) if weights.joint_range > 0.0 else fallback
+    least_range = smallest.lower_bound or 0.0
+    box = JointBox(smallest.path.q.min(axis=0), smallest.path.q.max(axis=0))
     lower_bound = np.inf
     queue: list[Entry] = []
     sweeps = {}
-    for index in undominated(matrices):
-        matrix = matrices[index]
+    for index, matrix in enumerate(matrices):
         cost = track_cost(problem, matrix.nodes, prices, np.zeros_like(matrix.free))
-        left = deadline - time.monotonic()
-        proven = least_box(matrix.ladder, matrix.blocked_edges, gap=BOX_GAP, seconds=left)
         rest = smoothest(matrix.ladder, matrix.blocked_edges, matrix.free, cost)
         if rest is not None:
             # the parts are each at least their own least, so the sum is at least theirs
-            least = weights.joint_range * proven.lower_bound + rest.cost
-            lower_bound = min(lower_bound, least)
-        ladder = matrix.ladder_within(max_contact_change)
-        sweeps[index] = sweep = _Sweep(index, matrix, ladder, proven.box, cost, weights)
+            lower_bound = min(lower_bound, weights.joint_range * least_range + rest.cost)
+        ladder = matrix.ladder_within(settings.max_contact_change)
+        sweeps[index] = sweep = _Sweep(index, matrix, ladder, box, cost, weights)
         queue += sweep.entries(range(len(WIDENINGS)))
     heapq.heapify(queue)
-    best, value = fallback, _value(problem, fallback, weights)
+    best = min(smallest, fallback, key=lambda plan: _value(problem, plan, weights))
+    value = _value(problem, best, weights)
     checks = 0
     # what a track costs at its nodes bounds from below what its path does
     while queue and queue[0][0] < value and checks < MOST_CHECKS:
@@ -90,7 +82,8 @@ def plan_weighted(
             checks += len(proposals)
             for entry in sweeps[index].entries([widening]):
                 heapq.heappush(queue, entry)
-    return replace(best, weighted=WeightedValue(value, min(lower_bound, value)))
+    known = WeightedValue(value, min(lower_bound, value))
+    return replace(best, lower_bound=None, weighted=known)
 
 
 @dataclass(frozen=True)
@@ -100,7 +93,7 @@ class _Sweep:
     index: int
     matrix: OpenMatrix
     ladder: Ladder
-    box: JointBox | None
+    box: JointBox
     cost: TrackCost
     weights: ObjectiveWeights
 
@@ -108,16 +101,16 @@ class _Sweep:
         """Yield the best track in each box."""
         for widening in widenings:
             amount, inside = WIDENINGS[widening], self.matrix.free
-            if self.box is not None and np.isfinite(amount):
+            if np.isfinite(amount):
                 inside = self.matrix.free_inside(self.box.widened(amount * self.box.size))
             track = smoothest(self.ladder, self.matrix.blocked_edges, inside, self.cost)
             if track is not None:
-                ranges = np.ptp(self.matrix.nodes.along(track.rows), axis=0)
-                total = self.weights.joint_range * float(ranges.sum()) + track.cost
+                range_sum = self.matrix.nodes.range_sum(track.rows)
+                total = self.weights.joint_range * range_sum + track.cost
                 yield total, self.index, widening, tuple(track.rows.tolist())
 
 
 def _value(problem: GrindingProblem, plan: Plan, weights: ObjectiveWeights) -> float:
     robot = problem.cell.robot
-    figures = figures_of_path(plan.path, plan.motion, problem.points, problem.pace, robot)
+    figures = figures_of_path(plan.path, plan.motion, problem.points, problem.process, robot)
     return weights.value(figures)

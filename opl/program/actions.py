@@ -87,10 +87,14 @@ class Actions:
     at_end: tuple[Action, ...] = ()
 
     @property
+    def every(self) -> tuple[Action, ...]:
+        """All of them."""
+        return (*self.at_start, *self.before_pass, *self.after_pass, *self.at_end)
+
+    @property
     def calls(self) -> frozenset[str]:
         """Names of the programs called."""
-        every = (*self.at_start, *self.before_pass, *self.after_pass, *self.at_end)
-        return frozenset(action.name for action in every if isinstance(action, Call))
+        return frozenset(action.name for action in self.every if isinstance(action, Call))
 
 
 NO_ACTIONS = Actions()

@@ -1,8 +1,8 @@
 """How long a written program runs, with the ramps that the controller puts to its moves.
 
 The speeds of a program are those between the ramps: a controller comes up to them from rest and
-goes down to rest wherever it stops. How long that takes is told by the time law that planned the
-moves, now at rest at both ends of every stretch between two stops.
+goes down to rest wherever it stops. How long that takes says the time law that planned the
+moves, now at rest at both ends of each run between two stops.
 """
 
 from __future__ import annotations
@@ -15,27 +15,28 @@ from opl.cell.robot import Robot
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, fastest_law
 from opl.program.actions import Call, Dwell, WaitInput
-from opl.program.moves import CycleTime, Kind, Move, Program
-from opl.program.settings import ByKind, ProgramSettings
+from opl.program.moves import CycleTime, Move, Program, Purpose
+from opl.program.settings import ProgramSettings
 
 
 def cycle_time(
     program: Program, times: Mapping[int, float], robot: Robot, settings: ProgramSettings
 ) -> CycleTime:
-    """Return how long a program takes from its first posture to its last.
+    """Return how long a program takes from its first configuration to its last.
 
     Args:
         program: The moves.
-        times: Time of the move to each posture at the written speed in [s], by the posture's index.
+        times: Time of the move to each configuration at the written speed in [s], by the
+            configuration's index.
         robot: Whose moves; where the job slows its ramps (ACC, DEC), so are they here.
         settings: How the program is written.
 
     Raises:
         UnsafeError: If the time law does not keep the joints' limits.
     """
-    spent = dict.fromkeys(Kind, 0.0)
+    spent = dict.fromkeys(Purpose, 0.0)
     ramps = 0.0
-    for moves in _stretches(program.moves):
+    for moves in _runs(program.moves):
         limits = JointLimits(robot.max_speed, _acceleration(moves[1:], robot, settings))
         wanted = np.array([move.duration or 0.0 for move in moves[1:]])
         q = np.array([move.q for move in moves])
@@ -46,19 +47,19 @@ def cycle_time(
         ramps += longer
         spent[moves[1].kind] += longer
         for move, time in zip(moves[1:], wanted, strict=True):
-            spent[move.kind] += times.get(move.posture, float(time))
+            spent[move.kind] += times.get(move.motion_index, float(time))
     actions = [action for move in program.moves for action in move.actions]
     return CycleTime(
-        passes=spent[Kind.WHEEL],
-        leads=spent[Kind.LEAD],
-        air=spent[Kind.AIR],
+        passes=spent[Purpose.WHEEL],
+        leads=spent[Purpose.LEAD],
+        air=spent[Purpose.AIR],
         waits=sum((one.seconds for one in actions if isinstance(one, Dwell)), 0.0),
         ramps=ramps,
         open_ended=any(isinstance(one, (WaitInput, Call)) for one in actions),
     )
 
 
-def _stretches(moves: Sequence[Move]) -> Iterator[Sequence[Move]]:
+def _runs(moves: Sequence[Move]) -> Iterator[Sequence[Move]]:
     """Yield the moves from one stop to the next; the first of each is where it starts."""
     start = 0
     for k in range(1, len(moves)):
@@ -68,12 +69,8 @@ def _stretches(moves: Sequence[Move]) -> Iterator[Sequence[Move]]:
 
 
 def _acceleration(moves: Sequence[Move], robot: Robot, settings: ProgramSettings) -> np.ndarray:
-    """Return the joint accelerations of a stretch as the program asks for them, shape (6,)."""
+    """Return the joint accelerations of a run as the program sets them, shape (6,)."""
     percents = [100.0]
     for ramp in (settings.acceleration, settings.deceleration):
-        percents += [percent for move in moves if (percent := _percent(ramp, move.kind))]
+        percents += [percent for move in moves if (percent := ramp.of(move.kind))]
     return robot.max_acceleration * min(percents) / 100.0
-
-
-def _percent(ramp: ByKind, kind: Kind) -> int | None:
-    return {Kind.WHEEL: ramp.on_wheel, Kind.LEAD: ramp.lead, Kind.AIR: ramp.air}[kind]

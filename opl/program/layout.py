@@ -27,7 +27,7 @@ def fill(template: Path, values: Mapping[str, object]) -> str:
     """Return the text of a template file, lines ended by a bare line feed.
 
     Raises:
-        InputError: If the file cannot be read or is no template, or asks for a value there is not.
+        InputError: If the file cannot be read or is no template, or uses a value there is not.
     """
     try:
         source = template.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Straight moves of the tool point, made only where they stay near the verified path.
+"""Straight moves of the tool point: where they may be made, and through which configurations.
 
 The verification replayed joint moves. A straight move leaves that path in between its ends, where
 it is the same; how far is measured at the corners of the box around the held part: no point of the
@@ -10,16 +10,21 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from opl.cell.full_turns import nearest_turn
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
-from opl.geometry.frames import inverse, pose, transform
-from opl.program.moves import Kind, Program
-
-Array = NDArray[np.float64]
+from opl.geometry.frames import Array, inverse, pose, transform
+from opl.program.moves import Program, Purpose
 
 _BETWEEN = np.array([0.25, 0.5, 0.75])
+LINE_STEP = 1e-3  # [m] of the tool point between configurations on a line
+LINE_TURN = np.deg2rad(0.5)  # of the hand and of any joint between them
+# Farthest that the end of a line may be from the configuration it is written with in [rad]: poses
+# have few digits. A line that ends on another ik_branch is off by far more.
+_SAME_END = np.deg2rad(0.5)
+_FURTHEST_TURN = np.deg2rad(20.0)  # of a joint from one to the next on a line: beyond, it flips
 
 
 def with_straight_moves(
@@ -37,17 +42,17 @@ def with_straight_moves(
     strays = stray(robot, np.array([move.q for move in program.moves]), T_flange_tool, corners)
     moves = [program.moves[0]] if program.moves else []
     for move, distance in zip(program.moves[1:], strays, strict=True):
-        straight = move.kind is not Kind.AIR and bool(distance <= tolerance)
+        straight = move.kind is not Purpose.AIR and bool(distance <= tolerance)
         moves.append(replace(move, straight=straight))
     return replace(program, moves=tuple(moves))
 
 
 def stray(robot: Robot, q: Array, T_flange_tool: Array, corners: Array) -> Array:
-    """Return how far straight moves lead from joint moves between the same postures.
+    """Return how far straight moves lead from joint moves between the same configurations.
 
     Args:
         robot: Whose moves.
-        q: Postures in [rad], shape (n, 6).
+        q: Configurations in [rad], shape (n, 6).
         T_flange_tool: The tool whose point runs straight, shape (4, 4).
         corners: Points that move along, in the flange frame in [m], shape (k, 3).
 
@@ -64,7 +69,7 @@ def stray(robot: Robot, q: Array, T_flange_tool: Array, corners: Array) -> Array
     apart = transform(Ts_joint[..., None, :, :], corners) - transform(
         Ts_straight[..., None, :, :], corners
     )
-    return np.linalg.norm(apart, axis=-1).max(axis=(0, 2))
+    return np.asarray(np.linalg.norm(apart, axis=-1).max(axis=(0, 2)))
 
 
 def _straight(Ts_start: Array, Ts_end: Array) -> Array:
@@ -81,3 +86,48 @@ def _straight(Ts_start: Array, Ts_end: Array) -> Array:
             for s in _BETWEEN
         ]
     )
+
+
+def straight_configurations(
+    robot: Robot, start: Array, end: Array, T_flange_tool: Array
+) -> Array | None:
+    """Return the configurations of a straight move after its start, the last of them its end.
+
+    Args:
+        robot: Whose move.
+        start: Joint positions in [rad], shape (6,).
+        end: As start.
+        T_flange_tool: The tool whose point runs straight, shape (4, 4).
+
+    Returns:
+        Joint positions in [rad], shape (k, 6); None if the line leaves the reach, passes through a
+        singularity, or ends in another configuration.
+    """
+    T_start, T_end = forward_kinematics(robot, np.stack([start, end])) @ T_flange_tool
+    first = Rotation.from_matrix(T_start[:3, :3])
+    turn = (first.inv() * Rotation.from_matrix(T_end[:3, :3])).as_rotvec()
+    distance = T_end[:3, 3] - T_start[:3, 3]
+    longest = max(
+        np.linalg.norm(distance) / LINE_STEP,
+        np.linalg.norm(turn) / LINE_TURN,
+        np.abs(end - start).max() / LINE_TURN,
+        1.0,
+    )
+    s = np.arange(1, int(np.ceil(longest)) + 1)[:, None] / np.ceil(longest)
+    Ts_base_tool = pose(
+        (first * Rotation.from_rotvec(s * turn)).as_matrix(), T_start[:3, 3] + s * distance
+    )
+    guess = start + s * (end - start)
+    slots = inverse_kinematics(robot.arm, Ts_base_tool @ inverse(T_flange_tool), guess)
+    found, q = [], start
+    for candidates in slots:
+        turned = nearest_turn(candidates, q)
+        apart = np.abs(turned - q).max(axis=1)
+        if np.isnan(apart).all() or np.nanmin(apart) > _FURTHEST_TURN:
+            return None
+        q = turned[int(np.nanargmin(apart))]
+        found.append(q)
+    if np.abs(found[-1] - end).max() > _SAME_END:
+        return None
+    found[-1] = end
+    return np.array(found)

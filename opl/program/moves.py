@@ -1,6 +1,6 @@
 """A robot program that belongs to no maker yet: moves with speeds, stops and comments.
 
-Every move is planned as a joint move. Between two postures the controller then does what the
+Every move is planned as a joint move. Between two configurations the controller then does what the
 verification replayed: all joints run linearly, in step with the slowest. A straight-line move leads
 the hand's tool point along a line instead, away from where the contact was proven;
 `opl.program.lines` makes one only where it stays near enough.
@@ -9,36 +9,40 @@ the hand's tool point along a line instead, away from where the contact was prov
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from opl.errors import UnsafeError
-from opl.motion.motion import Motion, Stretch, VerifiedMotion
+from opl.geometry.frames import Array
+from opl.motion.motion import Motion, Phase, TimedMotion, VerifiedMotion
 from opl.program.actions import NO_ACTIONS, Action, Actions
-from opl.program.stops import ON_WHEEL, actions_at, stops_at
+from opl.program.stops import actions_at, stops_at
 
-Array = NDArray[np.float64]
-
-# Speed of the move to the first posture. Nothing is known of where the robot starts from, so that
-# move is proven by nobody but the person who watches it.
+# Speed of the move to the first configuration. Nothing is known of where the robot starts from, so
+# that move is proven by nobody but the person who watches it.
 START_SPEED = 0.05
-# Postures nearer to each other than this in every joint [rad] are one: a micrometre at the end of
-# the arm, a tenth of an encoder pulse.
-SAME_POSTURE = 1e-6
-# What a move may ask above a joint's top speed before it is refused: the last digit a controller
-# can be told.
+# Configurations nearer to each other than this in every joint [rad] are one: a micrometre at the
+# end of the arm, a tenth of an encoder pulse.
+SAME_CONFIGURATION = 1e-6
+# What a move may need above a joint's top speed before it is refused: the last digit of a speed.
 OVERSPEED = 1e-4
 
 
-class Kind(str, Enum):
+class Purpose(str, Enum):
     """What a move is for."""
 
     WHEEL = "on_wheel"  # grinding
     LEAD = "lead"  # approach or retract, to or from the wheel
     AIR = "air"  # from and to home, and between passes
+
+    @classmethod
+    def of(cls, phase: Phase) -> Purpose:
+        """Return the kind of a move by what happens during it."""
+        return {Phase.GRINDING: cls.WHEEL, Phase.FREE: cls.AIR}.get(phase, cls.LEAD)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +56,7 @@ class Move:
         exact_stop: Whether the robot comes to rest there; if not, the next move may round the
             corner.
         on_wheel: Whether the part touches the wheel there.
-        posture: Index of that posture in the motion.
+        motion_index: Index of that configuration in the motion.
         kind: What it is for.
         ground_pass: The pass ground during the whole move, counted from 0, None off the wheel.
         straight: Whether the tool point runs on a straight line instead of the joints.
@@ -64,9 +68,9 @@ class Move:
     speed: float
     exact_stop: bool
     on_wheel: bool
-    posture: int
+    motion_index: int
     duration: float | None = None
-    kind: Kind = Kind.AIR
+    kind: Purpose = Purpose.AIR
     ground_pass: int | None = None
     straight: bool = False
     comment: str | None = None
@@ -98,7 +102,7 @@ class PassTime:
 
 @dataclass(frozen=True)
 class CycleTime:
-    """How long a program runs, from its first posture to its last.
+    """How long a program runs, from its first configuration to its last.
 
     Attributes:
         passes: Grinding in [s].
@@ -142,6 +146,19 @@ class Program:
     pass_times: tuple[PassTime, ...] = ()
     cycle: CycleTime | None = None
 
+    @property
+    def q(self) -> Array:
+        """Where the moves end, joint positions in [rad], shape (n, 6)."""
+        return np.array([move.q for move in self.moves]).reshape(-1, 6)
+
+    @property
+    def chained(self) -> list[bool]:
+        """Whether each move but the first goes on with the pass of the move before."""
+        return [
+            move.ground_pass is not None and move.ground_pass == before.ground_pass
+            for before, move in pairwise(self.moves)
+        ]
+
 
 def plan_moves(
     verified: VerifiedMotion,
@@ -153,9 +170,9 @@ def plan_moves(
 ) -> Program:
     """Turn a verified motion into moves.
 
-    A posture that repeats the one before needs no move; its time goes to the move that follows,
-    which so gets slower, never faster. The robot stops at home, where it enters and leaves the
-    wheel, where a stretch ends, and at sharp corners off the wheel; it never stops within a pass.
+    A configuration that repeats the one before needs no move; its time goes to the move that
+    follows, which so gets slower, never faster. The robot stops at home, where it enters and leaves
+    the wheel, where a phase ends, and at sharp corners off the wheel; it never stops within a pass.
 
     Args:
         verified: What the program shall do.
@@ -171,61 +188,57 @@ def plan_moves(
     """
     if not isinstance(verified, VerifiedMotion):
         raise TypeError(f"a program is made of a VerifiedMotion, got {type(verified).__name__}")
-    motion = verified.motion
-    kept = _distinct_postures(motion.q)
-    speeds = _speeds(motion, kept, np.asarray(max_speed), joint_names)
-    times = np.diff(np.cumsum(motion.duration)[kept]).tolist()
-    # reduceat: a kept posture also stands for the repeated ones that follow it
-    on_wheel = np.logical_or.reduceat([s in ON_WHEEL for s in motion.stretch], kept)
-    stops = stops_at(motion, kept, on_wheel)
-    done_there = actions_at(motion, kept, on_wheel, actions)
+    kept = _distinct_configurations(verified.motion.q)
+    motion = _without_repeats(verified.motion, kept)
+    speeds = _speeds(verified.timed, kept, np.asarray(max_speed), joint_names)
+    times = verified.timed.take(kept).duration.tolist()
+    stops, on_wheel = stops_at(motion), motion.on_wheel
+    done_there = actions_at(motion, actions)
     moves = []
-    before: int | None = None
-    for m, posture in enumerate(kept):
-        pass_here = int(motion.pass_index[posture])
-        pass_before = None if before is None else int(motion.pass_index[before])
+    pass_before: int | None = None
+    for m, (configuration, phase) in enumerate(zip(kept, motion.phase, strict=True)):
+        pass_here = int(motion.pass_index[m])
         comment = "HOME" if pass_here < 0 else f"PASS {pass_here + 1}"
-        grinding = m > 0 and on_wheel[m] and on_wheel[m - 1] and pass_here == pass_before
         moves.append(
             Move(
-                q=motion.q[posture],
+                q=motion.q[m],
                 speed=float(speeds[m]),
-                exact_stop=bool(stops[m]),
+                exact_stop=stops[m],
                 on_wheel=bool(on_wheel[m]),
-                posture=int(posture),
-                duration=times[m - 1] if m else None,
-                kind=_kind(motion.stretch[posture], grinding, bool(on_wheel[m])),
-                ground_pass=pass_here if grinding else None,
+                motion_index=int(configuration),
+                duration=times[m] if m else None,
+                kind=Purpose.of(phase),
+                ground_pass=pass_here if phase is Phase.GRINDING else None,
                 comment=comment if pass_here != pass_before else None,
                 actions=done_there.get(m, ()),
             )
         )
-        before = int(posture)
+        pass_before = pass_here
     return Program(name=name, comments=tuple(comments), moves=tuple(moves))
 
 
-def _kind(stretch: Stretch, grinding: bool, on_wheel: bool) -> Kind:
-    if grinding:
-        return Kind.WHEEL
-    if on_wheel or stretch in (Stretch.APPROACH, Stretch.RETRACT):
-        return Kind.LEAD  # the move onto the wheel ends the approach
-    return Kind.AIR
-
-
-def _distinct_postures(q: Array) -> NDArray[np.intp]:
-    """Return the indices of the postures that differ from the last one kept."""
+def _distinct_configurations(q: Array) -> NDArray[np.intp]:
+    """Return the indices of the configurations that differ from the last one kept."""
     kept = [0]
     for i in range(1, len(q)):
-        if np.abs(q[i] - q[kept[-1]]).max() > SAME_POSTURE:
+        if np.abs(q[i] - q[kept[-1]]).max() > SAME_CONFIGURATION:
             kept.append(i)
     return np.array(kept)
 
 
+def _without_repeats(motion: Motion, kept: NDArray[np.intp]) -> Motion:
+    """Return the kept configurations; what one is for, those that repeat it on the wheel say."""
+    repeats = np.split(np.arange(len(motion)), kept[1:])
+    on_wheel = motion.on_wheel
+    rows = [int(group[on_wheel[group].argmax()]) for group in repeats]
+    return replace(motion.take(rows), q=motion.q[kept])
+
+
 def _speeds(
-    motion: Motion, kept: NDArray[np.intp], max_speed: Array, joint_names: Sequence[str]
+    timed: TimedMotion, kept: NDArray[np.intp], max_speed: Array, joint_names: Sequence[str]
 ) -> Array:
-    """Return the speed of the move to each kept posture, shape (len(kept),)."""
-    times = np.diff(np.cumsum(motion.duration)[kept])
+    """Return the speed of the move to each kept configuration, shape (len(kept),)."""
+    motion, times = timed.motion, timed.take(kept).duration[1:]
     joint_times = np.abs(np.diff(motion.q[kept], axis=0)) / max_speed  # at top speed, [s]
     with np.errstate(divide="ignore"):
         speeds = np.concatenate([[START_SPEED], joint_times.max(axis=1) / times])
@@ -233,7 +246,8 @@ def _speeds(
     if speeds[m] > 1.0 + OVERSPEED:
         joint = joint_names[int(np.argmax(joint_times[m - 1]))]
         raise UnsafeError(
-            f"posture {kept[m]} ({motion.stretch[kept[m]].value}): joint {joint} would need "
+            f"configuration {kept[m]} ({motion.kind[kept[m]].value}): joint {joint} would need "
             f"{100.0 * speeds[m]:.1f} % of its top speed"
         )
-    return np.minimum(speeds, 1.0)
+    possible: Array = np.minimum(speeds, 1.0)
+    return possible

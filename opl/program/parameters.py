@@ -73,11 +73,7 @@ class AxisParameters:
 
 
 def read_parameters(text: str, source: str) -> AxisParameters:
-    """Read the text of ``RC.PRM`` or ``ALL.PRM``.
-
-    Args:
-        text: The file, line ends of any kind.
-        source: What messages call it.
+    """Read the text of ``RC.PRM`` or ``ALL.PRM``, line ends of any kind.
 
     Raises:
         InputError: If the section is missing, too short, or its numbers cannot be ratios.

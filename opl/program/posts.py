@@ -6,6 +6,9 @@ in the site's own package, which leaves opl as it is::
 
     [project.entry-points."opl.posts"]
     OUR_CELL = "our_package.our_module:POST"
+
+A post that has a `Reader` gets its programs read back and proven from their bytes. Without one they
+are written and not read back, and nothing claims more.
 """
 
 from __future__ import annotations
@@ -17,9 +20,10 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from opl.cell.robot import Robot
-from opl.errors import InputError, OplError
-from opl.program.controller import ControllerProfile
+from opl.errors import InputError, PassTimeError, SettingError
+from opl.geometry.frames import Array
 from opl.program.moves import PassTime, Program
+from opl.program.played import Corners, Reading, WrittenSpeed
 from opl.program.settings import ProgramSettings
 
 GROUP = "opl.posts"
@@ -35,7 +39,8 @@ class Written:
 
     Attributes:
         files: Text by file name, line ends as the controller wants them, the one to start first.
-        speeds: Speed of the move to each posture as written, by the posture's index in the motion.
+        speeds: Speed of the move to each configuration as written, by the configuration's index in
+            the motion.
         times: Time of that move at the written speed in [s], ramps left out, by the same index.
         pass_times: Of each pass.
     """
@@ -47,8 +52,33 @@ class Written:
 
 
 @dataclass(frozen=True)
+class Reader:
+    """How the programs of a language are read back.
+
+    Attributes:
+        suffix: How the names of its files end, e.g. ``.mod``.
+        read: Reads all files of a program, content by what messages call them.
+        rounded: Returns the configurations nearest to some, shape (n, 6) in [rad], that the digits
+            of a program can express: these are proven, and these are read back.
+        start: The fastest first move of a program: nobody knows from where it comes.
+        corners: The largest corners that a job allows.
+        describe: Says in lines what a file does, given its name, content and robot.
+        differences: Says in lines what one file does and another does not, ``-`` and ``+``, given
+            the name and content of both.
+    """
+
+    suffix: str
+    read: Callable[[Mapping[str, bytes], Robot, ProgramSettings], Reading]
+    rounded: Callable[[Array, Robot, ProgramSettings], Array]
+    start: Callable[[Robot], WrittenSpeed]
+    corners: Callable[[ProgramSettings], Corners]
+    describe: Callable[[str, bytes, Robot], list[str]]
+    differences: Callable[[tuple[str, bytes], tuple[str, bytes]], list[str]]
+
+
+@dataclass(frozen=True)
 class Post:
-    """One way to write programs.
+    """How programs are written for one controller.
 
     Attributes:
         title: The controller, for people.
@@ -57,7 +87,7 @@ class Post:
         template: The layout that comes with the post.
         variables: What its templates get: name and meaning.
         counts_pulses: Whether positions may be written in encoder pulses.
-        profile: The Yaskawa controller whose INFORM jobs it writes, None for other languages.
+        reader: Reads its programs back; None where they are written and not read back.
     """
 
     title: str
@@ -65,7 +95,7 @@ class Post:
     template: Path
     variables: Mapping[str, str]
     counts_pulses: bool = False
-    profile: ControllerProfile | None = None
+    reader: Reader | None = None
 
 
 def known_posts() -> list[str]:
@@ -73,26 +103,49 @@ def known_posts() -> list[str]:
     return sorted({entry.name for entry in entry_points(group=GROUP)})
 
 
-def find_post(name: str, where: str = "program.controller") -> Post:
-    """Return the post of a controller.
-
-    Args:
-        name: As a job names it.
-        where: File and key, for messages.
+def find_post(name: str) -> Post:
+    """Return the post of a controller by the name that jobs give it.
 
     Raises:
-        InputError: If there is none, or it cannot be loaded.
+        SettingError: If there is none, or it cannot be loaded.
     """
     found = [entry for entry in entry_points(group=GROUP) if entry.name == name]
     if not found:
-        raise InputError(where, f"unknown controller {name!r}; known: {', '.join(known_posts())}")
+        known = ", ".join(known_posts())
+        raise SettingError("controller", f"unknown controller {name!r}; known: {known}")
     try:
         post = found[0].load()
     except Exception as error:  # a package of the site's own: whatever is wrong in it
-        raise InputError(where, f"post {found[0].value} cannot be loaded: {error}") from error
+        message = f"post {found[0].value} cannot be loaded: {error}"
+        raise SettingError("controller", message) from error
     if not isinstance(post, Post):
-        raise InputError(where, f"post {found[0].value} is no opl.program.posts.Post")
+        raise SettingError("controller", f"post {found[0].value} is no opl.program.posts.Post")
     return post
+
+
+def readers() -> dict[str, Reader]:
+    """Return the reader of each suffix of files that opl can read, by the suffix in capitals."""
+    found: dict[str, Reader] = {}
+    for name in known_posts():
+        try:
+            reader = find_post(name).reader
+        except InputError:
+            continue  # a post that cannot be loaded is an error for the job that names it only
+        if reader is not None:
+            found.setdefault(reader.suffix.upper(), reader)
+    return found
+
+
+def reader_for(path: Path) -> Reader:
+    """Return the reader of a program file by its suffix, in either case.
+
+    Raises:
+        InputError: If no post reads such files.
+    """
+    known = readers()
+    if path.suffix.upper() not in known:
+        raise InputError(str(path), f"is no program that can be read: {', '.join(sorted(known))}")
+    return known[path.suffix.upper()]
 
 
 def pass_times(
@@ -102,24 +155,24 @@ def pass_times(
 
     Args:
         program: The moves.
-        times: Time of the move to each posture as written in [s], by the posture's index.
+        times: Time of the move to each configuration as written in [s], by the configuration's
+            index.
         controller: For messages.
 
     Raises:
-        OplError: If a pass does not keep its time.
+        PassTimeError: If a pass does not keep its time.
     """
-    wanted: dict[int, float] = {}
-    written: dict[int, float] = {}
+    sums: dict[int, tuple[float, float]] = {}
     for move in program.moves:
         if move.ground_pass is not None and move.duration is not None:
-            wanted[move.ground_pass] = wanted.get(move.ground_pass, 0.0) + move.duration
-            written[move.ground_pass] = written.get(move.ground_pass, 0.0) + times[move.posture]
-    found = {index: PassTime(wanted[index], written[index]) for index in sorted(wanted)}
+            wanted, written = sums.get(move.ground_pass, (0.0, 0.0))
+            both = wanted + move.duration, written + times[move.motion_index]
+            sums[move.ground_pass] = both
+    found = {index: PassTime(*both) for index, both in sorted(sums.items())}
     for index, one in found.items():
         if abs(one.error) > PASS_TIME_TOLERANCE:
-            raise OplError(
+            raise PassTimeError(
                 f"pass {index + 1} would take {one.written:.2f} s instead of {one.wanted:.2f} s: "
-                f"{controller} cannot be told speeds so low; raise process.feed_mm_s, or ask for "
-                "program.motion: straight"
+                f"{controller} takes no speeds so low"
             )
     return tuple(found.values())

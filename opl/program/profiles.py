@@ -48,7 +48,7 @@ DX200 = ControllerProfile(
     # C00000 in every saved job
     label_digits=5,
     # DT of DX100: six settings and r1 to r18; 24 in every saved job
-    configuration_fields=24,
+    rconf_fields=24,
     # every one of 745 saved positions
     length_decimals=3,
     angle_decimals=4,
@@ -86,7 +86,7 @@ NX100 = replace(
     # the remote commands count steps with three digits
     step_limit=999,
     # DT of NX100 names 6 to 8 fields; the first six are the ones with a meaning
-    configuration_fields=6,
+    rconf_fields=6,
     # jobs of that generation have two decimals of angles
     angle_decimals=2,
     # DT of NX100: 0 to 23; user frames 1 to 24

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opl.cell.robot import Robot
-from opl.errors import InputError, UnsafeError
+from opl.errors import InputError, SettingError, UnsafeError
+from opl.geometry.frames import Array
 
-Array = NDArray[np.float64]
 Pulses = NDArray[np.int64]
 
 
@@ -76,34 +76,41 @@ class PulseScale:
         """Lower and upper limits in pulses, as the controller keeps them, shapes (6,)."""
         return self._nearest(self.lower), self._nearest(self.upper)
 
-    def to_pulses(self, q: Array) -> Pulses:
+    def to_pulses(self, q: Array, inwards: bool = False) -> Pulses:
         """Return the pulses nearest to joint positions.
 
         Args:
             q: Joint positions in [rad], shape (..., 6).
+            inwards: Whether a joint at its limit is rounded inwards, if that limit is no whole
+                number of pulses.
 
         Returns:
             Pulses, shape (..., 6).
 
         Raises:
             InputError: If the ratio of a joint is not known.
-            UnsafeError: If a joint is beyond its soft limit; the first such posture is named.
+            UnsafeError: If a joint is beyond its soft limit; the first such configuration is named.
         """
         if not self.complete:
-            raise InputError("program.pulse_ratios", "the pulses per degree are not known")
-        postures = np.atleast_2d(q)
-        if not np.all(np.isfinite(postures)):
+            raise InputError("", "the pulses per degree are not known")
+        stack = np.atleast_2d(q)
+        if not np.all(np.isfinite(stack)):
             raise UnsafeError("a joint position is not a number")
-        pulses = self._nearest(postures)
+        pulses = self._nearest(stack)
         lower, upper = self.soft_limits
         beyond = np.argwhere((pulses < lower) | (pulses > upper))
         if len(beyond):
             *_, joint = place = tuple(beyond[0])
             raise UnsafeError(
-                f"posture {place[-2]}: joint {self.joint_names[joint]} at "
-                f"{np.rad2deg(postures[place]):.3f} deg is {pulses[place]} pulses, the soft limits "
+                f"configuration {place[-2]}: joint {self.joint_names[joint]} at "
+                f"{np.rad2deg(stack[place]):.3f} deg is {pulses[place]} pulses, the soft limits "
                 f"are {lower[joint]} and {upper[joint]}"
             )
+        if inwards:
+            slack = 1e-6  # pulses
+            lowest = np.ceil(self.lower * self.pulses_per_radian - slack)
+            highest = np.floor(self.upper * self.pulses_per_radian + slack)
+            pulses = np.clip(pulses, lowest, highest).astype(np.int64)
         return pulses.reshape(np.shape(q))
 
     def to_angles(self, pulses: NDArray[np.generic]) -> Array:
@@ -114,42 +121,37 @@ class PulseScale:
         return np.rint(q * self.pulses_per_radian).astype(np.int64)
 
 
-def require_known(robot: Robot, where: str) -> None:
+def require_known(robot: Robot) -> None:
     """Refuse to count a robot in pulses that are not known.
 
-    Args:
-        robot: Whose program.
-        where: File and key that would give them.
-
     Raises:
-        InputError: If the ratio of a joint is missing; tells the ways out.
+        SettingError: If the ratio of a joint is missing; names what gives it.
     """
     missing = ", ".join(robot.missing_pulses)
     if missing:
-        raise InputError(
-            where,
+        raise SettingError(
+            "pulses_per_radian",
             f"no pulses per degree are known of {missing} of {robot.title} (robot: {robot.name}), "
             "so its program cannot be written in pulses; give the controller's own (opl robots "
             "import-params)",
         )
 
 
-def require_accepted(unverified: Collection[str], accepted: Collection[str], where: str) -> None:
+def require_accepted(unverified: Collection[str], accepted: Collection[str]) -> None:
     """Refuse pulses of joints whose ratio nobody has confirmed and the user has not accepted.
 
     Args:
         unverified: Names of the joints whose ratio is not confirmed.
         accepted: Names of the joints the user accepts all the same.
-        where: File and key that would accept them.
 
     Raises:
-        InputError: If a joint is missing; tells the ways out.
+        SettingError: If a joint is missing; names what helps.
     """
     missing = [name for name in unverified if name not in accepted]
     if missing:
-        raise InputError(
-            where,
+        raise SettingError(
+            "accepted_pulses",
             f"the pulses per degree of {', '.join(missing)} are not verified, so a pulse program "
-            "may lead anywhere; give the controller's own (opl robots import-params, then "
-            f"program.pulse_ratios), or accept them by name: [{', '.join(missing)}]",
+            "may lead anywhere; give the file of the controller's own (opl robots import-params), "
+            f"or accept them by name: [{', '.join(missing)}]",
         )

@@ -6,8 +6,8 @@ same axis in two positions, each in pulses and in degrees.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -16,9 +16,10 @@ from pydantic import Field, model_validator
 
 from opl.cell.robot import Robot
 from opl.cell.spherical_wrist import SphericalWristArm
-from opl.documents import Document, read
 from opl.errors import InputError
-from opl.program.parameters import AxisParameters
+from opl.files.documents import Document, read
+from opl.files.writing import write_file
+from opl.program.parameters import AxisParameters, read_parameters
 
 # Readings nearer than this in [deg] give a ratio of too few digits: the pendant shows hundredths.
 LEAST_SPAN = 20.0
@@ -80,10 +81,6 @@ def with_ratios(robot: Robot, path: Path) -> Robot:
     The axes of the file are verified then; axes it leaves out stay as they were. Of two limits the
     narrower one holds.
 
-    Args:
-        robot: The robot as opl knows it.
-        path: The file.
-
     Raises:
         InputError: If the file is unusable or of another robot.
     """
@@ -116,14 +113,39 @@ def with_ratios(robot: Robot, path: Path) -> Robot:
     )
 
 
-def ratio_file(robot: Robot, parameters: AxisParameters, source: str) -> str:
-    """Return the text of a file with the controller's parameters.
+@dataclass(frozen=True)
+class ImportedRatios:
+    """What came of an import.
 
-    Args:
-        robot: Whose parameters they are said to be.
-        parameters: As read from the controller's file.
-        source: Name of that file.
+    Attributes:
+        file: What was written; a job names it as ``program.pulse_ratios``.
+        pulses_per_degree: By joint name.
+        cautions: What speaks against the parameters being those of the robot, one line each.
     """
+
+    file: Path
+    pulses_per_degree: Mapping[str, float]
+    cautions: tuple[str, ...]
+
+
+def import_pulse_ratios(parameter_file: Path, robot: Robot, file: Path) -> ImportedRatios:
+    """Make a file of pulse ratios and soft limits from a controller's RC.PRM or ALL.PRM.
+
+    Raises:
+        InputError: If the one cannot be read or is no such file, or the other cannot be written.
+    """
+    try:
+        text = parameter_file.read_text(encoding="latin-1")
+    except OSError as error:
+        raise InputError(str(parameter_file), f"cannot be read: {error.strerror}") from error
+    parameters = read_parameters(text, str(parameter_file))
+    write_file(file, ratio_file(robot, parameters, parameter_file.name))
+    ratios = dict(zip(robot.joint_names, parameters.pulses_per_degree, strict=True))
+    return ImportedRatios(file, ratios, tuple(mismatches(robot, parameters)))
+
+
+def ratio_file(robot: Robot, parameters: AxisParameters, source: str) -> str:
+    """Return the text of a file with the parameters from a controller's file, the source."""
     axes = zip(
         robot.joint_names,
         parameters.pulses_per_degree,
@@ -138,8 +160,8 @@ def ratio_file(robot: Robot, parameters: AxisParameters, source: str) -> str:
     cautions = [f"# caution: {line}" for line in mismatches(robot, parameters)]
     return "\n".join(
         [
-            f"# Pulse ratios and soft limits of one {robot.title}; a job names this file as",
-            "# program.pulse_ratios.",
+            f"# Pulse ratios and soft limits of one {robot.title}; the section program of a",
+            "# job names this file as pulse_ratios.",
             *cautions,
             f"robot: {robot.name}",
             f"source: '{source.replace(chr(39), chr(39) * 2)}, layout of {parameters.layout}'",

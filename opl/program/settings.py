@@ -1,4 +1,4 @@
-"""What a job asks of its program, in SI units; the YAML keys are known in `opl.job.load` only."""
+"""The settings of a job for its program, in SI units; their keys are known in `opl.job` only."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from enum import Enum
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from opl.geometry.frames import Array
 from opl.program.actions import NO_ACTIONS, Actions
-
-Array = NDArray[np.float64]
+from opl.program.moves import Purpose
 
 
 class MotionForm(str, Enum):
@@ -56,6 +55,11 @@ class ByKind:
     on_wheel: int | None = None
     lead: int | None = None
     air: int | None = None
+
+    def of(self, kind: Purpose) -> int | None:
+        """Return the number for a kind of move."""
+        number: int | None = getattr(self, kind.value)
+        return number
 
 
 @dataclass(frozen=True, eq=False)

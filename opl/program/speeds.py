@@ -1,4 +1,4 @@
-"""Speeds a controller can be told, and the time that moves take at them.
+"""Speeds of the digits a controller takes, and the time that moves take at them.
 
 A controller takes speeds of few digits: at slow feed the last digit of VJ is several percent of the
 speed. What rounding adds to one move is therefore taken from the moves that follow, so that a pass
@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from opl.geometry.frames import Array
 
 # A move makes up for the rounding of those before it by at most this factor of its own time.
 MOST_CORRECTION = 2.0
@@ -38,23 +37,24 @@ class SpeedRange:
         """Return a value as written; one out of range becomes the nearest in range."""
         return f"{min(max(value, self.lowest), self.highest):.{self.decimals}f}"
 
-    def keeping_time(self, way: float, time: float) -> float:
-        """Return the value at which a way takes a time most nearly.
+    def keeping_time(self, distance: float, time: float) -> float:
+        """Return the value at which a distance takes a time most nearly.
 
         Args:
-            way: Time [s] that the move takes at speed 1, in the unit of the value times [s].
+            distance: Time [s] of the move at speed 1, in the unit of the value times [s].
             time: Wanted time in [s].
         """
         digits = 10**self.decimals
-        exact = way / time * digits if time > 0.0 else math.inf
+        exact = distance / time * digits if time > 0.0 else math.inf
         lowest, highest = round(self.lowest * digits), round(self.highest * digits)
         below = math.floor(min(max(exact, lowest), highest))
         candidates = [min(max(n, lowest), highest) / digits for n in (below, below + 1)]
-        return min(candidates, key=lambda value: abs(way / value - time))
+        nearest: float = min(candidates, key=lambda value: abs(distance / value - time))
+        return nearest
 
 
 def speeds_keeping_time(
-    ways: Sequence[float],
+    distances: Sequence[float],
     times: Sequence[float],
     ranges: Sequence[SpeedRange],
     chained: Sequence[bool],
@@ -62,17 +62,17 @@ def speeds_keeping_time(
     """Return speeds, rounded as written, at which chains of moves keep their time.
 
     Args:
-        ways: Of each move, in the unit of its range times [s].
+        distances: Of each move, in the unit of its range times [s].
         times: Wanted time of each move in [s].
         ranges: The speeds each move may have.
         chained: Whether a move makes up for what rounding did to the one before.
     """
-    speeds = np.empty(len(ways))
+    speeds = np.empty(len(distances))
     late = 0.0
-    moves = zip(ways, times, ranges, chained, strict=True)
-    for k, (way, time, allowed, follows) in enumerate(moves):
+    moves = zip(distances, times, ranges, chained, strict=True)
+    for k, (distance, time, allowed, follows) in enumerate(moves):
         late = late if follows else 0.0
         aim = min(max(time - late, time / MOST_CORRECTION), time * MOST_CORRECTION)
-        speeds[k] = allowed.keeping_time(way, aim)
-        late += way / speeds[k] - time
+        speeds[k] = allowed.keeping_time(distance, aim)
+        late += distance / speeds[k] - time
     return speeds

@@ -1,12 +1,38 @@
-"""Programs that a controller cannot hold in one piece."""
+"""Programs that a controller cannot hold in one piece, or under their whole name."""
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
 
 from opl.errors import OplError
-from opl.program.moves import START_SPEED, Kind, Move, Program
-from opl.program.names import numbered_names
+from opl.program.moves import START_SPEED, Move, Program, Purpose
+
+_LETTERS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+_MARK_LENGTH = 3
+
+
+def short_name(name: str, length: int) -> str:
+    """Return a name of at most ``length`` characters.
+
+    A name that is too long is cut, and ends in a mark computed from the whole of it: two long names
+    with the same beginning would else be one, and the later program overwrite the earlier.
+    """
+    if len(name) <= length:
+        return name
+    number = int.from_bytes(hashlib.sha256(name.encode()).digest()[:8], "big")
+    mark = ""
+    for _ in range(_MARK_LENGTH):
+        number, digit = divmod(number, len(_LETTERS))
+        mark += _LETTERS[digit]
+    return name[: length - _MARK_LENGTH] + mark
+
+
+def numbered_names(name: str, count: int, length: int) -> list[str]:
+    """Return the names of the parts of a program: its own, shortened if need be, and a number."""
+    digits = max(2, len(str(count)))
+    stem = short_name(name, length - digits)
+    return [f"{stem}{number:0{digits}d}" for number in range(1, count + 1)]
 
 
 def split(program: Program, step_limit: int, name_length: int = 32) -> tuple[Program, ...]:
@@ -52,9 +78,9 @@ def _pieces(moves: tuple[Move, ...], step_limit: int) -> list[tuple[Move, ...]]:
         if end is None:
             nearest = min((k for k in cuts if k > start), default=len(moves))
             raise OplError(
-                f"postures {moves[start].posture} to {moves[nearest - 1].posture} take "
-                f"{nearest - start} moves between two places off the wheel where a job may be cut; "
-                f"a job holds {step_limit}"
+                f"configurations {moves[start].motion_index} to {moves[nearest - 1].motion_index} "
+                f"take {nearest - start} moves between two places off the wheel where a job may be "
+                f"cut; a job holds {step_limit}"
             )
         pieces.append((*entry, *moves[start:end]))
         start = end
@@ -68,7 +94,7 @@ def _entry(move: Move) -> Move:
         speed=START_SPEED,
         exact_stop=True,
         duration=None,
-        kind=Kind.AIR,
+        kind=Purpose.AIR,
         ground_pass=None,
         straight=False,
         comment="START OF PART",

@@ -1,7 +1,7 @@
 """Whether files are to the byte those that a run proved: their digests stand in its result.json.
 
 A pulse is some hundredths of a millimetre at the part: changed by one, a program grinds as well as
-before, and a proof of what it says holds. That somebody changed it is told by its bytes alone.
+before, and a proof of what it says holds. That somebody changed it is seen from its bytes alone.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ def digest(content: bytes) -> str:
 
 
 def digests_in(result: bytes) -> dict[str, str]:
-    """Return the digests that a result.json tells by file name; none if it is not one."""
+    """Return the digests in a result.json, by file name; none if it is not one."""
     try:
-        told = json.loads(result)["program"]["sha256"]
+        digests = json.loads(result)["program"]["sha256"]
     except (ValueError, KeyError, TypeError):
         return {}
-    return dict(told) if isinstance(told, dict) else {}
+    return dict(digests) if isinstance(digests, dict) else {}
 
 
-def changed_since(name: str, content: bytes, told: str) -> list[Finding]:
-    """Return a finding if bytes are not those that a digest was told of."""
-    if digest(content) == told:
+def changed_since(name: str, content: bytes, proven: str) -> list[Finding]:
+    """Return a finding if the digest of bytes is not that of the proven ones."""
+    if digest(content) == proven:
         return []
     message = (
         "not the bytes that opl run proved, says the result.json beside it; whoever changed it on "

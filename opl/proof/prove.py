@@ -1,22 +1,20 @@
-"""What is proven of a program is what its files say: parsed, played, recognised, replayed."""
+"""What is proven of a program is what its files say: read, played, recognised, replayed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
+from opl.job import keys
 from opl.job.load import Job
-from opl.motion.motion import Motion, Stretch
-from opl.program.controller import ControllerProfile
-from opl.program.inform.files import program_jobs
-from opl.program.inform.playback import play
-from opl.program.posts import find_post
+from opl.motion.motion import TimedMotion
+from opl.program.posts import Reader, find_post, readers
 from opl.proof.written import written_findings
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import Verification, replay
@@ -28,9 +26,9 @@ class Proof:
 
     Attributes:
         files: Names of the files.
-        foreign: Names of the user's own jobs that are called and were not looked at.
+        foreign: Names of the user's own programs that are called and were not looked at.
         moves: Number of moves.
-        motion: The motion as recognised, None if the files do not tell one.
+        timed: The motion as recognised and its times, None if the files do not tell one.
         verification: What the replay found, None without a motion.
         findings: What is wrong.
     """
@@ -38,20 +36,19 @@ class Proof:
     files: tuple[str, ...]
     foreign: tuple[str, ...]
     moves: int
-    motion: Motion | None
+    timed: TimedMotion | None
     verification: Verification | None
     findings: tuple[Finding, ...]
 
     @property
     def ground(self) -> int:
         """Number of cutter points that are ground."""
-        stretches = () if self.motion is None else self.motion.stretch
-        return sum(stretch is Stretch.GRIND for stretch in stretches)
+        return 0 if self.timed is None else len(self.timed.motion.ground_points)
 
     @property
     def proven(self) -> bool:
         """Whether the program is safe and complete."""
-        return self.motion is not None and not self.findings
+        return self.timed is not None and not self.findings
 
 
 def prove(
@@ -60,75 +57,63 @@ def prove(
     files: Mapping[str, bytes],
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> Proof:
-    """Prove job files against the cell of a job, knowing nothing of how they were planned.
+    """Prove the files of a program against the cell of a job, knowing nothing of its planning.
 
     Args:
         job: Cell, feed and tolerances.
         points: The cutter points of the job.
-        files: Content of the job files, the master and all parts, by what messages call them.
-        progress: Told the part of the motion that is replayed, 0 to 1.
+        files: Content of all files of the program by what messages call them.
+        progress: Gets the part of the motion that is replayed, 0 to 1.
 
     Raises:
-        InputError: If the files are no jobs, not those of one program, or of another robot.
+        InputError: If the files are not those of one program of the job's controller and robot.
     """
-    jobs, refused = program_jobs(files, profile_of(job))
-    playback, doubtful = play(jobs, job.cell.robot, job.program)
-    foreign = tuple(sorted({name for one in jobs.values() for name in one.calls} - jobs.keys()))
+    reader = reader_of(job)
+    _require_language(job, files, reader)
+    reading = reader.read(files, job.cell.robot, job.program)
+    playback = reading.playback
     if playback is None:
-        return Proof(tuple(files), foreign, 0, None, None, (*refused, *doubtful))
+        return Proof(tuple(files), reading.foreign, 0, None, None, reading.findings)
     search = job.search
     rule = Rule(
         search.max_contact_error,
         search.interpolation.max_contact_step,
-        job.pace.approach_length,
-        job.pace.approach_turn,
+        job.process.approach_length,
+        job.process.approach_turn,
     )
     found = recognise(job.cell, points, playback.q, playback.duration, playback.stations, rule)
-    replayed = replay(job.cell, points, found.motion, search.max_contact_error, progress)
-    written = at_stations(found.motion, found.source, playback.stations)
+    replayed = replay(job.cell, points, found.timed, search.max_contact_error, progress)
+    # the written configurations; of one that grinds several cutter points, the last of its rows
+    rows = np.searchsorted(found.source, playback.stations, side="right") - 1
     findings = (
-        *refused,
-        *doubtful,
+        *reading.findings,
         *replayed.findings,
         *found.findings,
-        *written_findings(job, points, written, playback),
+        *written_findings(job, points, found.timed.take(rows), playback, reader),
     )
-    moves = len(playback.visits)
-    return Proof(tuple(files), foreign, moves, found.motion, replayed, findings)
+    moves = len(playback.moves)
+    return Proof(tuple(files), reading.foreign, moves, found.timed, replayed, findings)
 
 
-def profile_of(job: Job) -> ControllerProfile:
-    """Return the Yaskawa controller that a job is for.
+def reader_of(job: Job) -> Reader:
+    """Return the reader of the language that a job's program is written in.
 
     Raises:
-        InputError: If it is for another one.
+        InputError: If programs of its controller cannot be read.
     """
-    post = find_post(job.program.controller, f"{job.path}: program.controller")
-    if post.profile is None:
-        raise InputError(
-            f"{job.path}: program.controller",
-            f"programs of Yaskawa controllers can be read, not those for {post.title}",
-        )
-    return post.profile
+    post = find_post(job.program.controller)
+    if post.reader is None:
+        where = job.source.at(keys.PROGRAM_CONTROLLER)
+        raise InputError(where, f"programs for {post.title} are written, not read back")
+    return post.reader
 
 
-def at_stations(motion: Motion, source: NDArray[np.intp], stations: NDArray[np.intp]) -> Motion:
-    """Return a motion with nothing but the written postures, the time between them summed.
-
-    Args:
-        motion: All postures.
-        source: Index of each in the postures that were played, ascending.
-        stations: Which of those are written.
-    """
-    # of a posture that grinds several cutter points, the last: there its move has come to
-    rows = np.searchsorted(source, stations, side="right") - 1
-    time = np.diff(np.cumsum(motion.duration)[rows], prepend=0.0)
-    return Motion(
-        motion.q[rows],
-        time,
-        tuple(motion.stretch[row] for row in rows),
-        motion.contact_position[rows],
-        motion.cutter_point[rows],
-        motion.pass_index[rows],
-        motion.clearance[rows],
-    )
+def _require_language(job: Job, files: Mapping[str, bytes], reader: Reader) -> None:
+    """Refuse files that by their names are of another language than the job's controller."""
+    for name in files:
+        suffix = Path(name).suffix.upper()
+        if suffix in readers() and suffix != reader.suffix.upper():
+            raise InputError(
+                job.source.at(keys.PROGRAM_CONTROLLER),
+                f"{job.program.controller} takes {reader.suffix} files, got {name}",
+            )

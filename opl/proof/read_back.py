@@ -1,8 +1,9 @@
 """The end of a run: the texts that will be written are read back and compared with the proof.
 
-The postures of a motion are rounded to what a job can tell before they are proven (`as_told`), so
-what is read back must be the proven motion itself, to the last bit. Where it is not, because
-straight moves lead between the same postures on other ways, the files are proven on their own.
+The configurations of a motion are rounded to the digits of the language before they are proven
+(`in_file_digits`), so what is read back must be the proven motion itself, to the last bit. Where it
+is not, because straight moves lead between the same configurations on other paths, the files are
+proven on their own.
 """
 
 from __future__ import annotations
@@ -18,19 +19,15 @@ from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
-from opl.motion.motion import Motion, VerifiedMotion
-from opl.program.inform.files import program_jobs
-from opl.program.inform.playback import Playback, play
-from opl.program.inform.render import FILE_SUFFIX
-from opl.program.inform.told import told_postures
-from opl.program.moves import SAME_POSTURE, Program
+from opl.motion.motion import Motion, TimedMotion, VerifiedMotion
+from opl.program.moves import SAME_CONFIGURATION, Program
+from opl.program.played import Playback
 from opl.program.posts import find_post
-from opl.program.pulses import PulseScale
 from opl.proof.prove import prove
 from opl.proof.written import written_findings
-from opl.verification.limits import limit_findings
+from opl.verification.kinematic_checks import limit_findings
 
-EXACT = 1e-9  # [rad] of round-off between a posture and itself, read back
+EXACT = 1e-9  # [rad] of round-off between a configuration and itself, read back
 
 
 @dataclass(frozen=True)
@@ -38,18 +35,18 @@ class FileProof:
     """What was found when the files of a run were read back.
 
     Attributes:
-        files: Names of the job files.
-        postures: Number of postures in them, in order, repeated ones once.
+        files: Names of the program's files.
+        configurations: Number of configurations in them, in order, repeated ones once.
         largest_rounding: Farthest in [m] that rounding to the digits of the file moved any corner
             of the box around the part, before the proof.
-        largest_difference: Farthest in [m] that a corner is, at a posture read back, from where it
-            was proven; 0 if they are one.
+        largest_difference: Farthest in [m] that a corner is, at a configuration read back, from
+            where it was proven; 0 if they are one.
         replayed: Whether the files were proven anew on their own.
         findings: What is wrong.
     """
 
     files: tuple[str, ...]
-    postures: int
+    configurations: int
     largest_rounding: float
     largest_difference: float
     replayed: bool
@@ -61,16 +58,18 @@ class FileProof:
         return not self.findings
 
 
-def as_told(motion: Motion, job: Job) -> Motion:
-    """Return a motion whose postures the job's program can tell; others than Yaskawa's as they are.
+def in_file_digits(motion: Motion, job: Job) -> Motion:
+    """Return a motion whose configurations the digits of the job's program can express.
+
+    As it is where programs of the controller cannot be read: nobody knows their digits.
 
     Raises:
-        UnsafeError: If a posture cannot be told.
+        UnsafeError: If a configuration cannot be expressed.
     """
-    profile = find_post(job.program.controller).profile
-    if profile is None:
+    reader = find_post(job.program.controller).reader
+    if reader is None:
         return motion
-    return replace(motion, q=told_postures(motion.q, job.cell.robot, job.program, profile))
+    return replace(motion, q=reader.rounded(motion.q, job.cell.robot, job.program))
 
 
 def read_back(
@@ -81,99 +80,85 @@ def read_back(
     program: Program,
     texts: Mapping[str, str],
 ) -> FileProof | None:
-    """Compare the texts of job files with what was proven; None if they are not Yaskawa's.
+    """Compare the texts of a program with what was proven; None if they cannot be read.
 
     Args:
         job: The job.
         points: Its cutter points.
-        planned: The motion before its postures were rounded.
+        planned: The motion before its configurations were rounded.
         verified: What was proven.
         program: The moves that were to be written.
         texts: All files of the run.
     """
-    profile = find_post(job.program.controller).profile
-    if profile is None:
+    reader = find_post(job.program.controller).reader
+    if reader is None:
         return None
     files = {
-        name: text.encode("utf-8") for name, text in texts.items() if name.endswith(FILE_SUFFIX)
+        name: text.encode("utf-8") for name, text in texts.items() if name.endswith(reader.suffix)
     }
-    jobs, refused = program_jobs(files, profile)
-    playback, doubtful = play(jobs, job.cell.robot, job.program)
-    findings = (*refused, *doubtful)
+    reading = reader.read(files, job.cell.robot, job.program)
+    playback, findings = reading.playback, reading.findings
     rounding = _apart(job, planned.q, verified.motion.q)
     if playback is None:
         return FileProof(tuple(files), 0, rounding, 0.0, False, findings)
     kept = _without_repeats(playback)
-    postures = [move.posture for move in program.moves]
-    if len(kept.stations) != len(postures):
-        told = f"{len(kept.stations)} postures read back, {len(postures)} proven"
-        findings = (*findings, Finding(Level.ERROR, "file", "program", told))
+    configurations = [move.motion_index for move in program.moves]
+    if len(kept.stations) != len(configurations):
+        message = f"{len(kept.stations)} configurations read back, {len(configurations)} proven"
+        findings = (*findings, Finding(Level.ERROR, "file", "program", message))
         return FileProof(tuple(files), len(kept.stations), rounding, 0.0, False, findings)
-    q, proven = kept.q[kept.stations], verified.motion.q[postures]
+    q, proven = kept.q[kept.stations], verified.motion.q[configurations]
     difference = np.abs(q - proven).max()
-    other_ways = difference > EXACT or len(kept.stations) < len(kept.q)
-    findings = (*findings, *_differences(job, kept, program))
-    if other_ways:
+    other_paths = difference > EXACT or len(kept.stations) < len(kept.q)
+    findings = (*findings, *_differences(kept, program))
+    if other_paths:
         findings = (*findings, *prove(job, points, files).findings)
     else:
-        written = _with_times(verified.motion, postures, kept)
+        written = TimedMotion(verified.motion.take(configurations), kept.duration)
         findings = (
             *findings,
             *limit_findings(job.cell, written),
-            *written_findings(job, points, written, kept),
+            *written_findings(job, points, written, kept, reader),
         )
     apart = _apart(job, q, proven) if difference > EXACT else 0.0
-    return FileProof(tuple(files), len(q), rounding, apart, bool(other_ways), findings)
+    return FileProof(tuple(files), len(q), rounding, apart, bool(other_paths), findings)
 
 
 def _without_repeats(playback: Playback) -> Playback:
     """Leave out the moves of no length with which the parts of a program begin."""
     q = playback.q[playback.stations]
-    moved = np.abs(np.diff(q, axis=0)).max(axis=1) > SAME_POSTURE
+    moved = np.abs(np.diff(q, axis=0)).max(axis=1) > SAME_CONFIGURATION
     kept = np.flatnonzero(np.concatenate([[True], moved]))
-    # such a move is one posture of no duration, wherever it stands
+    # such a move is one configuration of no duration, wherever it stands
     gone = np.delete(playback.stations, kept)
     all_but = np.delete(np.arange(len(playback.q)), gone)
     return Playback(
         playback.q[all_but],
         playback.duration[all_but],
         np.searchsorted(all_but, playback.stations[kept]),
-        tuple(playback.visits[k] for k in kept),
+        tuple(playback.moves[k] for k in kept),
     )
 
 
-def _differences(job: Job, playback: Playback, program: Program) -> Iterator[Finding]:
+def _differences(playback: Playback, program: Program) -> Iterator[Finding]:
     """Give what differs, move by move: where it leads, how, and whether it stops."""
-    half_pulse = 0.5 / PulseScale.of(job.cell.robot).pulses_per_radian
-    slack = np.where(np.isnan(half_pulse), SAME_POSTURE, half_pulse)
-    for k, (visit, move) in enumerate(zip(playback.visits, program.moves, strict=True)):
+    for k, (read, move) in enumerate(zip(playback.moves, program.moves, strict=True)):
         away = np.abs(playback.q[playback.stations[k]] - move.q)
-        told = []
-        if (away > slack).any():
-            told.append(f"leads {np.rad2deg(away.max()):.4f} deg away from the proven posture")
-        if visit.step.word == "MOVL" and not move.straight:
-            told.append("is straight, a joint move was proven")
-        if move.exact_stop and visit.step.tag("PL") != "0":
-            told.append("does not stop")
-        for line in told:
-            yield Finding(Level.ERROR, "file", visit.place, line)
-
-
-def _with_times(motion: Motion, postures: list[int], playback: Playback) -> Motion:
-    """Return the written postures of a motion with the times that were read back."""
-    return Motion(
-        motion.q[postures],
-        playback.duration,
-        tuple(motion.stretch[k] for k in postures),
-        motion.contact_position[postures],
-        motion.cutter_point[postures],
-        motion.pass_index[postures],
-        motion.clearance[postures],
-    )
+        messages = []
+        if (away > read.resolution).any():
+            messages.append(
+                f"leads {np.rad2deg(away.max()):.4f} deg away from the proven configuration"
+            )
+        if read.straight and not move.straight:
+            messages.append("is straight, a joint move was proven")
+        if move.exact_stop and not read.corner.exact_stop:
+            messages.append("does not stop")
+        for message in messages:
+            yield Finding(Level.ERROR, "file", read.place, message)
 
 
 def _apart(job: Job, q: Array, other: Array) -> float:
-    """Return the farthest in [m] that a corner of the part's box is moved between postures."""
+    """Return the farthest in [m] that a corner of the part's box is moved between two ``q``."""
     cell = job.cell
     corners = box_corners(cell.part.vertices)
     places = [

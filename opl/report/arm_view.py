@@ -32,8 +32,8 @@ LONGEST_STEP = 60.0  # [deg] between ticks of the limits
 
 @house_style()
 def arm_view(robot: Robot) -> str:
-    """Return the arm at its zero posture, seen from its right side, with its limits, as SVG."""
-    title = f"{robot.title}: zero posture, reach {MM * robot.reach:.0f} mm"
+    """Return the arm at all angles zero, seen from its right side, with its limits, as SVG."""
+    title = f"{robot.title}: zero configuration, reach {MM * robot.reach:.0f} mm"
     figure = blank_figure(title)
     side, limits = figure.subplots(1, 2, width_ratios=(2.3, 1.0))
     arm = drawn_arm(robot)
@@ -91,8 +91,8 @@ def _draw_axes(axes: Axes, arm: DrawnArm) -> None:
                       markeredgecolor=AXIS["color"], markeredgewidth=1.1, zorder=5)  # fmt: skip
             label = at + 0.022 * size
         else:
-            way = half * direction[[0, 2]] / np.linalg.norm(direction[[0, 2]])
-            ends = np.array([at - way, at + way])
+            reach = half * direction[[0, 2]] / np.linalg.norm(direction[[0, 2]])
+            ends = np.array([at - reach, at + reach])
             axes.plot(*ends.T, zorder=4, **AXIS)
             label = ends[int(np.argmax(ends @ [1.0, 1.0]))] + aside / 4.0
         while any(np.abs(label - other).max() < 0.045 * size for other in seen):

@@ -1,4 +1,4 @@
-"""What the pictures are drawn on: one style, one way to show passes, SVG that repeats to the byte.
+"""What the pictures are drawn on: one style, passes drawn alike, SVG that repeats to the byte.
 
 Whatever the user's matplotlib is set to does not matter. Text stays text, so a picture can be
 searched and read aloud.
@@ -75,20 +75,19 @@ def legend_below(figure: Figure, handles: Sequence[Artist]) -> None:
     )
 
 
+def by_pass(pass_index: np.ndarray) -> list[np.ndarray]:
+    """Return for each pass the indices of what belongs to it."""
+    return np.split(np.arange(len(pass_index)), np.flatnonzero(np.diff(pass_index)) + 1)
+
+
 def line_by_pass(pass_index: np.ndarray, x: Array, y: Array) -> tuple[Array, Array]:
-    """Return a line that is not drawn where the pass changes.
+    """Return a line, shapes (n,) before, with NaN where the pass changes.
 
-    Args:
-        pass_index: Pass of each posture, shape (n,).
-        x: Across, shape (n,).
-        y: Up, shape (n,).
-
-    Returns:
-        The line with NaN between passes. A posture alone in its pass becomes a short stroke.
+    A configuration alone in its pass becomes a short stroke.
     """
     across: list[Array] = []
     up: list[Array] = []
-    for one in np.split(np.arange(len(x)), np.flatnonzero(np.diff(pass_index)) + 1):
+    for one in by_pass(pass_index):
         alone = len(one) == 1
         across += [x[one] + LONE_STROKE if alone else x[one], GAP]
         up += [np.repeat(y[one], 2) if alone else y[one], GAP]

@@ -13,7 +13,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 
 from opl.geometry.frames import Array
-from opl.report.canvas import FAINT, INK, blank_figure, house_style, legend_below, svg
+from opl.geometry.inspection import Inspection
+from opl.geometry.mesh import TriangleMesh
+from opl.geometry.toolpath import CutterPoints
+from opl.report.canvas import FAINT, INK, blank_figure, by_pass, house_style, legend_below, svg
 
 MM = 1e3
 AXIS_COLOURS = {"x": "#c8102e", "y": "#2e7d32", "z": "#0b4f8a"}
@@ -22,7 +25,7 @@ BEHIND: dict[str, Any] = {"color": FAINT, "linewidth": 1.0, "alpha": 0.45}
 AIR: dict[str, Any] = {"color": FAINT, "linewidth": 0.9, "linestyle": (0, (3, 3))}
 DOUBT = "#e08214"
 MISSED = "#f4c48a"
-PART = to_rgb("#d9dee2")
+PART_COLOUR = to_rgb("#d9dee2")
 MOST_NORMALS, MOST_TRIADS, MOST_NUMBERS = 160, 12, 24  # drawn; more of them hide the passes
 NORMAL_SIZE, TRIAD_SIZE = 0.05, 0.09  # of the part's size
 LIGHT = np.array([-0.3, 0.6, 0.74])  # from above left, seen from the camera
@@ -33,78 +36,66 @@ def part_view(
     *,
     title: str,
     subtitle: str,
-    vertices: Array,
-    faces: np.ndarray,
-    Ts_workpiece_cutter: Array,
-    pass_index: np.ndarray,
-    doubtful: np.ndarray,
-    uncovered: Array,
-    uncovered_normals: Array,
+    part: TriangleMesh,
+    points: CutterPoints,
+    inspection: Inspection,
 ) -> str:
     """Return the part as SVG: seen obliquely, along its normals and from beside the passes.
 
     Args:
         title: Heading.
         subtitle: The figures, in one line.
-        vertices: Corners of the part's triangles in [m], shape (n, 3).
-        faces: Their indices, shape (m, 3).
-        Ts_workpiece_cutter: Cutter frames, shape (N, 4, 4).
-        pass_index: Pass of each, shape (N,).
-        doubtful: Which cutter points a warning names, shape (N,).
-        uncovered: Points of the surface that no pass comes by in [m], shape (k, 3).
-        uncovered_normals: Their outward normals, shape (k, 3).
+        part: The part.
+        points: What is ground.
+        inspection: What is doubtful about it, and where no pass comes by.
     """
     figure = blank_figure(title)
     # the layout knows only the title; a second line of it leaves room for this one
     figure.suptitle(f"{title}\n", x=0.012, ha="left", fontsize=16, fontweight="bold")
     figure.text(0.012, 0.915, subtitle, fontsize=11.5, color=FAINT)
     axes = figure.subplot_mosaic([list("ob"), list("oa")], width_ratios=[1.3, 1.0])
-    views = _views(Ts_workpiece_cutter[:, :3, 2].mean(axis=0), Ts_workpiece_cutter[:, :3, 0])
-    size = float(np.ptp(vertices, axis=0).max())
+    Ts, uncovered = points.Ts_workpiece_cutter, inspection.uncovered
+    views = _views(Ts[:, :3, 2].mean(axis=0), Ts[:, :3, 0])
+    size = float(np.ptp(part.vertices, axis=0).max())
     for key, view, name in zip("oab", views, ("oblique", "from above", "from beside"), strict=True):
         one = axes[key]
-        _draw_part(one, view, vertices, faces)
-        facing = uncovered_normals @ view[2] > 0.0
-        missed = MM * uncovered[facing] @ view.T
+        _draw_part(one, view, part)
+        facing = uncovered.normals @ view[2] > 0.0
+        missed = MM * uncovered.points[facing] @ view.T
         # as pixels: thousands of squares are more than some viewers of SVG take
         squares: dict[str, Any] = {"color": MISSED, "markersize": 1.3, "rasterized": True}
         one.plot(missed[:, 0], missed[:, 1], "s", zorder=1.5, **squares)
-        _draw_passes(one, view, Ts_workpiece_cutter, pass_index, doubtful, numbered=key != "b")
-        _draw_frames(one, view, Ts_workpiece_cutter, pass_index, size)
+        _draw_passes(one, view, points, inspection.doubtful, numbered=key != "b")
+        _draw_frames(one, view, points, size)
         one.autoscale_view()
         one.set_aspect("equal")
         one.axis("off")
         one.set_title(name, loc="left", fontsize=11, color=FAINT)
         _draw_corner(one, view)
         _draw_scale(one, MM * size)
-    legend_below(figure, _legend(doubtful, uncovered))
+    legend_below(figure, _legend(bool(inspection.doubtful.any()), len(uncovered.points) > 0))
     return svg(figure, title)
 
 
-def _legend(doubtful: np.ndarray, uncovered: Array) -> list[Artist]:
+def _legend(doubtful: bool, uncovered: bool) -> list[Artist]:
     handles: list[Artist] = [
         Line2D([], [], label="pass, begun at its dot", marker="o", markevery=2, **PASS),
-        Line2D([], [], label="way in the air", **AIR),
+        Line2D([], [], label="link between passes", **AIR),
         Line2D([], [], color=AXIS_COLOURS["z"], label="z: outward normal"),
         Line2D([], [], color=AXIS_COLOURS["x"], label="x of the frame: tangent of the path"),
         Line2D([], [], color=AXIS_COLOURS["y"], label="y of the frame: z cross x"),
     ]
     dots: dict[str, Any] = {"linestyle": "none", "color": DOUBT}
-    if doubtful.any():
+    if doubtful:
         handles.append(Line2D([], [], marker="o", label="cutter point with a warning", **dots))
-    if len(uncovered):
+    if uncovered:
         dots["color"] = MISSED
         handles.append(Line2D([], [], marker="s", label="no pass comes by", **dots))
     return handles
 
 
 def _views(up: Array, tangents: Array) -> tuple[Array, Array, Array]:
-    """Return three cameras as rows right, up, towards the eye, shape (3, 3) each.
-
-    Args:
-        up: Mean normal, shape (3,).
-        tangents: Tangents of the path, shape (N, 3).
-    """
+    """Return three cameras as rows right, up, towards the eye; tangents of shape (N, 3)."""
     side = np.cross(up, tangents.mean(axis=0))
     if np.linalg.norm(side) < 1e-3:  # a closed pass has no mean direction
         up, side = np.array([0.0, 0.0, 1.0]), np.array([0.0, -1.0, 0.0])
@@ -125,9 +116,9 @@ def _camera(eye: Array, up: Array) -> Array:
     return np.stack([right, np.cross(eye, right), eye])
 
 
-def _draw_part(axes: Axes, view: Array, vertices: Array, faces: np.ndarray) -> None:
+def _draw_part(axes: Axes, view: Array, part: TriangleMesh) -> None:
     """Draw the triangles that face the eye, the nearest last."""
-    corners = vertices[faces]
+    corners = part.triangles
     triangles = MM * corners @ view.T
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -135,7 +126,7 @@ def _draw_part(axes: Axes, view: Array, vertices: Array, faces: np.ndarray) -> N
     front = normals @ view[2] > 0.0
     order = np.argsort(triangles[front][:, :, 2].mean(axis=1))
     shade = 0.72 + 0.28 * np.clip(normals[front] @ (LIGHT @ view), -0.4, 1.0)
-    colours = np.clip(shade[:, None] * np.array(PART), 0.0, 1.0)[order]
+    colours = np.clip(shade[:, None] * np.array(PART_COLOUR), 0.0, 1.0)[order]
     axes.add_collection(
         PolyCollection(
             triangles[front][order][:, :, :2],
@@ -149,14 +140,10 @@ def _draw_part(axes: Axes, view: Array, vertices: Array, faces: np.ndarray) -> N
 
 
 def _draw_passes(
-    axes: Axes,
-    view: Array,
-    Ts: Array,
-    pass_index: np.ndarray,
-    doubtful: np.ndarray,
-    numbered: bool,
+    axes: Axes, view: Array, cutter_points: CutterPoints, doubtful: np.ndarray, numbered: bool
 ) -> None:
     """Draw passes from their starts, fainter where the surface turns away from the eye."""
+    Ts, pass_index = cutter_points.Ts_workpiece_cutter, cutter_points.pass_index
     points = (MM * Ts[:, :3, 3] @ view.T)[:, :2]
     away = Ts[:, :3, 2] @ view[2] < 0.0
     steps = np.stack([points[:-1], points[1:]], axis=1)
@@ -167,7 +154,7 @@ def _draw_passes(
     axes.add_collection(LineCollection(list(steps[~one_pass]), **AIR, zorder=2))
     marked = points[doubtful & ~away]
     axes.plot(marked[:, 0], marked[:, 1], "o", color=DOUBT, markersize=3.2, zorder=4.5)
-    passes = np.split(np.arange(len(points)), np.flatnonzero(~one_pass) + 1)
+    passes = by_pass(pass_index)
     starts = points[[one[0] for one in passes]]
     axes.plot(starts[:, 0], starts[:, 1], "o", color=INK, markersize=4.0, zorder=5)
     shown = np.linspace(0, len(passes) - 1, MOST_NUMBERS if numbered else 0)
@@ -188,11 +175,11 @@ def _draw_passes(
         )
 
 
-def _draw_frames(axes: Axes, view: Array, Ts: Array, pass_index: np.ndarray, size: float) -> None:
+def _draw_frames(axes: Axes, view: Array, points: CutterPoints, size: float) -> None:
     """Draw normals all along, and whole frames here and there."""
+    Ts, passes = points.Ts_workpiece_cutter, by_pass(points.pass_index)
     shown = np.unique(np.linspace(0, len(Ts) - 1, min(len(Ts), MOST_NORMALS)).astype(int))
     _strokes(axes, view, Ts[shown], "z", NORMAL_SIZE * size, 0.8)
-    passes = np.split(np.arange(len(Ts)), np.flatnonzero(np.diff(pass_index)) + 1)
     some = np.unique(np.linspace(0, len(passes) - 1, min(len(passes), MOST_TRIADS)).astype(int))
     # each further along its pass than the one before, so that they do not hide each other
     fractions = np.linspace(0.15, 0.85, len(some))

@@ -15,7 +15,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from opl.cell.robot import Robot
 from opl.geometry.frames import Array
+from opl.motion.path import GrindingPath
 from opl.report.canvas import (
     FAINT,
     INK,
@@ -54,9 +56,7 @@ def contact_chart(
     state_names: Sequence[str],
     pass_index: np.ndarray,
     flat_end: float,
-    path_cutter_point: Array,
-    path_contact_position: Array,
-    path_pass: np.ndarray,
+    path: GrindingPath,
 ) -> str:
     """Draw what is free at every cutter point and contact position, and the path through it.
 
@@ -67,9 +67,7 @@ def contact_chart(
         state_names: What the codes mean.
         pass_index: Pass of each cutter point, 0, 1, ..., shape (N,).
         flat_end: Contact position in belt units where the flat ends.
-        path_cutter_point: Cutter point of each posture, fractional in between, shape (n,).
-        path_contact_position: t of each posture, shape (n,). If n is 0 no path is drawn.
-        path_pass: Pass of each posture, shape (n,).
+        path: The path found.
 
     Returns:
         The picture as SVG text.
@@ -80,7 +78,7 @@ def contact_chart(
     bottom, top = contact_positions[0] - step / 2.0, contact_positions[-1] + step / 2.0
     palette = np.array([_state_colour(code) for code in range(len(state_names))])
     # one embedded image is ever so much smaller than rectangles; several pixels a node, as many
-    # viewers smooth images whatever the file says
+    # viewers smooth images whatever the file requests
     across, up = (-(-least // n) for least, n in zip(LEAST_PIXELS, states.shape, strict=True))
     pixels = np.kron(states.T, np.ones((up, across), dtype=np.uint8))
     axes.imshow(
@@ -103,11 +101,10 @@ def contact_chart(
         )
         for code in np.flatnonzero(counts).tolist()
     ]
-    if len(path_pass):
-        line = line_by_pass(path_pass, path_cutter_point, path_contact_position)
-        axes.plot(*line, color="white", linewidth=2.0 * FOUND["linewidth"])
-        axes.plot(*line, **FOUND, gid="found")
-        handles.append(Line2D([], [], **FOUND))
+    line = line_by_pass(path.pass_index, path.cutter_point, path.contact_position)
+    axes.plot(*line, color="white", linewidth=2.0 * FOUND["linewidth"])
+    axes.plot(*line, **FOUND, gid="found")
+    handles.append(Line2D([], [], **FOUND))
     axes.set_ylim(bottom, top)
     axes.xaxis.set_major_locator(MaxNLocator(12, integer=True, min_n_ticks=1))
     axes.yaxis.set_major_locator(MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]))
@@ -121,12 +118,8 @@ def contact_chart(
 def joint_chart(
     *,
     title: str,
-    joint_names: Sequence[str],
-    lower: Array,
-    upper: Array,
-    found_cutter_point: Array,
-    found_q: Array,
-    found_pass: np.ndarray,
+    robot: Robot,
+    path: GrindingPath,
     fixed_q: Array | None,
     pass_index: np.ndarray,
 ) -> str:
@@ -134,13 +127,10 @@ def joint_chart(
 
     Args:
         title: What the picture is called.
-        joint_names: The six joints.
-        lower: Lower limits in [rad], shape (6,).
-        upper: Upper limits in [rad], shape (6,).
-        found_cutter_point: Cutter point of each posture, fractional in between, shape (n,).
-        found_q: The postures in [rad], shape (n, 6).
-        found_pass: Pass of each posture, shape (n,).
-        fixed_q: The contact-fixed posture at each cutter point in [rad], shape (N, 6), or None.
+        robot: Names and limits of the joints.
+        path: The path found.
+        fixed_q: The contact-fixed configuration at each cutter point in [rad], shape (N, 6), or
+            None.
         pass_index: Pass of each cutter point, 0, 1, ..., shape (N,).
 
     Returns:
@@ -149,21 +139,21 @@ def joint_chart(
     figure = blank_figure(title)
     panels = figure.subplots(2, 3, sharex=True)
     points = np.arange(len(pass_index), dtype=float)
-    limits = np.rad2deg(np.stack([lower, upper], axis=-1))
+    limits = np.rad2deg(np.stack([robot.lower, robot.upper], axis=-1))
     limit_seen = False
     for joint, axes in enumerate(panels.flat):
-        shown = found = np.rad2deg(found_q[:, joint])
+        shown = found = np.rad2deg(path.q[:, joint])
         heading = f"range {np.ptp(found):.1f} deg"
         if fixed_q is not None:
             fixed = np.rad2deg(fixed_q[:, joint])
             shown = np.append(found, fixed)
             heading += f" (fixed {np.ptp(fixed):.1f} deg)"
             axes.plot(*line_by_pass(pass_index, points, fixed), **FIXED, gid=f"fixed_{joint}")
-        line = line_by_pass(found_pass, found_cutter_point, found)
+        line = line_by_pass(path.pass_index, path.cutter_point, found)
         axes.plot(*line, **FOUND, gid=f"found_{joint}")
         limit_seen |= _frame_angles(axes, shown, limits[joint])
         draw_pass_borders(axes, pass_index)
-        axes.set_title(joint_names[joint], loc="left", fontsize=13, fontweight="bold")
+        axes.set_title(robot.joint_names[joint], loc="left", fontsize=13, fontweight="bold")
         axes.set_title(heading, loc="right", fontsize=10.5)
         axes.set_xlim(-0.5, len(points) - 0.5)
         axes.xaxis.set_major_locator(MaxNLocator(6, integer=True, min_n_ticks=1))
@@ -216,12 +206,7 @@ def _number_passes(axes: Axes, pass_index: np.ndarray) -> None:
 
 
 def _frame_angles(axes: Axes, angles: Array, limits: Array) -> bool:
-    """Choose what a panel shows of the angle axis; draw limits that are in it or near.
-
-    Args:
-        axes: The panel.
-        angles: All angles drawn in [deg], shape (n,).
-        limits: Lower and upper limit in [deg], shape (2,).
+    """Choose what a panel shows of angles in [deg]; draw limits, shape (2,), in it or near.
 
     Returns:
         Whether a limit was drawn.

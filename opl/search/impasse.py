@@ -14,14 +14,12 @@ def impasses(ladder: Ladder, blocked: np.ndarray) -> list[tuple[int, int]]:
     Through every part of such a run a track leads; first and last are the same where a column has
     no free node at all.
 
-    Args:
-        ladder: The nodes.
-        blocked: Sorted keys of the edges that are not free, int64.
+    `blocked` are the sorted keys of the edges that are not free, int64.
     """
     free = ladder.free
 
     def edges(column: int) -> np.ndarray:
-        rule = _edges(ladder.q_by_joint, *ladder.step_rule, blocked, column)
+        rule = _edges(ladder.q_by_joint, *ladder.edge_rule, blocked, column)
         return np.asarray(rule & free[column][:, None] & free[column + 1])
 
     found = []

@@ -1,4 +1,4 @@
-"""The ladder graph that every search walks: nodes, and which steps between them are small."""
+"""The ladder graph that every search walks: nodes, and which edges between them are small."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ class Ladder:
         q: Joint positions in [rad], shape (n_columns, n_rows, 6); entries of nodes that are not
             free are not looked at.
         free: Which nodes may be used, shape (n_columns, n_rows).
-        contact_position: t of each node, shape (n_columns, n_rows), or of each row, shape (n_rows,).
-        off_wheel: Whether the step from each column to the next leaves the wheel (a new pass),
-            shape (n_columns - 1,). Such a step has no intermediate nodes and may be of any size.
+        contact_position: t of each node, shape (n_columns, n_rows), or of each row, (n_rows,).
+        off_wheel: Whether the edge from each column to the next leaves the wheel (a new pass),
+            shape (n_columns - 1,). Such an edge has no intermediate nodes and may be of any size.
         max_contact_step: Largest difference of t between adjacent nodes, the paper's delta T.
-        max_contact_change: Largest difference of t over each step on the wheel, shape
+        max_contact_change: Largest difference of t over each edge on the wheel, shape
             (n_columns - 1,) or one for all; the paper sets none.
         max_joint_step: Largest change of a joint between adjacent nodes in [rad]; more is taken for
             a discontinuity.
@@ -44,7 +44,7 @@ class Ladder:
 
     @cached_property
     def contact_changes(self) -> Array:
-        """Largest difference of t over each step, shape (n_columns - 1,)."""
+        """Largest difference of t over each edge, shape (n_columns - 1,)."""
         return np.broadcast_to(self.max_contact_change, len(self.q) - 1).astype(float)
 
     @cached_property
@@ -53,8 +53,8 @@ class Ladder:
         return np.ascontiguousarray(np.moveaxis(self.q, 1, 2))
 
     @property
-    def step_rule(self) -> tuple[Array, np.ndarray, float, Array, float]:
-        """What tells small steps from others, in the order in which the inner loops take it."""
+    def edge_rule(self) -> tuple[Array, np.ndarray, float, Array, float]:
+        """What makes an edge small enough, in the order in which the inner loops take it."""
         return (
             self.t_of_nodes,
             self.off_wheel,
@@ -63,16 +63,16 @@ class Ladder:
             self.max_joint_step,
         )
 
-    def step_key(self, column: int, row: int, next_row: int) -> int:
-        """Return the number under which a step is remembered as blocked."""
-        n_rows = self.q.shape[1]
+    def edge_key(self, column: int, row: int, next_row: int) -> int:
+        """Return the number under which an edge is remembered as blocked."""
+        n_rows = int(self.q.shape[1])
         return (column * n_rows + row) * n_rows + next_row
 
 
 def middle_count(contact_step: float, max_contact_step: float) -> int:
     """Return how many intermediate nodes keep t from changing by more than delta T (equation 15).
 
-    A step exactly divisible by delta T does not repeat its end node.
+    An edge exactly divisible by delta T does not repeat its end node.
     """
     return max(int(np.ceil(abs(contact_step) / max_contact_step - 1e-9)) - 1, 0)
 
@@ -84,7 +84,7 @@ def middle_count(contact_step: float, max_contact_step: float) -> int:
 def continuous(  # type: ignore[no-untyped-def]
     q, t, off_wheel, max_t_step, max_t_change, max_q_step, column, here, row
 ):
-    """Return whether a step to a row of the next column is small in t and in every joint."""
+    """Return whether an edge to a row of the next column is small in t and in every joint."""
     if off_wheel[column]:
         return True
     t_step = abs(t[column + 1, row] - t[column, here])
@@ -112,7 +112,7 @@ def contains(keys, key):  # type: ignore[no-untyped-def]
 def allowed(  # type: ignore[no-untyped-def]
     q, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, column, here, row
 ):
-    """Return whether a step to a row of the next column is small enough and not blocked."""
+    """Return whether an edge to a row of the next column is small enough and not blocked."""
     n_rows = q.shape[2]
     return continuous(
         q, t, off_wheel, max_t_step, max_t_change, max_q_step, column, here, row

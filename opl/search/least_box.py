@@ -21,7 +21,9 @@ from opl.search.outside import outside
 from opl.search.relaxation import Relaxation, least_box_of
 from opl.search.walls import Image, Piece, Wall, relaxed
 
-SETTLED = 0.1  # of the gap wanted: what the bend of the spans may lose where no wall is split further
+SETTLED = (
+    0.1  # of the gap wanted: what the bend of the spans may lose where no wall is split further
+)
 STILL = 1e-6  # [rad] a core that grows by less in a round has stopped growing
 MOST_ROUNDS = 12  # of cutting spans off; more would cut little
 
@@ -224,6 +226,7 @@ class BoxProof:
             return None
         self._kept = node
         found, alone = node.found, self._alone(node)
+        assert found is not None
         held_by = {k: found.prices[i] for i, k in enumerate(alone) if found.prices[i].any()}
         return Candidate(node.bound, found.low, found.high, held_by)
 
@@ -319,6 +322,7 @@ class BoxProof:
     def _where_to_split(self, node: Subproblem) -> tuple[int, float] | None:
         """Return the wall to be split, and where along its span; None if that gains nothing."""
         found, alone = node.found, self._alone(node)
+        assert found is not None
         low, high = found.low, found.high
         settled = SETTLED * self._gap * self.threshold
         score, at = np.zeros(len(node.spans)), np.full(len(node.spans), 0.5)
@@ -345,7 +349,12 @@ class BoxProof:
                     return
                 (span,) = finer[:1]
                 if len(finer) > 1:
-                    self._push(node.bound, [*node.spans[:index], finer, *node.spans[index + 1 :]], node.low, node.high)
+                    self._push(
+                        node.bound,
+                        [*node.spans[:index], finer, *node.spans[index + 1 :]],
+                        node.low,
+                        node.high,
+                    )
                     return
             at = body.pieces[span.piece].at[span.first : span.end + 1]
             n = len(at) - 1

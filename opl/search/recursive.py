@@ -44,21 +44,14 @@ def descend(
     Args:
         ladder: The nodes.
         start: Row of the start node in column 0; must be free.
-        blocked: Keys of steps that are not free, sorted, shape (n_blocked,) of int64.
+        blocked: Keys of edges that are not free, sorted, shape (n_blocked,) of int64.
         dead: Nodes known to be dead ends, shape (n_columns, n_rows); new ones are added.
         bound: Give up as soon as the joint range sum reaches this value, in [rad]. Only if no dead
             end is missing in ``dead`` is it certain that the track would not have been shorter.
     """
     rows = np.full(len(ladder.q), -1, dtype=np.int64)
     outcome, total, reached = _descend(
-        ladder.q_by_joint,
-        ladder.free,
-        *ladder.step_rule,
-        blocked,
-        dead,
-        start,
-        bound,
-        rows,
+        ladder.q_by_joint, ladder.free, *ladder.edge_rule, blocked, dead, start, bound, rows
     )
     return Descent(rows if outcome == _COMPLETE else None, total, reached)
 
@@ -67,20 +60,11 @@ def add_dead_ends(ladder: Ladder, blocked: np.ndarray, dead: np.ndarray) -> None
     """Mark every node from which the last column cannot be reached.
 
     A search finds dead ends as it meets them; one that is to stop at a bound must know them before,
-    or it stops on a way that it would have come back from.
+    or it stops on a track that it would have come back from.
 
-    Args:
-        ladder: The nodes.
-        blocked: As for `descend`.
-        dead: Nodes known to be dead ends, shape (n_columns, n_rows); the others are added.
+    New ones are added to `dead`, shape (n_columns, n_rows).
     """
-    _add_dead_ends(
-        ladder.q_by_joint,
-        ladder.free,
-        *ladder.step_rule,
-        blocked,
-        dead,
-    )
+    _add_dead_ends(ladder.q_by_joint, ladder.free, *ladder.edge_rule, blocked, dead)
 
 
 _COMPLETE, _FAILED, _GIVEN_UP = 1, 0, 2
@@ -115,10 +99,7 @@ def _add_dead_ends(  # type: ignore[no-untyped-def]
             dead[column, here] = not leads_on
 
 
-@njit(
-    f"Tuple((int64,float64,int64))({_FIELD},boolean[:,::1],int64,float64,int64[::1])",
-    cache=True,
-)
+@njit(f"Tuple((int64,float64,int64))({_FIELD},boolean[:,::1],int64,float64,int64[::1])", cache=True)
 def _descend(  # type: ignore[no-untyped-def]
     q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, dead, start, bound, rows
 ):
@@ -126,7 +107,7 @@ def _descend(  # type: ignore[no-untyped-def]
     sums = np.empty(n_rows)
     low = np.empty((n_columns, n_joints))
     high = np.empty((n_columns, n_joints))
-    # candidates of a column are taken by increasing (sum, row); these say where it stands
+    # candidates of a column are taken by increasing (sum, row); these hold where it stands
     tried_sum = np.full(n_columns + 1, -np.inf)
     tried_row = np.full(n_columns + 1, -1)
     rows[0] = start

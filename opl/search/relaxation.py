@@ -60,8 +60,7 @@ def least_box_of(segments: list[Segment], low: Array, high: Array) -> Relaxation
     reach = np.concatenate([start + pad_low - high, low - start - pad_high], axis=1)
     slope = np.concatenate([along, -along], axis=1)
     wall, face = (
-        np.ascontiguousarray(index)
-        for index in np.nonzero(reach + np.maximum(slope, 0.0) > 0.0)
+        np.ascontiguousarray(index) for index in np.nonzero(reach + np.maximum(slope, 0.0) > 0.0)
     )
     bound = float((high - low).sum())
     prices, out, x = np.zeros((k, 12)), np.zeros(12), np.full(k, 0.5)
@@ -78,9 +77,7 @@ def least_box_of(segments: list[Segment], low: Array, high: Array) -> Relaxation
     found_low, found_high = low - out[6:], high + out[:6]
     point = start + along * x[:, None]
     away = np.maximum(point - found_high, 0.0) + np.maximum(found_low - point, 0.0)
-    return Relaxation(
-        bound - ROUND_OFF, found_low, found_high, x, lost, by_face, away.sum(axis=1)
-    )
+    return Relaxation(bound - ROUND_OFF, found_low, found_high, x, lost, by_face, away.sum(axis=1))
 
 
 MOST_PIVOTS = 2000

@@ -1,7 +1,7 @@
 """The smoothest track: least joint travel, by exact dynamic programming over the ladder.
 
-Each column is passed once; the cost of the best way to each of its nodes is all that is kept, no
-step is ever stored.
+Each column is passed once; the cost of the best track to each of its nodes is all that is kept, no
+edge is ever stored.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ class TrackCost:
         contact_weight: Cost of changing t by one belt unit on the wheel: the belt dwells while t
             moves.
         time_weight: Cost of a second on the wheel in [1/s].
-        step_seconds: Time that the feed gives each step in [s], shape (n_columns - 1,); 0 off the
+        edge_seconds: Time that the feed gives each edge in [s], shape (n_columns - 1,); 0 off the
             wheel.
-        max_speed: Largest joint speeds in [rad/s], shape (6,): a step may need longer for them.
+        max_speed: Largest joint speeds in [rad/s], shape (6,): an edge may need longer for them.
         contact_speed: Largest speed of t in belt units per second: likewise.
         node_cost: Cost of being at each node, shape (n_columns, n_rows).
     """
@@ -37,7 +37,7 @@ class TrackCost:
     joint_weights: Array
     contact_weight: float
     time_weight: float
-    step_seconds: Array
+    edge_seconds: Array
     max_speed: Array
     contact_speed: float
     node_cost: Array
@@ -48,8 +48,8 @@ class Travel:
     """How far joints and contact move on the wheel along a track or a path.
 
     Attributes:
-        joints: Sum over steps and joints of the absolute change in [rad].
-        contact: Sum over steps of the absolute change of t in belt units.
+        joints: Sum over edges and joints of the absolute change in [rad].
+        contact: Sum over edges of the absolute change of t in belt units.
     """
 
     joints: float
@@ -62,12 +62,7 @@ class Travel:
 
 @dataclass(frozen=True)
 class SmoothTrack:
-    """The cheapest track.
-
-    Attributes:
-        rows: The row in each column, shape (n_columns,).
-        cost: Its cost.
-    """
+    """The cheapest track: its row in each column, shape (n_columns,), and its cost."""
 
     rows: np.ndarray
     cost: float
@@ -80,22 +75,19 @@ def smoothest(
 
     Among equal ones the lowest rows are taken, so the answer is always the same.
 
-    Args:
-        ladder: The nodes and what steps are small enough.
-        blocked: Sorted keys of steps that are not free, int64.
-        inside: Which of the free nodes may be used, shape (n_columns, n_rows).
-        cost: The costs.
+    `blocked` are the sorted keys of the edges that are not free, int64; `inside` says which of the
+    free nodes may be used, shape (n_columns, n_rows).
     """
     rows = np.empty(len(ladder.q), dtype=np.int64)
     total = _cheapest(
         ladder.q_by_joint,
         ladder.free & inside,
-        *ladder.step_rule,
+        *ladder.edge_rule,
         np.asarray(blocked, dtype=np.int64),
         np.array(cost.joint_weights),
         cost.contact_weight,
         cost.time_weight,
-        np.array(cost.step_seconds),
+        np.array(cost.edge_seconds),
         np.array(cost.max_speed),
         cost.contact_speed,
         np.ascontiguousarray(cost.node_cost),
@@ -120,12 +112,7 @@ def smoothest_within(
     Movement of t is made dearer until the cheapest track keeps to both; where none of the prices
     tried leads to such a track, the prices given decide. None if there is no connected track.
 
-    Args:
-        ladder: As in `smoothest`.
-        blocked: As in `smoothest`.
-        inside: As in `smoothest`.
-        cost: The costs.
-        most: How far joints and contact should move at the most.
+    Joints and contact should move no further than `most`; all else is as in `smoothest`.
     """
     cheapest = smoothest(ladder, blocked, inside, cost)
     if cheapest is None or travel_of(ladder, cheapest.rows).within(most):
@@ -146,7 +133,7 @@ def smoothest_within(
 )
 def _cheapest(  # type: ignore[no-untyped-def]
     q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked,
-    joint_weights, contact_weight, time_weight, step_seconds, max_speed, contact_speed, node_cost,
+    joint_weights, contact_weight, time_weight, edge_seconds, max_speed, contact_speed, node_cost,
     rows,
 ):  # fmt: skip
     n_columns, n_joints, n_rows = q.shape
@@ -178,7 +165,7 @@ def _cheapest(  # type: ignore[no-untyped-def]
             if on_wheel and time_weight > 0.0:
                 for here in range(n_rows):
                     sliding = abs(t[column, row] - t[column - 1, here]) / contact_speed
-                    seconds[here] = max(step_seconds[column - 1], sliding)
+                    seconds[here] = max(edge_seconds[column - 1], sliding)
                 for joint in range(n_joints):
                     there = q[column, joint, row]
                     for here in range(n_rows):
@@ -210,7 +197,7 @@ def _cheapest(  # type: ignore[no-untyped-def]
                         before[column, row] = here
             following[row] += node_cost[column, row]
         best[:] = following
-    row = np.argmin(best)
+    row = int(np.argmin(best))
     total = best[row]
     if total == np.inf:
         return total

@@ -22,30 +22,28 @@ ROLL_SLACK = 0.1  # [deg] beyond the largest roll that is taken for rounding
 
 @dataclass(frozen=True, eq=False)
 class Touches:
-    """Which cutter points are where they can be ground, at which postures; k items each.
+    """Which cutter points are where they can be ground, at which configurations; k items each.
 
     Attributes:
-        posture: Index of the posture, ascending.
-        point: Index of the cutter point, ascending within a posture.
+        configuration: Index of the configuration, ascending.
+        point: Index of the cutter point, ascending within a configuration.
         contact_position: t.
         distance: Of the cutter point from where the contact model has it, in [m].
     """
 
-    posture: NDArray[np.intp]
+    configuration: NDArray[np.intp]
     point: NDArray[np.intp]
     contact_position: Array
     distance: Array
 
     def __len__(self) -> int:
-        return len(self.posture)
+        return len(self.configuration)
 
 
 def contact_positions(wheel: ContactWheel, Ts_contact0_cutter: Array) -> Array:
     """Return the contact position t nearest to frames, shape (...).
 
-    Args:
-        wheel: The wheel.
-        Ts_contact0_cutter: Frames seen from contact frame 0, shape (..., 4, 4).
+    The frames are seen from contact frame 0, shape (..., 4, 4).
     """
     along = -Ts_contact0_cutter[..., 0, 3] * MM_PER_M  # where the flat would touch
     slide = np.clip(along, -wheel.flat_end, wheel.flat_end)
@@ -69,15 +67,12 @@ def find_touches(
 ) -> Touches:
     """Return every cutter point that is where it can be ground.
 
-    Args:
-        wheel: The wheel.
-        points: N cutter points.
-        Ts_contact0_workpiece: Where the part is, shape (n, 4, 4).
-        tolerance: Largest distance from where the contact model has the point, in [m].
+    `Ts_contact0_workpiece` has shape (n, 4, 4); a point may be up to `tolerance` in [m] off the
+    contact model.
     """
     Ts_workpiece_cutter = points.Ts_workpiece_cutter
-    found: list[tuple[Array, ...]] = []
-    for posture, T_contact0_workpiece in enumerate(Ts_contact0_workpiece):
+    found: list[tuple[Array, ...]] = [(np.empty(0),) * 4]
+    for configuration, T_contact0_workpiece in enumerate(Ts_contact0_workpiece):
         p_contact0 = transform(T_contact0_workpiece, Ts_workpiece_cutter[:, :3, 3])
         near = np.flatnonzero(np.abs(wheel.signed_distance(p_contact0)) <= tolerance)
         Ts_contact0_cutter = T_contact0_workpiece @ Ts_workpiece_cutter[near]
@@ -86,8 +81,6 @@ def find_touches(
         fits = (distance <= tolerance) & (angle <= ALIGNED)
         fits &= np.abs(t) <= wheel.last_position + ROLL_SLACK
         point = near[fits]
-        found.append((np.full(len(point), posture), point, t[fits], distance[fits]))
-    posture_, point_, t_, distance_ = (
-        np.concatenate(column) if found else np.empty(0) for column in zip(*found, strict=True)
-    )
-    return Touches(posture_.astype(np.intp), point_.astype(np.intp), t_, distance_)
+        found.append((np.full(len(point), configuration), point, t[fits], distance[fits]))
+    columns = [np.concatenate(column) for column in zip(*found, strict=True)]
+    return Touches(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])

@@ -1,8 +1,8 @@
 """Meshes in PyBullet that are not the part: compounds of their triangles.
 
-A mesh is made a convex hull by Bullet unless it is told to keep it concave, and between two meshes
-kept concave it finds no contact whatever. A compound of triangles, each a convex body of its own,
-meets both.
+Bullet makes a mesh a convex hull unless a flag keeps it concave, and between two concave meshes it
+finds no contact whatever. A compound of triangles, each a convex body of its own, has neither
+fault.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh
 from opl.verification.engine import BulletClient, pybullet
 
-RAY = np.array([0.2748, 0.5913, 0.7582])  # along no edge that anybody draws
+RAY = np.array([0.2748, 0.5913, 0.7582])  # not along any edge of a likely mesh
 
 
 def triangle_body(client: BulletClient, mesh: TriangleMesh) -> int:
@@ -38,9 +38,7 @@ def triangle_body(client: BulletClient, mesh: TriangleMesh) -> int:
 def is_inside(triangles: Array, p: Array) -> bool:
     """Return whether a ray from a point crosses a closed surface an odd number of times.
 
-    Args:
-        triangles: Corners in [m], shape (n, 3, 3).
-        p: The point in [m], shape (3,).
+    The corners of its triangles are in [m], shape (n, 3, 3), and so is the point, shape (3,).
     """
     a, b, c = (triangles[:, k] - p for k in range(3))
     sides = [np.sign(np.cross(one, other) @ RAY) for one, other in ((a, b), (b, c), (c, a))]

@@ -1,4 +1,7 @@
-"""The surface of the part in patches, and how near to the wheel each can be."""
+"""The surface of the part in patches, and how near each can be to the wheel, a plain cylinder.
+
+The cylinder is written out from its axis, apart from `ContactWheel`.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,49 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array, transform
-from opl.verification.drum import Drum
 
 MOST = 50  # triangles in a patch
+
+
+@dataclass(frozen=True, eq=False)
+class Drum:
+    """A cylinder about z of its own frame.
+
+    Attributes:
+        T_base_drum: Its pose, the origin in the middle, shape (4, 4).
+        radius: In [m].
+        width: In [m].
+    """
+
+    T_base_drum: Array
+    radius: float
+    width: float
+
+    def distances(self, p_base: Array) -> tuple[Array, Array]:
+        """Return signed distances of points in [m] and the directions in which they grow.
+
+        The points are in the base frame in [m], shape (n, 3).
+
+        Returns:
+            Distances, negative inside, shape (n,); unit vectors, shape (n, 3).
+        """
+        axis = self.T_base_drum[:3, 2]
+        from_middle = p_base - self.T_base_drum[:3, 3]
+        along = from_middle @ axis
+        radial = from_middle - along[:, None] * axis
+        away = np.linalg.norm(radial, axis=1)
+        beside, beyond = np.abs(along) - self.width / 2.0, away - self.radius
+        # parts of the shortest motion out: along the axis, and away from it
+        sideways, outward = np.maximum(beside, 0.0), np.maximum(beyond, 0.0)
+        inside = (beside <= 0.0) & (beyond <= 0.0)
+        sideways = np.where(inside, beside > beyond, sideways)
+        outward = np.where(inside, beside <= beyond, outward)
+        norm = np.hypot(sideways, outward)
+        distance = np.where(inside, np.maximum(beside, beyond), norm)
+        side = np.where(along < 0.0, -1.0, 1.0)
+        direction = (sideways / norm * side)[:, None] * axis
+        direction = direction + (outward / norm / np.maximum(away, 1e-12))[:, None] * radial
+        return distance, direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,14 +79,15 @@ class Patches:
         return cls(patches, (low + high) / 2.0, (high - low) / 2.0)
 
     def least_distances(self, drum: Drum, T_base_workpiece: Array) -> Array:
-        """Return what each patch is at least from the wheel in [m], shape (p,).
+        """Return a lower bound of the distance of each patch from the wheel in [m], shape (p,).
 
         The signed distance to a cylinder is convex: nothing of a patch is nearer than the plane
-        that touches it in the middle says. That bounds a depth as Bullet tells it, the shortest
-        way out, as well: along the normal of that plane there is one.
+        that touches it in the middle says. That bounds Bullet's penetration depth as well, the
+        shortest motion out of the wheel: one is along the normal of that plane.
         """
         distance, outward = drum.distances(transform(T_base_workpiece, self.middle))
-        return distance - (np.abs(outward @ T_base_workpiece[:3, :3]) * self.half).sum(axis=1)
+        reach = (np.abs(outward @ T_base_workpiece[:3, :3]) * self.half).sum(axis=1)
+        return np.asarray(distance - reach)
 
 
 def _halved(triangles: Array) -> Iterator[Array]:

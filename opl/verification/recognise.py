@@ -1,9 +1,9 @@
-"""What a robot grinds, recognised from its postures alone: nobody tells where the passes are.
+"""What a robot grinds, recognised from its configurations alone, without knowing its passes.
 
-Postures and cutter points are aligned like two texts: both keep their order, a posture may lie
-between two cutter points or off the wheel, and a cutter point that no posture brings to the wheel
-is left out, which is dear. Between two cutter points the frame changes evenly; postures there get
-places that never go back and lie nearest to the contact model.
+Configurations and cutter points are aligned like two texts: both keep their order, a configuration
+may lie between two cutter points or off the wheel, and a cutter point that no configuration brings
+to the wheel is left out, which costs much. Between two cutter points the frame changes evenly;
+configurations there get places that never go back and lie nearest to the contact model.
 """
 
 from __future__ import annotations
@@ -17,17 +17,16 @@ from opl.cell.workcell import WorkCell
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.motion import Motion, Stretch
+from opl.motion.motion import Motion, MoveKind, TimedMotion
 from opl.verification.align import align
-from opl.verification.contact import ALIGNED, Touches, find_touches
-from opl.verification.place import where
-from opl.verification.ways import Way, Ways
+from opl.verification.contact import ALIGNED, find_touches
+from opl.verification.contact_segments import ContactSegment, ContactSegments
 from opl.verification.world import World
 
-# [m] that a posture may be off the contact model at the cutter point it grinds: what the digits of
-# a position leave. Farther off it passes by; that is for the way between cutter points.
+# [m] that a configuration may be off the contact model at the cutter point it grinds: what the
+# digits of a position leave. Farther off it is between cutter points.
 AT_POINT = 5e-5
-ASIDE = 2e-4  # [m] that a posture of an approach may be beside the contact normal or the arc
+ASIDE = 2e-4  # [m] that a configuration of an approach may be beside the contact normal or the arc
 FARTHER = 1e-3  # [m] than the approach is long that still is approach
 
 
@@ -38,7 +37,7 @@ class Rule:
     Attributes:
         max_contact_error: Farthest that a ground point may be from where the contact model has it,
             in [m].
-        max_contact_step: Largest change of t between neighbouring postures on the wheel.
+        max_contact_step: Largest change of t between neighbouring configurations on the wheel.
         approach_length: Of approach and retract in [m].
         approach_turn: What they turn by in [rad]: 0 if they run along the contact normal, else they
             are arcs that begin and end along the belt, y of the contact frame.
@@ -55,12 +54,13 @@ class Recognition:
     """A motion with its meaning.
 
     Attributes:
-        motion: The postures, labelled; one that grinds several cutter points at once is repeated.
-        source: Index of each of them in the postures that were given, shape (n,).
-        findings: Postures that leave the way between two cutter points.
+        timed: The configurations, labelled; one that grinds several cutter points at once is
+            repeated, the move to itself taking no time.
+        source: Index of each of them in the configurations that were given, shape (n,).
+        findings: Configurations between two cutter points that are off the contact model.
     """
 
-    motion: Motion
+    timed: TimedMotion
     source: NDArray[np.intp]
     findings: tuple[Finding, ...]
 
@@ -79,104 +79,95 @@ def recognise(
         cell: The cell.
         points: The cutter points that may be ground.
         q: Joint positions in [rad], joined by linear joint interpolation, shape (n, 6).
-        duration: Time of the move that ends at each posture in [s], shape (n,).
-        stations: Indices of the postures at which a cutter point may be ground, in order.
+        duration: Time of the move that ends at each configuration in [s], shape (n,).
+        stations: Indices of the configurations at which a cutter point may be ground, in order.
         rule: What a motion over the wheel has to keep.
     """
     with World(cell) as world:
-        Ts_base_workpiece = np.array([world.move_to(posture) for posture in q])
+        Ts_base_workpiece = np.array([world.move_to(configuration) for configuration in q])
     Ts_contact0_workpiece = inverse(cell.wheel.T_base_contact0) @ Ts_base_workpiece
     tolerance = min(AT_POINT, rule.max_contact_error)
     touches = find_touches(cell.wheel, points, Ts_contact0_workpiece[stations], tolerance)
     ground = align(touches, points.pass_index, tolerance, rule.max_contact_step)
-    touches = replace(touches, posture=stations[touches.posture])
-    ways = Ways(cell.wheel, points, Ts_contact0_workpiece, duration, touches)
-    ground = ways.settled(ground, rule.max_contact_error)
-    labels = _Labels(cell, points, Ts_contact0_workpiece, rule)
-    labels.grind(touches, ground, ways)
+    touches = replace(touches, configuration=stations[touches.configuration])
+    segments = ContactSegments(cell.wheel, points, Ts_contact0_workpiece, duration, touches)
+    ground = segments.settled(ground, rule.max_contact_error)
+    labels = _Labels(segments, rule)
+    labels.grind(ground)
     return labels.recognition(q, duration)
 
 
 class _Labels:
-    """What each posture is, being found out."""
+    """What each configuration is, being found out."""
 
-    def __init__(
-        self, cell: WorkCell, points: CutterPoints, Ts_contact0_workpiece: Array, rule: Rule
-    ) -> None:
-        n = len(Ts_contact0_workpiece)
-        self._wheel = cell.wheel
-        self._points = points
-        self._Ts = Ts_contact0_workpiece
+    def __init__(self, segments: ContactSegments, rule: Rule) -> None:
+        n = len(segments.duration)
+        self._segments = segments
         self._rule = rule
-        self._stretch = [Stretch.HOME] * n
+        self._kind = [MoveKind.HOME] * n
         self._t = np.full(n, np.nan)
         self._place = np.full(n, np.nan)
         self._pass = np.full(n, -1)
-        self._also: dict[int, list[tuple[int, float]]] = {}  # more cutter points at a posture
+        # more cutter points at a configuration: its index, the point and t
+        self._also: list[tuple[int, int, float]] = []
         self._astray: list[tuple[int, float]] = []
 
-    def grind(self, touches: Touches, ground: NDArray[np.intp], ways: Ways) -> None:
+    def grind(self, ground: NDArray[np.intp]) -> None:
         """Label everything, given which touches are the ground cutter points."""
-        posture, point = touches.posture[ground], touches.point[ground]
+        touches = self._segments.touches
+        configuration, point = touches.configuration[ground], touches.point[ground]
         t = touches.contact_position[ground]
-        pass_index = self._points.pass_index[point]
-        for k, i, position in zip(posture, point, t, strict=True):
-            if self._stretch[k] is Stretch.GRIND:
-                self._also.setdefault(int(k), []).append((int(i), float(position)))
+        pass_index = self._segments.points.pass_index[point]
+        for k, i, position, index in zip(configuration, point, t, pass_index, strict=True):
+            if self._kind[k] is MoveKind.GRIND:
+                self._also.append((int(k), int(i), float(position)))
                 continue
-            self._mark(k, Stretch.GRIND, self._points.pass_index[i], position, i)
+            self._mark(k, MoveKind.GRIND, index, position, i)
         for m in np.flatnonzero(np.diff(pass_index) == 0):
-            self._fill_in(ways.between(int(ground[m]), int(ground[m + 1])), int(pass_index[m]))
-        first, last = self._lead_ins(posture, point, t, pass_index)
-        self._name_the_air(first, last)
+            segment = self._segments.between(int(ground[m]), int(ground[m + 1]))
+            self._fill_in(segment, int(pass_index[m]))
+        self._label_free_moves(*self._label_leads(configuration, point, t, pass_index))
 
     def recognition(self, q: Array, duration: Array) -> Recognition:
         """Return the labelled motion."""
-        rows = [(k, 0) for k in range(len(q))]
-        rows += [(k, 1 + m) for k, more in self._also.items() for m in range(len(more))]
-        rows.sort()
-        source = np.array([k for k, _ in rows])
-        t, place, time = self._t[source], self._place[source], duration[source]
-        for row, (k, again) in enumerate(rows):
-            if again:
-                place[row], t[row] = self._also[k][again - 1]
-                time[row] = 0.0
+        also = np.array(self._also).reshape(-1, 3)
+        at = also[:, 0].astype(np.intp)
+        source = np.insert(np.arange(len(q)), at + 1, at)
         motion = Motion(
             q=q[source],
-            duration=time,
-            stretch=tuple(self._stretch[k] for k in source),
-            contact_position=t,
-            cutter_point=place,
+            kind=tuple(self._kind[k] for k in source),
+            contact_position=np.insert(self._t, at + 1, also[:, 2]),
+            cutter_point=np.insert(self._place, at + 1, also[:, 1]),
             pass_index=self._pass[source],
-            clearance=np.full(len(source), np.nan),
         )
         findings = tuple(
             Finding(
                 Level.ERROR,
                 "contact",
-                where(motion, int(np.searchsorted(source, k))),
-                f"{1e3 * amount:.3f} mm off the way to the next cutter point, "
+                motion.place(int(np.searchsorted(source, k))),
+                f"{1e3 * amount:.3f} mm off the contact model before the next cutter point, "
                 f"{1e3 * self._rule.max_contact_error:g} mm allowed",
             )
             for k, amount in self._astray
         )
-        return Recognition(motion, source, findings)
+        timed = TimedMotion(motion, np.insert(duration, at + 1, 0.0))
+        return Recognition(timed, source, findings)
 
-    def _mark(self, k: int, stretch: Stretch, pass_index: int, t: float, place: float) -> None:
-        self._stretch[k], self._pass[k] = stretch, pass_index
+    def _mark(self, k: int, kind: MoveKind, pass_index: int, t: float, place: float) -> None:
+        self._kind[k], self._pass[k] = kind, pass_index
         self._t[k], self._place[k] = t, place
 
-    def _fill_in(self, way: Way, pass_index: int) -> None:
-        """Label the postures between two that grind cutter points."""
-        columns = (way.postures, way.place, way.contact_position, way.apart)
-        for k, place, t, apart in zip(*columns, strict=True):
-            self._mark(int(k), Stretch.BETWEEN, pass_index, t, place)
+    def _fill_in(self, segment: ContactSegment, pass_index: int) -> None:
+        """Label the configurations between two that grind cutter points."""
+        placed = (segment.configurations, segment.place, segment.contact_position, segment.apart)
+        for k, place, t, apart in zip(*placed, strict=True):
+            self._mark(int(k), MoveKind.BETWEEN, pass_index, t, place)
             if apart > self._rule.max_contact_error:
                 self._astray.append((int(k), float(apart)))
 
-    def _lead_ins(
+    def _label_leads(
         self,
-        posture: NDArray[np.intp],
+        configuration: NDArray[np.intp],
         point: NDArray[np.intp],
         t: Array,
         pass_index: NDArray[np.int64],
@@ -186,25 +177,26 @@ class _Labels:
         for index in np.unique(pass_index):
             on_pass = np.flatnonzero(pass_index == index)
             begin, end = on_pass[0], on_pass[-1]
-            reach = self._leading(posture[begin], point[begin], t[begin], -1)
-            for k in reach[:-1]:  # the move to the farthest of them is free
-                self._mark(k, Stretch.APPROACH, index, np.nan, np.nan)
-            firsts.append(min(reach, default=int(posture[begin])))
-            away = self._leading(posture[end], point[end], t[end], 1)
-            for k in away:
-                self._mark(k, Stretch.RETRACT, index, np.nan, np.nan)
-            lasts.append(max(away, default=int(posture[end])))
+            before = self._lead(configuration[begin], point[begin], t[begin], -1)
+            for k in before[:-1]:  # the move to the farthest of them is free
+                self._mark(k, MoveKind.APPROACH, index, np.nan, np.nan)
+            firsts.append(min(before, default=int(configuration[begin])))
+            after = self._lead(configuration[end], point[end], t[end], 1)
+            for k in after:
+                self._mark(k, MoveKind.RETRACT, index, np.nan, np.nan)
+            lasts.append(max(after, default=int(configuration[end])))
         return firsts, lasts
 
-    def _leading(self, k: int, point: int, t: float, step: int) -> list[int]:
-        """Return the postures off the wheel along the lead next to posture k, nearest first."""
-        T_cutter = self._points.Ts_workpiece_cutter[point]
-        to_contact = inverse(self._wheel.T_contact0_contact(t))
+    def _lead(self, k: int, point: int, t: float, side: int) -> list[int]:
+        """Return the configurations off the wheel along the lead next to k, nearest first."""
+        T_workpiece_cutter = self._segments.points.Ts_workpiece_cutter[point]
+        T_contact_contact0 = inverse(self._segments.wheel.T_contact0_contact(t))
         farthest, found = 0.0, []
-        j = int(k) + step
-        while 0 <= j < len(self._Ts) and self._stretch[j] is Stretch.HOME:
-            T_contact_cutter = to_contact @ self._Ts[j] @ T_cutter
-            along, aside = self._along_lead(T_contact_cutter[:3, 3], step)
+        j = int(k) + side
+        while 0 <= j < len(self._kind) and self._kind[j] is MoveKind.HOME:
+            T_contact0_workpiece = self._segments.Ts_contact0_workpiece[j]
+            T_contact_cutter = T_contact_contact0 @ T_contact0_workpiece @ T_workpiece_cutter
+            along, aside = self._along_lead(T_contact_cutter[:3, 3], side)
             turned = np.linalg.norm(T_contact_cutter[:3, :3] - np.eye(3)) / np.sqrt(2.0)
             if aside > ASIDE or turned > ALIGNED or not along > farthest:
                 break
@@ -212,15 +204,14 @@ class _Labels:
                 break
             farthest = along
             found.append(j)
-            j += step
+            j += side
         return found
 
     def _along_lead(self, p_contact: Array, side: int) -> tuple[float, float]:
         """Return how far along approach or retract a point is and how far beside it, in [m].
 
-        Args:
-            p_contact: The ground point in the contact frame, whose z points into the wheel, (3,).
-            side: -1 for the approach, which comes from -y, 1 for the retract.
+        `p_contact` is the ground point in the contact frame, whose z points into the wheel, shape
+        (3,); `side` is -1 for the approach, which comes from -y, 1 for the retract.
         """
         x, y, z = (float(v) for v in p_contact)
         if self._rule.approach_turn == 0.0:
@@ -229,14 +220,12 @@ class _Labels:
         y, z = side * y, z + radius  # seen from the centre of the arc
         return radius * float(np.arctan2(y, z)), float(np.hypot(x, np.hypot(y, z) - radius))
 
-    def _name_the_air(self, firsts: list[int], lasts: list[int]) -> None:
-        """Tell the ways from and to home from the links between passes."""
-        for k in range(len(self._stretch)):
-            if self._stretch[k] is not Stretch.HOME or not firsts:
-                continue
+    def _label_free_moves(self, firsts: list[int], lasts: list[int]) -> None:
+        """Tell the free moves from and to home from the links between passes."""
+        for k in range(1, len(self._kind)):
             following = next((m for m, first in enumerate(firsts) if k <= first), None)
-            if following is None or k == 0:
-                continue  # on the way home, or at home
+            if self._kind[k] is not MoveKind.HOME or following is None:
+                continue
             self._pass[k] = self._pass[lasts[following]]
             if following > 0:
-                self._stretch[k] = Stretch.LINK
+                self._kind[k] = MoveKind.LINK

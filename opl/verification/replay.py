@@ -1,8 +1,8 @@
 """Replay of a motion in PyBullet: a second opinion that shares no code with the planner.
 
-The controller moves all joints linearly between the postures of the program, so that is what is
-replayed, densely: between two checked poses no corner of the held part's box moves more than `STEP`
-and no joint turns more than `TURN`.
+The controller moves all joints linearly between the configurations of the program, so that is what
+is replayed, densely: between two checked poses no corner of the held part's box moves more than
+`STEP` and no joint turns more than `TURN`.
 
 A pair of solids is measured only when it could have come too near: since it was last measured its
 distance cannot have shrunk by more than the joints between the two moved times their levers. That
@@ -12,7 +12,7 @@ leaves out nothing; it covers the moves between the checked poses as well.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,23 +21,24 @@ from opl.findings import Finding, Level
 from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.motion import Motion, Stretch, VerifiedMotion
-from opl.verification.limits import limit_findings, missing_points
-from opl.verification.place import where
+from opl.motion.motion import Motion, MoveKind, TimedMotion, VerifiedMotion
+from opl.verification.kinematic_checks import limit_findings, missing_points
 from opl.verification.world import World
 
 STEP = 1e-3  # [m]
 TURN = np.deg2rad(0.5)
-HORIZON = 0.1  # [m] clearances beyond this are not told, only known to be more
-AHEAD = 0.03  # [m] beyond what is asked that is measured: so long a pair can be left alone after
+HORIZON = 0.1  # [m] clearances beyond this are not measured, only known to be more
+AHEAD = 0.03  # [m] measured beyond what is needed: for that long a pair can be left alone after
 # Bullet's distance of a mesh from the rim of a cylinder is too large by up to 0.083 mm, too small
-# by 0.025 mm: 2000 random postures each in the V and S cells, against the exact distance. Whether
-# the ground point lies on the wheel is checked without it
+# by 0.025 mm: 2000 random configurations each in the V and S cells, against the exact distance.
+# Whether the ground point lies on the wheel is checked without it
 GAP_ACCURACY = 1e-4  # [m]
 FARTHEST_GAP = 0.005  # [m] between part and wheel that is measured while grinding
 
-ON_WHEEL = (Stretch.GRIND, Stretch.BETWEEN)
-ALONG_LEAD = (Stretch.APPROACH, Stretch.RETRACT)
+# What a kind of move means for the contact is written here anew: a mistake in `MoveKind` must not
+# go through the proof unseen.
+ON_WHEEL = (MoveKind.GRIND, MoveKind.BETWEEN)
+ALONG_LEAD = (MoveKind.APPROACH, MoveKind.RETRACT)
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,8 @@ class Verification:
         min_clearance: Smallest distance of any pair that needs clearance in [m], part on wheel
             aside; `HORIZON` if nothing came nearer than that.
         max_contact_error: Largest distance of the ground point from the wheel's surface in [m].
-        limit_violations: Number of postures beyond a joint limit or moves beyond a joint speed.
+        limit_violations: Number of configurations beyond a joint limit or moves beyond a joint
+            speed.
         findings: What is wrong, worst of each kind and place.
         verified: The motion with its clearances, or None if anything is wrong.
     """
@@ -69,7 +71,7 @@ class Verification:
 def replay(
     cell: WorkCell,
     points: CutterPoints,
-    motion: Motion,
+    timed: TimedMotion,
     max_contact_error: float,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> Verification:
@@ -78,11 +80,12 @@ def replay(
     Args:
         cell: The cell.
         points: The cutter points that are to be ground.
-        motion: The motion.
+        timed: The motion and its times.
         max_contact_error: Largest distance of the ground point from the wheel's surface allowed,
             in [m].
-        progress: Told the part of the motion that is done, 0 to 1.
+        progress: Called with the part of the motion that is done, 0 to 1.
     """
+    motion = timed.motion
     with World(cell) as world:
         run = _Run(cell, world, points, motion, max_contact_error)
         for move in range(len(motion)):
@@ -90,11 +93,9 @@ def replay(
             if move % 50 == 0:
                 progress(move / len(motion))
         version = world.version
-    findings = run.findings.worst()
-    limits = limit_findings(cell, motion)
-    missing = missing_points(points, motion)
-    findings = (*findings, *limits, *missing)
-    motion = replace(motion, clearance=run.clearance)
+    limits = limit_findings(cell, timed)
+    worst = (finding for _, finding in run.worst.values())
+    findings = (*worst, *limits, *missing_points(points, motion))
     return Verification(
         engine=f"PyBullet {version}",
         poses=run.poses,
@@ -103,25 +104,8 @@ def replay(
         max_contact_error=run.max_contact_error,
         limit_violations=len(limits),
         findings=findings,
-        verified=None if findings else VerifiedMotion(motion),
+        verified=None if findings else VerifiedMotion(timed, run.clearance),
     )
-
-
-class _Worst:
-    """Findings, of which only the worst of each kind, place and subject is kept."""
-
-    def __init__(self) -> None:
-        self._worst: dict[tuple[str, str, str], tuple[float, Finding]] = {}
-
-    def add(
-        self, kind: str, place: str, where: str, subject: str, amount: float, told: str
-    ) -> None:
-        key = (kind, place, subject)
-        if key not in self._worst or amount > self._worst[key][0]:
-            self._worst[key] = (amount, Finding(Level.ERROR, kind, where, f"{subject}: {told}"))
-
-    def worst(self) -> tuple[Finding, ...]:
-        return tuple(finding for _, finding in self._worst.values())
 
 
 class _Run:
@@ -138,8 +122,10 @@ class _Run:
         self.poses = 0
         self.collisions = 0
         self.max_contact_error = 0.0
-        self.findings = _Worst()
-        self.clearance = np.full(len(motion), HORIZON)  # of the move that ends at each posture
+        # the worst finding of each kind, place and subject, and by how much it is wrong
+        self.worst: dict[tuple[str, str, int, str], tuple[float, Finding]] = {}
+        # of the move that ends at each configuration
+        self.clearance = np.full(len(motion), HORIZON)
         self._cell = cell
         self._points = points
         self._world = world
@@ -158,11 +144,10 @@ class _Run:
         self._at = transform(world.move_to(self._q), self._corners)
         for name in world.surrounding():
             self.collisions += 1
-            told = f"robot and {name}"
-            self.findings.add("collision", "start", where(motion, 0), told, 0.0, "one in the other")
+            self._note("collision", 0, f"robot and {name}", np.inf, "one in the other")
 
     def make_move(self, move: int) -> None:
-        """Go on to a posture, checking on the way."""
+        """Go on to a configuration, checking the poses on the move."""
         start, target = self._q, self._motion.q[move]
         done = 0.0
         stride = 1.0 / max(np.abs(target - start).max() / TURN, 1.0)
@@ -174,9 +159,8 @@ class _Run:
             q = start + ahead * (target - start)
             T_base_workpiece = self._world.move_to(q)
             corners = transform(T_base_workpiece, self._corners)
-            way = np.sqrt(np.square(corners - self._at).sum(axis=1).max()) / STEP
-            turn = np.abs(q - self._q).max() / TURN
-            longest = max(way, turn)
+            moved = np.sqrt(np.square(corners - self._at).sum(axis=1).max()) / STEP
+            longest = max(moved, np.abs(q - self._q).max() / TURN)
             stride = (ahead - done) * 0.95 / max(longest, 0.1)
             if longest > 1.0:
                 continue
@@ -192,13 +176,13 @@ class _Run:
         self._q = q
         hit = False
         # near pairs are measured at every pose, so that the smallest clearance is found too; the
-        # nearest first: it leaves the least to ask of the others
+        # nearest first: it leaves the least to measure of the others
         for k in self._apart.argsort(kind="stable"):
             pair = self._pairs[k]
-            asked = max(pair.clearance, self.clearance[move] if pair.clearance > 0.0 else 0.0)
-            if self._apart[k] > asked:
+            wanted = max(pair.clearance, self.clearance[move] if pair.clearance > 0.0 else 0.0)
+            if self._apart[k] > wanted:
                 continue
-            within = asked + AHEAD
+            within = wanted + AHEAD
             distance = self._world.distance(pair.first, pair.second, within + pair.rounding)
             distance -= pair.rounding
             self._apart[k] = min(distance, within)
@@ -206,22 +190,23 @@ class _Run:
                 self.clearance[move] = min(self.clearance[move], distance)
             if distance < pair.clearance or distance <= 0.0:
                 hit = True
-                self._too_near(move, pair.first.name, pair.second.name, distance, pair.clearance)
+                names = f"{pair.first.name} and {pair.second.name}"
+                self._too_near(move, names, distance, pair.clearance)
         hit |= self._check_wheel(move)
         self.collisions += hit
 
     def _check_wheel(self, move: int) -> bool:
         """Check part against wheel as bodies; return whether they collide."""
         motion, cell = self._motion, self._cell
-        grinding = motion.stretch[move] in ON_WHEEL
-        touching_down = grinding and motion.stretch[move - 1] is Stretch.APPROACH
-        free = not grinding and motion.stretch[move] not in ALONG_LEAD
+        grinding = motion.kind[move] in ON_WHEEL
+        touching_down = grinding and motion.kind[move - 1] is MoveKind.APPROACH
+        free = not grinding and motion.kind[move] not in ALONG_LEAD
         off_wheel = cell.pairs.required.get(frozenset((PART, WHEEL)), cell.required_clearance)
-        needed = off_wheel if free else -cell.contact_allowance
+        needed = off_wheel if free else -cell.max_belt_penetration
         farthest = self._allowed_error + GAP_ACCURACY if grinding and not touching_down else np.inf
         gap = self._world.gap(farthest if farthest < np.inf else max(needed, 0.0))
         if gap < needed:
-            self._too_near(move, PART, WHEEL, gap, needed)
+            self._too_near(move, f"{PART} and {WHEEL}", gap, needed)
             return True
         if farthest < gap:
             gap = min(self._world.gap(FARTHEST_GAP), FARTHEST_GAP)
@@ -231,16 +216,13 @@ class _Run:
     def _check_contact(self, move: int, fraction: float, T_base_workpiece: Array) -> None:
         """Check that the point to be ground lies on the wheel's surface.
 
-        Args:
-            move: The move.
-            fraction: How much of the move is done.
-            T_base_workpiece: Where the part is, shape (4, 4).
+        `fraction` of the move is done; T_base_workpiece has shape (4, 4).
         """
         motion = self._motion
-        if motion.stretch[move] not in ON_WHEEL:
+        if motion.kind[move] not in ON_WHEEL:
             return
         place = motion.cutter_point[move]
-        if motion.stretch[move - 1] in ON_WHEEL:
+        if motion.kind[move - 1] in ON_WHEEL:
             place -= (1.0 - fraction) * (place - motion.cutter_point[move - 1])
         elif fraction < 1.0:
             return  # touching down
@@ -254,30 +236,24 @@ class _Run:
             self._contact_lost(move, error, "ground point")
 
     def _contact_lost(self, move: int, error: float, subject: str) -> None:
-        self.findings.add(
-            "contact",
-            self._place(move),
-            where(self._motion, move),
-            subject,
-            error,
+        message = (
             f"{1e3 * error:.3f} mm from the wheel's surface, "
-            f"{1e3 * self._allowed_error:g} mm allowed",
+            f"{1e3 * self._allowed_error:g} mm allowed"
         )
+        self._note("contact", move, subject, error, message)
 
-    def _too_near(self, move: int, first: str, second: str, distance: float, needed: float) -> None:
-        told = (
+    def _too_near(self, move: int, subject: str, distance: float, needed: float) -> None:
+        message = (
             f"{1e3 * distance:.2f} mm apart, {1e3 * needed:g} mm needed"
             if distance > 0.0
             else f"{-1e3 * distance:.2f} mm into each other"
         )
-        self.findings.add(
-            "collision",
-            self._place(move),
-            where(self._motion, move),
-            f"{first} and {second}",
-            needed - distance,
-            told,
-        )
+        self._note("collision", move, subject, needed - distance, message)
 
-    def _place(self, move: int) -> str:
-        return f"{self._motion.stretch[move].value} {self._motion.pass_index[move]}"
+    def _note(self, kind: str, move: int, subject: str, amount: float, message: str) -> None:
+        """Keep a finding if it is the worst of its kind, place and subject."""
+        motion = self._motion
+        key = kind, motion.kind[move].value, int(motion.pass_index[move]), subject
+        if key not in self.worst or amount > self.worst[key][0]:
+            finding = Finding(Level.ERROR, kind, motion.place(move), f"{subject}: {message}")
+            self.worst[key] = amount, finding

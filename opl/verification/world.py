@@ -15,13 +15,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from opl.cell.workcell import PART, WorkCell
-from opl.geometry.frames import Array, pose
+from opl.geometry.frames import Array, pose, transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Body, Box, Cylinder
-from opl.verification.drum import Drum
 from opl.verification.engine import pybullet, start
 from opl.verification.meshes import is_inside, triangle_body
-from opl.verification.patches import Patches
+from opl.verification.patches import Drum, Patches
 
 BASE_LINK = -1  # Bullet's number of the link that does not move
 # Bullet rounds the edges of a link's boxes by about this much, so that they seem farther away than
@@ -43,7 +42,7 @@ class Solid:
 
 
 @dataclass(frozen=True)
-class Pair:
+class SolidPair:
     """Two solids that must stay apart.
 
     Attributes:
@@ -103,7 +102,7 @@ class World:
         self._wheel = self._add(wheel, wheel.T_parent_body)
         self._drum = Drum(wheel.T_parent_body, cell.wheel.radius, cell.wheel.width)
         self._obstacles = [self._add(body, body.T_parent_body) for body in cell.obstacles]
-        # Bullet asks every triangle in the box around the wheel, nearly all of a fine mesh
+        # Bullet tests every triangle in the box around the wheel, nearly all of a fine mesh
         self._patches = Patches.of(cell.part.triangles)
         self._shown = [self._add_mesh(patch.reshape(-1, 3)) for patch in self._patches.triangles]
         self.move_to(np.zeros(len(self._joints)))
@@ -114,36 +113,34 @@ class World:
     def __exit__(self, *_: object) -> None:
         self._client.disconnect()
 
-    def pairs(self) -> list[Pair]:
+    def pairs(self) -> list[SolidPair]:
         """Return every pair that must stay apart; part and wheel may touch and are not in it."""
-        return [pair for pair in map(self._as_said, self._pairs()) if pair is not None]
+        rules, found = self._cell.pairs, []
+        for pair in self._pairs():
+            names = frozenset((pair.first.name, pair.second.name))
+            if names not in rules.allowed:
+                clearance = rules.required.get(names, pair.clearance)
+                found.append(replace(pair, clearance=clearance))
+        return found
 
-    def _as_said(self, pair: Pair) -> Pair | None:
-        """Return a pair with what the cell says of it; None if the two may touch."""
-        names = {pair.first.name, pair.second.name}
-        if any(names == set(allowed) for allowed in self._cell.pairs.allowed):
-            return None
-        for told, clearance in self._cell.pairs.required.items():
-            if names == set(told):
-                return replace(pair, clearance=clearance)
-        return pair
-
-    def _pairs(self) -> Iterator[Pair]:
+    def _pairs(self) -> Iterator[SolidPair]:
         links, clearance = self._links, self._cell.required_clearance
         for k, link in enumerate(links):
             # neighbouring links share a bearing
-            yield from (Pair(link, other, 0.0, 2.0 * LINK_ROUNDING) for other in links[k + 2 :])
+            yield from (
+                SolidPair(link, other, 0.0, 2.0 * LINK_ROUNDING) for other in links[k + 2 :]
+            )
             if k > 0:  # the base does not move, nor does what stands around it
                 for other in (self._wheel, *self._obstacles):
-                    yield Pair(link, other, clearance, LINK_ROUNDING)
+                    yield SolidPair(link, other, clearance, LINK_ROUNDING)
             if k < len(links) - 1:  # the fixture is bolted to the last link
                 # and turns close in front of the last but one
                 needed = 0.0 if k == len(links) - 2 else clearance
-                yield from (Pair(link, held, needed, LINK_ROUNDING) for held, _ in self._held)
+                yield from (SolidPair(link, held, needed, LINK_ROUNDING) for held, _ in self._held)
         for held, _ in self._held:
-            yield from (Pair(held, other, clearance) for other in self._obstacles)
+            yield from (SolidPair(held, other, clearance) for other in self._obstacles)
             if held.name != PART:
-                yield Pair(held, self._wheel, clearance)
+                yield SolidPair(held, self._wheel, clearance)
 
     def move_to(self, q: Array) -> Array:
         """Pose robot, part and fixture; return T_base_workpiece as PyBullet sees it, (4, 4)."""
@@ -151,13 +148,10 @@ class World:
         for joint, value in zip(self._joints, q, strict=True):
             client.resetJointState(self._robot, joint, value)
         state = client.getLinkState(self._robot, self._flange, computeForwardKinematics=True)
-        placed = [
-            (held, client.multiplyTransforms(state[4], state[5], *in_flange))
-            for held, in_flange in self._held
-        ]
-        for held, (position, quaternion) in placed:
-            client.resetBasePositionAndOrientation(held.body, position, quaternion)
-        position, quaternion = self._part_at = placed[0][1]
+        placed = [client.multiplyTransforms(*state[4:6], *at_flange) for _, at_flange in self._held]
+        for (held, _), at in zip(self._held, placed, strict=True):
+            client.resetBasePositionAndOrientation(held.body, *at)
+        position, quaternion = self._part_at = placed[0]
         R = np.array(client.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
         self._T_base_workpiece = pose(R, np.array(position))
         return self._T_base_workpiece
@@ -170,8 +164,8 @@ class World:
     def gap(self, within: float) -> float:
         """Return the distance of the part from the wheel in [m], as `distance`.
 
-        Measured patch by patch, the most promising first, and none that cannot be nearer than what
-        is known.
+        Measured patch by patch, the nearest bound first, and none that cannot be nearer than what
+        was measured.
         """
         bounds = self._patches.least_distances(self._drum, self._T_base_workpiece)
         place, nearest = self._client.resetBasePositionAndOrientation, np.inf
@@ -186,23 +180,20 @@ class World:
     def surrounding(self) -> list[str]:
         """Return the meshes around flange or part as posed: distances are those of surfaces."""
         state = self._client.getLinkState(self._robot, self._flange, computeForwardKinematics=True)
-        held = self._client.getBasePositionAndOrientation(self._held[0][0].body)
-        R_base_part = np.array(self._client.getMatrixFromQuaternion(held[1])).reshape(3, 3)
-        points = [np.array(state[4]), R_base_part @ self._cell.part.vertices[0] + held[0]]
+        points = [
+            np.array(state[4]),
+            transform(self._T_base_workpiece, self._cell.part.vertices[0]),
+        ]
         found = []
         for body in self._cell.obstacles:
             if isinstance(body.shape, TriangleMesh) and body.shape.is_closed:
-                R, p = body.T_parent_body[:3, :3], body.T_parent_body[:3, 3]
-                corners = body.shape.vertices[body.shape.faces] @ R.T + p
+                corners = transform(body.T_parent_body, body.shape.triangles)
                 if any(is_inside(corners, point) for point in points):
                     found.append(body.name)
         return found
 
     def distance_to_wheel(self, p_base: Array) -> float:
-        """Return how far a point, given in the base frame, is from the wheel's surface in [m].
-
-        Negative inside.
-        """
+        """Return how far a point is from the wheel's surface in [m], negative inside."""
         return float(self._drum.distances(p_base[None])[0][0])
 
     @property
@@ -213,17 +204,17 @@ class World:
     def levers(self) -> Array:
         """Return how far from each joint's axis anything that it moves can ever be, in [m], (6,).
 
-        A bound for all postures: the arm stretched out from the joint on, then the largest link or
-        held body all the way out.
+        A bound for all configurations: the arm stretched out from the joint on, then the largest
+        link or held body stretched out beyond it.
         """
         self.move_to(np.zeros(len(self._joints)))
         origins = [
             np.array(self._client.getLinkState(self._robot, joint)[4]) for joint in self._joints
         ]
-        solids = [*self._links[1:], *(held for held, _ in self._held)]
-        origins_of_solids = [*origins, *([origins[-1]] * len(self._held))]
+        moved = [*self._links[1:], *(held for held, _ in self._held)]
         radii = []
-        for solid, origin in zip(solids, origins_of_solids, strict=True):
+        for solid in moved:
+            origin = origins[solid.moved_by - 1]
             low, high = self._client.getAABB(solid.body, solid.link)
             away = np.maximum(np.abs(np.array(low) - origin), np.abs(np.array(high) - origin))
             radii.append(float(np.linalg.norm(away)))
@@ -260,7 +251,8 @@ class World:
         else:
             solid = self._as_solid(body.name, triangle_body(client, body.shape))
         if T_base_body is not None:
-            self._place(solid, T_base_body)
+            at = _position_quaternion(T_base_body)
+            client.resetBasePositionAndOrientation(solid.body, *at)
         return solid
 
     def _body(self, name: str, shape: int) -> Solid:
@@ -270,9 +262,6 @@ class World:
     def _as_solid(self, name: str, body: int) -> Solid:
         self._client.changeDynamics(body, BASE_LINK, collisionMargin=MARGIN)
         return Solid(name, body, BASE_LINK)
-
-    def _place(self, solid: Solid, T_base_body: Array) -> None:
-        self._client.resetBasePositionAndOrientation(solid.body, *_position_quaternion(T_base_body))
 
 
 def _position_quaternion(T: Array) -> tuple[list[float], list[float]]:

@@ -25,7 +25,7 @@ from tests.support.bare_cells import (
     c_shape,
     convex_hull,
     free_move,
-    random_postures,
+    random_configurations,
     with_obstacle,
 )
 from tests.support.fcl_scene import FclScene
@@ -62,11 +62,11 @@ def meshed_cell():
     return replace(cell, obstacles=(*cell.obstacles, gate), fixture=(jaw,), pairs=rules)
 
 
-def postures(n=240, seed=5):
+def configurations(n=240, seed=5):
     robot, random = meshed_cell().robot, np.random.default_rng(seed)
     on_motion = small_motion().q[random.integers(0, len(small_motion()), n // 2)]
     near = on_motion + random.normal(scale=0.3, size=on_motion.shape)
-    anywhere = random_postures(robot, n - n // 2, seed)
+    anywhere = random_configurations(robot, n - n // 2, seed)
     return np.concatenate([anywhere, np.clip(near, robot.lower, robot.upper)])
 
 
@@ -74,7 +74,7 @@ def test_coal_and_fcl_find_the_same_pairs():
     cell = meshed_cell()
     scene, other = CollisionScene(cell), FclScene(cell)
     met = set()
-    for q in postures():
+    for q in configurations():
         margins = {frozenset(names): margin for names, margin in other.clearances(q).items()}
         found = {frozenset(names) for names in scene.colliding_pairs(q)}
         met |= found
@@ -91,7 +91,7 @@ def test_bullet_and_fcl_agree_on_meshes_and_rules():
     hits, near_gate = 0, 0
     with World(cell) as world:
         pairs = world.pairs()
-        for q in postures():
+        for q in configurations():
             margins = {frozenset(names): margin for names, margin in other.clearances(q).items()}
             world.move_to(q)
             for asked in pairs:
@@ -129,7 +129,7 @@ def only_the_part_meets(name):
 
 
 def in_front_of(cell, part_to_body):
-    """Return the pose of a body so far from the part at the zero posture."""
+    """Return the pose of a body so far from the part at the zero configuration."""
     T_base_part = forward_kinematics(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece
     return pose(np.eye(3), T_base_part[:3, 3] + part_to_body)
 
@@ -194,7 +194,7 @@ def test_an_arm_inside_a_solid_is_told_though_no_surface_meets():
     cell = replace(v_job().cell, obstacles=())
     hall = Body("hall", block((20.0, 20.0, 20.0)), np.eye(4))
     ready = replace(cell, obstacles=(hall,))
-    home = v_job().pace.home
+    home = v_job().process.home
     assert CollisionScene(ready).colliding_pairs(home) == []
     assert enclosing_bodies(ready, home) == [("flange", "hall"), ("part", "hall")]
     assert replay_nothing(ready).verified is None

@@ -12,18 +12,18 @@ from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import part_tree
-from opl.motion.check import RESOLUTION, densify, find_faults
-from opl.motion.motion import Stretch
+from opl.motion.collision_check import RESOLUTION, colliding_moves, densify
+from opl.motion.motion import MoveKind
 from tests.support.bare_cells import bare_cell, block, free_move, with_obstacle
 from tests.support.fcl_scene import FclScene
 from tests.support.planned import small_motion, small_problem
 
-postures = arrays(float, st.tuples(st.integers(2, 6), st.just(6)), elements=st.floats(-3, 3))
+configurations = arrays(float, st.tuples(st.integers(2, 6), st.just(6)), elements=st.floats(-3, 3))
 
 
 @settings(max_examples=50, deadline=None)
-@given(postures, st.floats(0.01, 1.0))
-def test_densified_postures_lie_on_the_joint_lines_no_further_apart_than_asked(q, resolution):
+@given(configurations, st.floats(0.01, 1.0))
+def test_densified_configurations_lie_on_the_joint_lines_no_further_apart_than_asked(q, resolution):
     dense, move = densify(q, resolution)
     assert np.abs(np.diff(dense, axis=0)).max() <= resolution * (1 + 1e-9)
     assert move[0] == 0
@@ -38,22 +38,22 @@ def test_densified_postures_lie_on_the_joint_lines_no_further_apart_than_asked(q
         assert (np.diff(along) > 0.0).all()
 
 
-def test_a_posture_held_is_one_posture():
+def test_a_configuration_held_is_one_configuration():
     dense, move = densify(np.ones((3, 6)), 0.1)
     assert len(dense) == 3
     assert move.tolist() == [0, 1, 2]
 
 
-def faults_of(cell, motion):
-    return find_faults(cell, CollisionScene(cell), part_tree(cell.part), motion)
+def faults_of(cell, timed):
+    return colliding_moves(cell, CollisionScene(cell), part_tree(cell.part), timed.motion)
 
 
 def test_a_planned_motion_has_no_faults():
     scene = small_problem().scene
-    assert find_faults(scene.cell, scene.collision, scene.part, small_motion()) == []
+    assert colliding_moves(scene.cell, scene.collision, scene.part, small_motion()) == []
 
 
-def test_an_obstacle_between_two_free_postures_is_found():
+def test_an_obstacle_between_two_free_configurations_is_found():
     cell = bare_cell(block((0.02, 0.02, 0.02)))
     q = np.zeros((3, 6))
     q[1, 0], q[2, 0] = 0.8, 1.6
@@ -68,7 +68,7 @@ def test_an_obstacle_between_two_free_postures_is_found():
     assert not fault.at_end
 
 
-def test_a_posture_that_collides_is_told_from_a_way_that_does():
+def test_a_configuration_that_collides_is_told_from_a_way_that_does():
     cell = bare_cell(block((0.02, 0.02, 0.02)))
     q = np.zeros((3, 6))
     q[1, 0], q[2, 0] = 0.8, 1.6
@@ -79,7 +79,7 @@ def test_a_posture_that_collides_is_told_from_a_way_that_does():
 
 
 def test_a_fault_names_a_pair_that_collides_on_its_own_move():
-    # asked about many postures before: what those hit must not be told here
+    # asked about many configurations before: what those hit must not be told here
     cell = bare_cell(block((0.02, 0.02, 0.02)))
     q = np.zeros((4, 6))
     q[:, 0] = [0.0, 0.8, 1.6, 2.4]
@@ -97,7 +97,7 @@ def test_a_fault_names_a_pair_that_collides_on_its_own_move():
 
 
 def shifted_along_normal(motion, index, depth):
-    """Return a motion with one posture moved towards the wheel by a depth."""
+    """Return a motion with one configuration moved towards the wheel by a depth."""
     cell = small_problem().cell
     T_base_flange = forward_kinematics(cell.robot, motion.q[index])
     # only moved: the contact normal is that of the contact frame at this t
@@ -111,14 +111,14 @@ def shifted_along_normal(motion, index, depth):
 
 
 @pytest.mark.parametrize(("depth", "found"), [(0.0003, False), (0.0007, True), (0.002, True)])
-def test_the_part_may_sink_into_the_belt_by_the_allowance(depth, found):
+def test_the_part_may_sink_into_the_belt_by_the_penetration(depth, found):
     problem, motion = small_problem(), small_motion()
     # on the flat: an edge of the wheel can sink in between two samples of the part
-    grind = np.array([stretch is Stretch.GRIND for stretch in motion.stretch])
+    grind = np.array([kind is MoveKind.GRIND for kind in motion.kind])
     index = int(np.argmin(np.where(grind, np.abs(motion.contact_position), np.inf)))
     assert abs(motion.contact_position[index]) < 20.0
     moved = shifted_along_normal(motion, index, depth)
-    faults = find_faults(problem.cell, problem.scene.collision, problem.scene.part, moved)
+    faults = colliding_moves(problem.cell, problem.scene.collision, problem.scene.part, moved)
     assert bool(faults) == found
     if found:
         assert faults[0].pair == ("part", "wheel")
@@ -127,14 +127,14 @@ def test_the_part_may_sink_into_the_belt_by_the_allowance(depth, found):
 
 def test_a_free_move_keeps_the_clearance_from_the_wheel():
     problem, motion = small_problem(), small_motion()
-    on_wheel = next(k for k, s in enumerate(motion.stretch) if s is Stretch.GRIND)
-    hold = free_move(motion.q[[on_wheel, on_wheel]])
-    faults = find_faults(problem.cell, problem.scene.collision, problem.scene.part, hold)
+    on_wheel = next(k for k, s in enumerate(motion.kind) if s is MoveKind.GRIND)
+    hold = free_move(motion.q[[on_wheel, on_wheel]]).motion
+    faults = colliding_moves(problem.cell, problem.scene.collision, problem.scene.part, hold)
     assert [fault.pair for fault in faults] == [("part", "wheel")] * 2
 
 
 def test_faults_are_those_an_independent_scene_finds():
-    # a sweep through a narrow gap, asked at the same postures
+    # a sweep through a narrow gap, asked at the same configurations
     cell = bare_cell(block((0.05, 0.05, 0.05)))
     p = (forward_kinematics(cell.robot, np.zeros(6)) @ cell.T_flange_workpiece)[:3, 3]
     cell = with_obstacle(cell, p + np.array([0.0, 0.3, 0.06]), (0.05, 0.05, 0.05))

@@ -10,7 +10,7 @@ from opl.cell.collision import CollisionScene
 from opl.cell.robot import forward_kinematics, load_robot
 from opl.geometry.frames import pose
 from opl.geometry.shapes import Body, Box, Cylinder
-from tests.support.bare_cells import bare_cell, block, random_postures, with_obstacle
+from tests.support.bare_cells import bare_cell, block, random_configurations, with_obstacle
 from tests.support.fcl_scene import FclScene
 from tests.support.planned import small_motion, v_job
 
@@ -19,12 +19,12 @@ SMALL = block((0.02, 0.02, 0.02))
 STATED = 1e-4  # [m] the two libraries may differ where a pair is this near to its margin
 
 
-def postures_of_interest(cell, n=300, seed=0):
-    """Return random postures, half of them anywhere and half near a motion at the wheel."""
+def configurations_of_interest(cell, n=300, seed=0):
+    """Return random configurations, half of them anywhere and half near a motion at the wheel."""
     random = np.random.default_rng(seed)
     on_motion = small_motion().q[random.integers(0, len(small_motion()), n // 2)]
     near = on_motion + random.normal(scale=0.15, size=on_motion.shape)
-    anywhere = random_postures(cell.robot, n - n // 2, seed)
+    anywhere = random_configurations(cell.robot, n - n // 2, seed)
     return np.concatenate([anywhere, np.clip(near, cell.robot.lower, cell.robot.upper)])
 
 
@@ -36,10 +36,10 @@ def unordered(pairs):
 def test_an_independent_scene_finds_the_same_pairs(clearance):
     cell = replace(v_job().cell, required_clearance=clearance)
     scene, other = CollisionScene(cell), FclScene(cell)
-    postures = postures_of_interest(cell)
-    collides = scene.collides(postures)
+    configurations = configurations_of_interest(cell)
+    collides = scene.collides(configurations)
     assert 50 < collides.sum() < 250
-    for q, hit in zip(postures, collides, strict=True):
+    for q, hit in zip(configurations, collides, strict=True):
         margins = {tuple(sorted(pair)): m for pair, m in other.clearances(q).items()}
         found = unordered(scene.colliding_pairs(q))
         assert bool(found) == hit
@@ -55,9 +55,11 @@ def test_the_broad_phase_misses_no_pair_however_large_the_clearance():
     lifted[2, 3] += 0.25  # else the part is always within 80 mm of the forearm
     cell = replace(cell, T_flange_workpiece=lifted)
     scene, other = CollisionScene(cell), FclScene(cell)
-    postures = postures_of_interest(cell, seed=1)
-    collides = scene.collides(postures)
-    wanted = np.array([min(other.clearances(q).values(), default=1.0) <= 0.0 for q in postures])
+    configurations = configurations_of_interest(cell, seed=1)
+    collides = scene.collides(configurations)
+    wanted = np.array(
+        [min(other.clearances(q).values(), default=1.0) <= 0.0 for q in configurations]
+    )
     assert 20 < wanted.sum() < 280
     np.testing.assert_array_equal(collides, wanted)
 
@@ -65,36 +67,37 @@ def test_the_broad_phase_misses_no_pair_however_large_the_clearance():
 def test_asking_every_pair_agrees_with_the_broad_phase():
     cell = replace(v_job().cell, required_clearance=0.03)
     scene = CollisionScene(cell)
-    postures = postures_of_interest(cell, seed=2)
-    one_by_one = [bool(scene.colliding_pairs(q)) for q in postures]
-    np.testing.assert_array_equal(scene.collides(postures), one_by_one)
+    configurations = configurations_of_interest(cell, seed=2)
+    one_by_one = [bool(scene.colliding_pairs(q)) for q in configurations]
+    np.testing.assert_array_equal(scene.collides(configurations), one_by_one)
 
 
 def test_the_answer_does_not_depend_on_what_was_asked_before():
     cell = v_job().cell
-    postures = postures_of_interest(cell, n=60, seed=3)
+    configurations = configurations_of_interest(cell, n=60, seed=3)
     scene = CollisionScene(cell)
-    for q in [*postures, *postures[::-1]]:
+    for q in [*configurations, *configurations[::-1]]:
         fresh = CollisionScene(cell)
         assert scene.colliding_pairs(q) == fresh.colliding_pairs(q)
         assert scene.collides(q[None])[0] == fresh.collides(q[None])[0]
 
 
-def test_the_home_posture_of_the_job_is_free():
+def test_the_home_configuration_of_the_job_is_free():
     job = v_job()
     scene = CollisionScene(job.cell)
-    assert not scene.collides(job.pace.home[None])[0]
-    assert scene.colliding_pairs(job.pace.home) == []
+    assert not scene.collides(job.process.home[None])[0]
+    assert scene.colliding_pairs(job.process.home) == []
 
 
-def test_no_posture_is_no_answer():
+def test_no_configuration_is_no_answer():
     assert CollisionScene(v_job().cell).collides(np.empty((0, 6))).shape == (0,)
 
 
 # what keeps which distance
 
 
-# at the zero posture the turret disc of S reaches y = 0.229, and lies 0.354 to 0.215 below the base
+# at the zero configuration the turret disc of S reaches y = 0.229, and lies 0.354 to 0.215 below
+# the base
 @pytest.mark.parametrize(("gap", "hit"), [(0.003, True), (0.0049, True), (0.0051, False)])
 def test_the_first_link_keeps_the_clearance_from_obstacles(gap, hit):
     cell = with_obstacle(bare_cell(SMALL), (0.0, 0.229 + gap + 0.05, -0.28), (0.1, 0.1, 0.1))
@@ -156,11 +159,11 @@ def test_the_fork_is_open_over_the_whole_travel_of_b():
     at_flange = pose(np.eye(3), np.array([0.0, 0.0, 0.01]))
     cell = replace(bare_cell(block((0.002, 0.002, 0.002))), T_flange_workpiece=at_flange)
     scene = CollisionScene(cell)
-    postures = np.zeros((301, 6))
-    postures[:, 4] = np.radians(np.linspace(-150.0, 150.0, 301))
+    configurations = np.zeros((301, 6))
+    configurations[:, 4] = np.radians(np.linspace(-150.0, 150.0, 301))
     for wrist in np.radians([0.0, 77.0]):
-        postures[:, 5] = wrist
-        assert not scene.collides(postures).any()
+        configurations[:, 5] = wrist
+        assert not scene.collides(configurations).any()
 
 
 def test_a_wide_part_meets_the_fork_when_the_wrist_is_bent_back():

@@ -9,15 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opl import pipeline
 from opl.geometry.frames import transform
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.motion.leads import LEAD_SPACING, LEAD_TURN, lead_count, lead_offsets
-from opl.motion.motion import Stretch
+from opl.motion.motion import MoveKind
 from tests.support.jobs import opl, write_job
 from tests.support.planned import small_job
 
-SIDES = {Stretch.APPROACH: -1.0, Stretch.RETRACT: 1.0}
+SIDES = {MoveKind.APPROACH: -1.0, MoveKind.RETRACT: 1.0}
 LENGTHS = st.floats(0.002, 0.3)
 TURNS = st.floats(np.deg2rad(0.5), np.deg2rad(90.0))
 STRETCHES = st.sampled_from(list(SIDES))
@@ -102,14 +101,14 @@ def planned(tmp_path_factory):
     home = tmp_path_factory.mktemp("arc")
     job = write_job(home, JOB)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "draw", lambda outcome, problem: None)
+        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
         ended = opl("run", job, "--out", home / "out")
     assert ended.status == 0, ended.err
     return home
 
 
 def test_a_program_comes_and_goes_on_arcs(planned):
-    wheel = load(planned / "job.yaml").cell.wheel
+    wheel = load_job(planned / "job.yaml").cell.wheel
     with (planned / "out" / "V_SHAPE.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     flange = np.array([[float(row[f"{axis}_mm"]) for axis in "xyz"] for row in rows])
@@ -152,8 +151,8 @@ def test_a_turn_out_of_range_is_refused_by_key(tmp_path, turn):
 
 
 def test_a_job_that_does_not_say_leads_straight(tmp_path):
-    pace = load(write_job(tmp_path)).pace
-    assert pace.approach_turn == 0.0
-    said = load(write_job(tmp_path, {"process.approach_turn_deg": 0})).pace
-    np.testing.assert_array_equal(said.home, pace.home)
-    assert replace(said, home=None) == replace(pace, home=None)
+    process = load_job(write_job(tmp_path)).process
+    assert process.approach_turn == 0.0
+    said = load_job(write_job(tmp_path, {"process.approach_turn_deg": 0})).process
+    np.testing.assert_array_equal(said.home, process.home)
+    assert replace(said, home=None) == replace(process, home=None)

@@ -8,14 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opl.cell.joint_limits import JointLimit
-from opl.motion.air import UnreachableApproachError, whole_motion
-from opl.motion.motion import Stretch
+from opl.cell.workcell import JointLimit
+from opl.motion.motion import MoveKind
+from opl.motion.whole_motion import UnreachableApproachError, whole_motion
 from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.multi_start import plan_recursive
 from opl.planning.nodes import build_nodes
-from opl.planning.reasons import explain
-from opl.planning.starts import plan_recursive
-from opl.planning.states import NodeState, node_states
+from opl.planning.reasons import NodeState, explain, node_states
 from tests.support.planned import (
     replay_tiny,
     small_problem,
@@ -39,8 +38,8 @@ def with_limits(problem, *limits):
     return replace(with_scene(problem, cell=cell), field=field)
 
 
-def postures_of(field):
-    """Return every posture of every matrix, shape (n, 6)."""
+def configurations_of(field):
+    """Return every configuration of every matrix, shape (n, 6)."""
     return np.concatenate([nodes.q[nodes.exists] for nodes in field.matrices])
 
 
@@ -50,11 +49,11 @@ def postures_of(field):
     st.floats(-300, 300),
     st.floats(1, 300),
 )
-def test_the_nodes_are_all_postures_within_the_limits_and_no_others(weights, lowest, width):
+def test_the_nodes_are_all_configurations_within_the_limits_and_no_others(weights, lowest, width):
     problem, coefficients = tiny_problem(), np.array(weights)
     limit = limit_of("sum", coefficients, lowest, lowest + width)
     limited = with_limits(problem, limit).field
-    kept = postures_of(limited) if limited.matrices else np.empty((0, 6))
+    kept = configurations_of(limited) if limited.matrices else np.empty((0, 6))
     sums = np.rad2deg(kept @ coefficients)
     assert (sums >= lowest).all() and (sums <= lowest + width).all()
     # brute force over turns: nothing else was lost
@@ -98,8 +97,8 @@ def test_the_replay_finds_what_breaks_a_limit():
             assert found.findings[0].message.startswith(f"R+T: {np.rad2deg(sums[worst]):.3f} deg")
 
 
-def test_between_two_postures_a_sum_stays_between_its_values_at_both():
-    # why it is enough to look at the postures
+def test_between_two_configurations_a_sum_stays_between_its_values_at_both():
+    # why it is enough to look at the configurations
     motion, limit = tiny_motion(), R - 2.0 * T
     at = motion.q @ limit
     for fraction in (0.1, 0.5, 0.9):
@@ -112,13 +111,13 @@ def test_a_step_and_an_approach_beyond_a_limit_are_refused_by_name():
     problem = tiny_problem()
     plan = plan_recursive(problem)
     motion, path = plan.motion, plan.path
-    leads = [k for k, s in enumerate(motion.stretch) if s is Stretch.RETRACT]
+    leads = [k for k, s in enumerate(motion.kind) if s is MoveKind.RETRACT]
     lead = motion.q[leads[-1]]
     cell = replace(
         problem.cell, limits=(JointLimit("U only", np.eye(6)[2], lead[2] + 1e-3, EVERYWHERE),)
     )
     with pytest.raises(UnreachableApproachError) as refused:
-        whole_motion(cell, problem.points, path, problem.pace)
+        whole_motion(cell, problem.points, path, problem.process)
     assert refused.value.cause == "limits of U only"
 
     nodes = next(n for n in problem.field.matrices if n.ik_branch == path.ik_branch)
@@ -139,5 +138,5 @@ def test_reasons_and_states_tell_the_limit():
     assert "beyond the limits of R+T" in line
     states = node_states(shut, 0)
     reached = ~np.isnan(problem.field.q[:, :, 0, 0])
-    cuts = problem.wheel_clearance < -problem.cell.planned_allowance
+    cuts = problem.wheel_distance < -problem.cell.planned_penetration
     assert (states[reached & ~cuts] == list(NodeState).index(NodeState.LIMITS)).all()

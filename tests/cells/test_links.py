@@ -1,4 +1,4 @@
-"""Links: ways through the air, and that none of them is taken on trust."""
+"""Free moves, and that none of them is taken on trust."""
 
 from dataclasses import replace
 from functools import cache
@@ -13,10 +13,10 @@ from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import part_tree
 from opl.geometry.frames import pose, transform
 from opl.geometry.shapes import Body, Box
-from opl.motion.check import RESOLUTION, densify
-from opl.motion.free_moves import FreeMoves
-from opl.motion.links import Links, NoLinkError
-from opl.motion.sampling import fewest, sample_way
+from opl.motion.collision_check import RESOLUTION, densify
+from opl.motion.free_move_search import BlockedMoveError, FreeMoveSearch
+from opl.motion.sampling import fewest, sample_path
+from opl.motion.straight_moves import StraightMoves
 from tests.support.bare_cells import bare_cell, block, with_obstacle
 from tests.support.fcl_scene import margin_along
 
@@ -34,11 +34,11 @@ def open_cell():
 
 
 def moves_in(cell):
-    return FreeMoves(cell, CollisionScene(cell), part_tree(cell.part))
+    return StraightMoves(cell, CollisionScene(cell), part_tree(cell.part))
 
 
-def links_in(cell):
-    return Links(cell, CollisionScene(cell), part_tree(cell.part))
+def search_in(cell):
+    return FreeMoveSearch(cell, CollisionScene(cell), part_tree(cell.part))
 
 
 def part_at(cell, q):
@@ -60,8 +60,8 @@ def test_nothing_moves_farther_than_the_levers_say():
         for joint in range(6):
             turned = q + 1e-4 * np.eye(6)[joint]
             T = forward_kinematics(cell.robot, turned) @ cell.T_flange_workpiece
-            way = np.linalg.norm(transform(T, cell.part.vertices) - corners, axis=1).max()
-            reach[joint] = max(reach[joint], way / 1e-4)
+            moved = np.linalg.norm(transform(T, cell.part.vertices) - corners, axis=1).max()
+            reach[joint] = max(reach[joint], moved / 1e-4)
     assert (reach <= levers).all()
     assert (reach > 0.4 * levers).all()
 
@@ -76,11 +76,11 @@ def test_a_move_is_free_if_and_only_if_an_independent_scene_says_so(seed):
     middle = part_at(cell, (start + end) / 2.0)
     cell = with_obstacle(cell, middle + rng.normal(0.0, 0.15, 3), rng.uniform(0.01, 0.2, 3))
     margin = margin_along(cell, np.stack([start, end]))
-    if abs(margin) > 0.002:  # neither scene is asked everywhere, and ours keeps a little more
+    if abs(margin) > 0.002:  # neither scene is checked everywhere, and ours keeps a little more
         assert moves_in(cell).free(start, end) == (margin > 0.0)
 
 
-def test_a_plate_thinner_than_the_way_between_two_looks_is_found():
+def test_a_plate_thinner_than_the_gap_between_two_looks_is_found():
     cell = open_cell()
     cell = replace(cell, part=block((0.12, 0.002, 0.06)), required_clearance=0.0)
     # the arm sweeps a thin plate over S, far out: by 14 mm from look to look
@@ -93,11 +93,11 @@ def test_a_plate_thinner_than_the_way_between_two_looks_is_found():
     assert not moves_in(needle).free(HOME, swept)
 
 
-# ways
+# paths
 
 
 def test_a_free_straight_move_is_taken_as_it_is():
-    assert links_in(open_cell()).find(HOME, AWAY).shape == (0, 6)
+    assert search_in(open_cell()).find(HOME, AWAY).shape == (0, 6)
 
 
 @cache
@@ -107,14 +107,14 @@ def blocked_cell():
 
 
 @cache
-def way_around():
-    return links_in(blocked_cell()).find(HOME, AWAY)
+def path_around():
+    return search_in(blocked_cell()).find(HOME, AWAY)
 
 
-def test_a_way_leads_around_what_blocks_the_straight_move():
+def test_a_path_leads_around_what_blocks_the_straight_move():
     cell = blocked_cell()
     assert not moves_in(cell).free(HOME, AWAY)
-    via = way_around()
+    via = path_around()
     assert 1 <= len(via) <= 6
     assert margin_along(cell, np.stack([HOME, *via, AWAY])) > 0.0
     assert (via >= cell.robot.lower).all() and (via <= cell.robot.upper).all()
@@ -122,15 +122,15 @@ def test_a_way_leads_around_what_blocks_the_straight_move():
 
 @settings(max_examples=3, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.integers(0, 10**6))
-def test_every_way_that_is_found_is_free_in_an_independent_scene(seed):
+def test_every_path_that_is_found_is_free_in_an_independent_scene(seed):
     rng = np.random.default_rng(seed)
     cell = open_cell()
     for k in range(3):
         at = part_at(cell, HOME + rng.uniform(0.2, 0.8) * (AWAY - HOME))
         cell = with_obstacle(cell, at + rng.normal(0.0, 0.1, 3), rng.uniform(0.03, 0.2, 3), f"{k}")
     try:
-        via = links_in(cell).find(HOME, AWAY)
-    except NoLinkError as error:
+        via = search_in(cell).find(HOME, AWAY)
+    except BlockedMoveError as error:
         # only an end that is too near to something rules out these few boxes
         ends = [margin_along(cell, end[None]) for end in (HOME, AWAY)]
         assert error.end is not None and ends[error.end] < 0.0005
@@ -140,23 +140,23 @@ def test_every_way_that_is_found_is_free_in_an_independent_scene(seed):
 
 def test_what_was_sought_elsewhere_before_does_not_change_what_a_search_finds():
     # the random numbers of OMPL are one for the whole process
-    first = way_around()
+    first = path_around()
     turned = AWAY + np.deg2rad([5.0, 0.0, 0.0, 0.0, 0.0, 90.0])
-    assert len(links_in(blocked_cell()).find(turned, HOME))
-    again = links_in(blocked_cell()).find(HOME, AWAY)
+    assert len(search_in(blocked_cell()).find(turned, HOME))
+    again = search_in(blocked_cell()).find(HOME, AWAY)
     np.testing.assert_array_equal(again, first)
 
 
 def test_an_end_that_is_too_near_is_named():
     cell = with_obstacle(open_cell(), part_at(open_cell(), AWAY), (0.1, 0.1, 0.1), "anvil")
-    with pytest.raises(NoLinkError) as caught:
-        links_in(cell).find(HOME, AWAY)
+    with pytest.raises(BlockedMoveError) as caught:
+        search_in(cell).find(HOME, AWAY)
     assert caught.value.end == 1
     assert "anvil" in caught.value.pair
 
 
 def caged(cell, q):
-    """Return a cell with six walls around the part at a posture; one is behind it."""
+    """Return a cell with six walls around the part at a configuration; one is behind it."""
     T = forward_kinematics(cell.robot, q) @ cell.T_flange_workpiece
     low, high, thick = np.array([-0.06, -0.08, -0.045]), np.array([0.06, 0.08, 0.06]), 0.01
     walls = []
@@ -169,30 +169,30 @@ def caged(cell, q):
     return replace(cell, obstacles=tuple(walls))
 
 
-def test_a_posture_that_is_shut_in_is_told_with_what_shuts_it_in(monkeypatch):
-    monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
-    links = links_in(caged(open_cell(), HOME))
-    for way in ((HOME, AWAY), (AWAY, HOME)):
-        with pytest.raises(NoLinkError) as caught:
-            links.find(*way)
+def test_a_configuration_that_is_shut_in_is_named_with_what_shuts_it_in(monkeypatch):
+    monkeypatch.setattr("opl.motion.free_move_search.MOST_CHECKED", 3000)
+    search = search_in(caged(open_cell(), HOME))
+    for ends in ((HOME, AWAY), (AWAY, HOME)):
+        with pytest.raises(BlockedMoveError) as caught:
+            search.find(*ends)
         assert caught.value.end is None
         assert caught.value.pair[0] == "part"
         assert caught.value.pair[1].endswith("wall")
 
 
 def test_what_is_joined_to_an_end_sought_in_vain_is_not_sought_again(monkeypatch):
-    monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
-    links = links_in(caged(open_cell(), HOME))
-    with pytest.raises(NoLinkError) as first:
-        links.find(HOME, AWAY)
+    monkeypatch.setattr("opl.motion.free_move_search.MOST_CHECKED", 3000)
+    search = search_in(caged(open_cell(), HOME))
+    with pytest.raises(BlockedMoveError) as first:
+        search.find(HOME, AWAY)
 
     def searched(*arguments):
         raise AssertionError("searched again")
 
-    monkeypatch.setattr("opl.motion.links.sample_way", searched)
+    monkeypatch.setattr("opl.motion.free_move_search.sample_path", searched)
     near = AWAY + np.deg2rad([2.0, 0.0, 0.0, 0.0, 0.0, 5.0])
-    with pytest.raises(NoLinkError) as second:
-        links.find(near, HOME)
+    with pytest.raises(BlockedMoveError) as second:
+        search.find(near, HOME)
     assert second.value.pair == first.value.pair
 
 
@@ -213,13 +213,13 @@ def wall_with_gap(low, high):
 def test_a_gap_in_a_wall_is_found_and_few_places_are_left():
     start, goal = np.array([-1.0, 0.0]), np.array([1.0, 0.0])
     free = wall_with_gap(0.7, 0.9)
-    found = sample_way(start, goal, np.full(2, -2.0), np.full(2, 2.0), free, lambda: False)
-    np.testing.assert_array_equal(found.way[[0, -1]], [start, goal])
-    assert all(free(a, b) for a, b in zip(found.way[:-1], found.way[1:], strict=True))
-    assert 3 <= len(found.way) <= 5
+    found = sample_path(start, goal, np.full(2, -2.0), np.full(2, 2.0), free, lambda: False)
+    np.testing.assert_array_equal(found.path[[0, -1]], [start, goal])
+    assert all(free(a, b) for a, b in zip(found.path[:-1], found.path[1:], strict=True))
+    assert 3 <= len(found.path) <= 5
 
 
-def test_a_search_ends_after_as_many_moves_as_it_may_ask():
+def test_a_search_ends_after_as_many_moves_as_it_may_check():
     asked = []
 
     def free(a, b):
@@ -228,8 +228,8 @@ def test_a_search_ends_after_as_many_moves_as_it_may_ask():
 
     start, goal = np.array([-1.0, 0.0]), np.array([1.0, 0.0])
     box = np.full(2, -2.0), np.full(2, 2.0)
-    found = sample_way(start, goal, *box, free, lambda: len(asked) >= 500)
-    assert found.way is None
+    found = sample_path(start, goal, *box, free, lambda: len(asked) >= 500)
+    assert found.path is None
     assert 500 <= len(asked) < 520
 
 
@@ -240,16 +240,15 @@ def test_refused_moves_are_those_of_the_end_that_is_shut_in():
     asked = iter(range(2000))
     start, goal = np.array([-1.0, -1.0]), np.array([1.0, 1.0])
     box = np.full(2, -2.0), np.full(2, 2.0)
-    found = sample_way(start, goal, *box, free, lambda: next(asked, None) is None)
-    assert found.way is None
-    assert not found.from_start
+    found = sample_path(start, goal, *box, free, lambda: next(asked, None) is None)
+    assert found.path is None
     assert len(found.refused) > 10
     assert (np.abs(found.refused[:, 0] - 1.0) < 0.1).all()
 
 
 def test_idle_places_are_left_out():
-    way = np.array([[0.0, 0.0], [0.5, 0.3], [1.0, 0.0], [1.0, 1.0]])
-    everything = fewest(way, lambda a, b: True)
-    np.testing.assert_array_equal(everything, way[[0, 3]])
-    nothing = fewest(way, lambda a, b: False)
-    np.testing.assert_array_equal(nothing, way)
+    path = np.array([[0.0, 0.0], [0.5, 0.3], [1.0, 0.0], [1.0, 1.0]])
+    everything = fewest(path, lambda a, b: True)
+    np.testing.assert_array_equal(everything, path[[0, 3]])
+    nothing = fewest(path, lambda a, b: False)
+    np.testing.assert_array_equal(nothing, path)

@@ -7,15 +7,14 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import forward_kinematics
+from opl.files.resources import folder
 from opl.geometry.frames import pose
 from opl.geometry.wheel import ContactWheel
-from opl.job.load import load
-from opl.resources import folder
-from opl.verification.drum import Drum
+from opl.job.load import load_job
 from opl.verification.engine import pybullet, start
-from opl.verification.patches import MOST, Patches
+from opl.verification.patches import MOST, Drum, Patches
 from opl.verification.world import MARGIN, World
-from tests.support.bare_cells import random_postures
+from tests.support.bare_cells import random_configurations
 
 
 def at(turn, p):
@@ -90,17 +89,17 @@ def whole_mesh(client, cell):
 
 @pytest.mark.parametrize("part", ["v_shape", "turbine_blade"])
 def test_patch_by_patch_is_the_distance_of_the_whole_mesh(part):
-    cell = load(folder("workpieces") / part / "job.yaml").cell
+    cell = load_job(folder("workpieces") / part / "job.yaml").cell
     random = np.random.default_rng(0)
     middle = cell.wheel.T_base_contact0[:3, 3]
-    postures = random_postures(cell.robot, 6000)
-    parts = (forward_kinematics(cell.robot, postures) @ cell.T_flange_workpiece)[:, :3, 3]
-    postures = postures[np.linalg.norm(parts - middle, axis=1).argsort()[:80]]
-    postures = postures + random.normal(scale=0.02, size=postures.shape)
+    configurations = random_configurations(cell.robot, 6000)
+    parts = (forward_kinematics(cell.robot, configurations) @ cell.T_flange_workpiece)[:, :3, 3]
+    configurations = configurations[np.linalg.norm(parts - middle, axis=1).argsort()[:80]]
+    configurations = configurations + random.normal(scale=0.02, size=configurations.shape)
     client, found = start(), []
     whole = whole_mesh(client, cell)
     with World(cell) as world:
-        for q in postures:
+        for q in configurations:
             wanted = whole(world.move_to(q), 0.1)
             assert world.gap(0.1) == pytest.approx(wanted, abs=1e-7)
             found.append(wanted)

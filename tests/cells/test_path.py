@@ -1,4 +1,4 @@
-"""Filling in a track: its postures against kinematics of the tests' own, and what is refused."""
+"""Filling in a track: against kinematics of the tests' own, and what is refused."""
 
 from dataclasses import replace
 
@@ -23,11 +23,11 @@ PLANS = pytest.mark.parametrize(
 def flange_poses(cell, q):
     """Return flange poses from the URDF, read and multiplied by the tests themselves."""
     scene = FclScene(cell)
-    return np.array([scene.frames(posture)["tool0"] for posture in q])
+    return np.array([scene.frames(configuration)["tool0"] for configuration in q])
 
 
 def ground_points(cell, points, q, place):
-    """Return where the ground point of each posture is, the origin of its cutter frame."""
+    """Return where the ground point of each configuration is, the origin of its cutter frame."""
     origins = points.Ts_workpiece_cutter[:, :3, 3]
     p = np.stack([np.interp(place, np.arange(len(points)), axis) for axis in origins.T], axis=-1)
     Ts = flange_poses(cell, q) @ cell.T_flange_workpiece
@@ -57,7 +57,7 @@ def rows_of(problem, plan):
 
 
 @PLANS
-def test_the_ground_point_lies_on_the_contact_point_at_every_posture(problem, plan):
+def test_the_ground_point_lies_on_the_contact_point_at_every_configuration(problem, plan):
     cell, points, path = problem().cell, problem().points, plan().path
     ground = ground_points(cell, points, path.q, path.cutter_point)
     error = np.linalg.norm(ground - contact_points(cell, path.contact_position), axis=1)
@@ -78,7 +78,7 @@ def test_the_normal_of_the_part_points_into_the_wheel_as_t_says(problem, plan):
 
 
 @PLANS
-def test_the_ground_point_stays_near_its_place_between_postures(problem, plan):
+def test_the_ground_point_stays_near_its_place_between_configurations(problem, plan):
     cell, points, path = problem().cell, problem().points, plan().path
     rule = problem().interpolation
     # the rule speaks of half-way; elsewhere the bow may be somewhat larger
@@ -107,7 +107,7 @@ def test_joints_do_not_jump_within_a_pass(problem, plan):
 
 
 @PLANS
-def test_postures_of_nodes_are_kept_to_the_bit(problem, plan):
+def test_configurations_of_nodes_are_kept_to_the_bit(problem, plan):
     nodes, rows = rows_of(problem(), plan())
     at_node = plan().path.cutter_point % 1.0 == 0.0
     np.testing.assert_array_equal(plan().path.q[at_node], nodes.q[np.arange(len(rows)), rows])
@@ -126,14 +126,14 @@ def test_every_cutter_point_is_there_once_and_in_order(problem, plan):
     assert path.n_intermediate == np.count_nonzero(~at_node)
 
 
-def test_there_are_no_postures_between_two_passes():
+def test_there_are_no_configurations_between_two_passes():
     path = small_plan().path
     last = np.flatnonzero(np.diff(path.pass_index))[0]
     assert path.cutter_point[last] % 1.0 == path.cutter_point[last + 1] % 1.0 == 0.0
     assert path.cutter_point[last + 1] == path.cutter_point[last] + 1.0
 
 
-def test_figures_are_those_of_the_postures():
+def test_figures_are_those_of_the_configurations():
     path = v_plan().path
     ranges = path.q.max(axis=0) - path.q.min(axis=0)
     np.testing.assert_array_equal(path.joint_ranges, ranges)

@@ -8,15 +8,15 @@ import pytest
 
 from opl.cell.robot import forward_kinematics
 from opl.errors import NoPathError
-from opl.motion.air import UnreachableApproachError, whole_motion
-from opl.motion.check import RESOLUTION, densify, find_faults
-from opl.motion.motion import Motion, Stretch
-from opl.motion.timing import timed
+from opl.motion.collision_check import RESOLUTION, colliding_moves, densify
+from opl.motion.motion import MoveKind
+from opl.motion.timing import time_motion
+from opl.motion.whole_motion import UnreachableApproachError, whole_motion
 from opl.planning.filling import BrokenEdgeError, fill_in
-from opl.planning.fixed import keep_contact, runs_of
-from opl.planning.reasons import explain, unreachable_points
-from opl.planning.starts import Start, plan_recursive
-from opl.planning.states import NodeState, node_states
+from opl.planning.fixed_contact import keep_contact, runs_of
+from opl.planning.multi_start import Start, plan_recursive, try_recursive
+from opl.planning.plan import Exhausted, Found, OutOfBudget
+from opl.planning.reasons import NodeState, explain, node_states, unreachable_points
 from tests.support.bare_cells import Ghosts, with_obstacle
 from tests.support.brute_force import printed_recursion
 from tests.support.fcl_scene import FclScene
@@ -26,10 +26,11 @@ from tests.support.planned import (
     small_motion,
     small_plan,
     small_problem,
+    small_timed,
     v_job,
-    v_motion,
     v_plan,
     v_problem,
+    v_timed,
     with_positions,
     with_problem_cell,
     with_scene,
@@ -40,7 +41,7 @@ PAPER_RECURSIVE = 2.5287  # [rad]
 
 
 def hits_anything(cell, motion, every=1):
-    """Ask an independent scene about the postures of a motion and the ways between them."""
+    """Ask an independent scene about the configurations of a motion and the ways between them."""
     scene = FclScene(cell)
     dense, _ = densify(motion.q, RESOLUTION)
     return any(min(scene.clearances(q).values(), default=1.0) <= 0.0 for q in dense[::every])
@@ -59,7 +60,7 @@ def test_with_the_contact_kept_the_joint_ranges_are_those_of_the_paper():
     np.testing.assert_array_equal(fixed.joint_ranges, np.ptp(fixed.q, axis=0))
 
 
-def test_with_the_contact_kept_every_posture_grinds_at_the_middle():
+def test_with_the_contact_kept_every_configuration_grinds_at_the_middle():
     problem, fixed = v_problem(), keep_contact(v_problem())
     Ts = forward_kinematics(problem.cell.robot, fixed.q) @ problem.cell.T_flange_workpiece
     Ts_base_cutter = Ts @ problem.points.Ts_workpiece_cutter
@@ -88,7 +89,7 @@ def test_the_best_start_is_no_worse_than_the_nearest():
 def test_the_nearest_start_is_the_node_nearest_to_home():
     problem = small_problem()
     path = plan_recursive(problem, Start.NEAREST).path
-    home = problem.pace.home
+    home = problem.process.home
     nearest = np.inf
     for nodes in problem.field.matrices:
         q = nodes.q[0][problem.free_nodes(nodes)[0]]
@@ -113,11 +114,12 @@ def one_row_problem():
 
 
 def by_printed_recursion(problem):
-    """Return the node postures that Algorithm 1 finds from the nearest start that leads through.
+    """Return the node configurations that Algorithm 1 finds from the nearest start that leads
+    through.
 
     Every step is filled in and asked about on its own, when the recursion comes to it.
     """
-    home = problem.pace.home
+    home = problem.process.home
     fields = [(nodes, problem.free_nodes(nodes)) for nodes in problem.field.matrices]
     starts = sorted(
         (np.linalg.norm(nodes.q[0, row] - home), index, row)
@@ -161,7 +163,7 @@ def step_is_free(problem, nodes, column, here, there):
 def test_collisions_found_late_lead_to_the_track_of_the_printed_recursion(seed):
     problem = one_row_problem()
     free = plan_recursive(problem, Start.NEAREST).path
-    # some nodes of the free track and some postures between its nodes collide
+    # some nodes of the free track and some configurations between its nodes collide
     random = np.random.default_rng(seed)
     inner = np.flatnonzero((free.cutter_point > 3) & (free.cutter_point < 16))
     ghosts = Ghosts(free.q[random.choice(inner, 5, replace=False)], radius=0.02)
@@ -183,6 +185,23 @@ def test_a_path_goes_round_an_obstacle():
     assert not hits_anything(cell, plan.motion, every=3)
 
 
+def test_a_search_ends_with_a_plan_or_without_proposals_or_with_its_budget_spent():
+    problem = one_row_problem()
+    found = try_recursive(problem, Start.NEAREST, most_checks=1)
+    assert isinstance(found, Found) and found.plan.checks == 1
+    shut = with_scene(problem, collision=Ghosts(np.zeros(6), radius=100.0))
+    assert isinstance(try_recursive(shut, Start.NEAREST, most_checks=1), OutOfBudget)
+    assert isinstance(try_recursive(shut, Start.NEAREST, most_checks=1000), Exhausted)
+
+
+def test_another_scene_finds_free_moves_of_its_own():
+    scene = small_problem().scene
+    other = replace(scene, collision=Ghosts(np.zeros(6), radius=0.1))
+    assert scene.free_moves is scene.free_moves
+    assert other.free_moves is not scene.free_moves
+    assert other.free_moves.scene is other.collision
+
+
 def test_a_wall_at_the_wheel_is_named_with_the_points_it_shuts():
     problem = one_row_problem()
     # just in front of the wheel: wherever the part touches, it is in the wall
@@ -200,7 +219,7 @@ def test_a_wall_at_the_wheel_is_named_with_the_points_it_shuts():
 
 def test_a_way_that_only_ends_in_a_collision_is_named():
     problem = one_row_problem()
-    home = problem.pace.home
+    home = problem.process.home
     ghosts = Ghosts(home + np.array([0.0, 0.01, 0.0, 0.0, 0.0, 0.0]), radius=0.02)
     # home itself is in it, so is every way from and to home
     with pytest.raises(NoPathError, match=r"R_link and ghost"):
@@ -210,31 +229,31 @@ def test_a_way_that_only_ends_in_a_collision_is_named():
 def test_what_is_in_the_way_of_a_free_move_is_led_around():
     problem, plan = small_problem(), small_plan()
     n = len(plan.motion)
-    links = [k for k in range(n) if plan.motion.stretch[k] is Stretch.LINK]
+    links = [k for k in range(n) if plan.motion.kind[k] is MoveKind.LINK]
     assert len(links) == 1
     moves = [1, *links, n - 1]
     middles = np.array([(plan.motion.q[k - 1] + plan.motion.q[k]) / 2.0 for k in moves])
     ghosts = Ghosts(middles, radius=0.015)
-    faults = find_faults(problem.cell, ghosts, problem.scene.part, plan.motion)
+    faults = colliding_moves(problem.cell, ghosts, problem.scene.part, plan.motion)
     assert [fault.move for fault in faults] == moves
     other = plan_recursive(with_scene(problem, collision=ghosts))
     assert other.checks == 1
     np.testing.assert_array_equal(other.path.q, plan.path.q)
     assert not ghosts.collides(densify(other.motion.q, RESOLUTION)[0]).any()
-    along = [(s, p) for s, p in zip(other.motion.stretch, other.motion.pass_index, strict=True)]
-    # the postures on the way belong to the stretch that they lead through
-    assert along.count((Stretch.HOME, 0)) >= 2
-    assert along.count((Stretch.LINK, 1)) >= 2
-    assert along.count((Stretch.HOME, -1)) >= 3
+    along = [(s, p) for s, p in zip(other.motion.kind, other.motion.pass_index, strict=True)]
+    # the configurations on the way are of the kind of the move that they are inserted into
+    assert along.count((MoveKind.HOME, 0)) >= 2
+    assert along.count((MoveKind.LINK, 1)) >= 2
+    assert along.count((MoveKind.HOME, -1)) >= 3
 
 
 def test_a_part_that_cannot_touch_without_being_cut_is_told_how_deep():
     problem = small_problem()
-    layer = problem.wheel_clearance.copy()
+    layer = problem.wheel_distance.copy()
     layer[30:40] = -0.003
     layer[35, 4] = -0.0012
     with pytest.raises(NoPathError) as caught:
-        plan_recursive(replace(problem, wheel_clearance=layer))
+        plan_recursive(replace(problem, wheel_distance=layer))
     error = caught.value
     assert error.message == "no path beyond cutter point 29 (30 of 120 reached)"
     assert len(error.reasons) == 1
@@ -261,9 +280,9 @@ def test_points_beyond_the_limits_are_told_with_the_joint():
 
 def test_many_shut_runs_are_not_all_listed():
     problem = one_row_problem()
-    layer = problem.wheel_clearance.copy()
+    layer = problem.wheel_distance.copy()
     layer[::2] = -1.0
-    reasons = explain(replace(problem, wheel_clearance=layer), [])
+    reasons = explain(replace(problem, wheel_distance=layer), [])
     assert len(reasons) == 9
     assert reasons[-1] == "and 2 more runs of cutter points"
 
@@ -304,14 +323,14 @@ def test_states_say_what_rules_a_node_out():
     problem = one_row_problem()
     codes = {state: code for code, state in enumerate(NodeState)}
     branch = small_plan().path.ik_branch
-    layer = problem.wheel_clearance.copy()
+    layer = problem.wheel_distance.copy()
     layer[5, 3] = -0.1
     q = problem.field.q.copy()
     q[6, 4, branch] = np.nan
     nodes = next(n for n in problem.field.matrices if n.ik_branch == branch and n.exists.any())
     column, row = np.argwhere(nodes.exists)[len(np.argwhere(nodes.exists)) // 2]
     haunted = with_scene(problem, collision=Ghosts(nodes.q[column, row], radius=1e-3))
-    changed = replace(haunted, wheel_clearance=layer, field=replace(problem.field, q=q))
+    changed = replace(haunted, wheel_distance=layer, field=replace(problem.field, q=q))
     states = node_states(changed, branch)
     assert states.shape == layer.shape
     assert states[5, 3] == codes[NodeState.WHEEL]
@@ -323,47 +342,49 @@ def test_states_say_what_rules_a_node_out():
 
 
 MOTIONS = pytest.mark.parametrize(
-    ("problem", "motion"),
-    [(small_problem, small_motion), (v_problem, v_motion)],
+    ("problem", "timed"),
+    [(small_problem, small_timed), (v_problem, v_timed)],
     ids=["small", "V"],
 )
 
 
 @MOTIONS
-def test_a_motion_starts_and_ends_at_home(problem, motion):
-    np.testing.assert_array_equal(motion().q[[0, -1]], np.array([problem().pace.home] * 2))
-    assert motion().stretch[0] is motion().stretch[-1] is Stretch.HOME
+def test_a_motion_starts_and_ends_at_home(problem, timed):
+    motion = timed().motion
+    np.testing.assert_array_equal(motion.q[[0, -1]], np.array([problem().process.home] * 2))
+    assert motion.kind[0] is motion.kind[-1] is MoveKind.HOME
 
 
 @MOTIONS
-def test_a_pass_is_approached_ground_and_left(problem, motion):
-    order = [motion().stretch[0]]
-    for stretch in motion().stretch[1:]:
-        stretch = Stretch.GRIND if stretch is Stretch.BETWEEN else stretch
-        if stretch is not order[-1]:
-            order.append(stretch)
-    one = [Stretch.APPROACH, Stretch.GRIND, Stretch.RETRACT]
+def test_a_pass_is_approached_ground_and_left(problem, timed):
+    order = []
+    for kind in timed().motion.kind:
+        kind = MoveKind.GRIND if kind is MoveKind.BETWEEN else kind
+        if order[-1:] != [kind]:
+            order.append(kind)
+    one = [MoveKind.APPROACH, MoveKind.GRIND, MoveKind.RETRACT]
     n = problem().points.n_passes
-    assert order == [Stretch.HOME, *([*one, Stretch.LINK] * n)[:-1], Stretch.HOME]
+    assert order == [MoveKind.HOME, *([*one, MoveKind.LINK] * n)[:-1], MoveKind.HOME]
 
 
 @MOTIONS
-def test_the_path_is_in_the_motion_as_it_is(problem, motion):
+def test_the_path_is_in_the_motion_as_it_is(problem, timed):
     plan = small_plan() if problem is small_problem else v_plan()
-    on_wheel = ~np.isnan(motion().cutter_point)
-    np.testing.assert_array_equal(motion().q[on_wheel], plan.path.q)
-    np.testing.assert_array_equal(motion().contact_position[on_wheel], plan.path.contact_position)
+    motion = timed().motion
+    on_wheel = ~np.isnan(motion.cutter_point)
+    np.testing.assert_array_equal(motion.q[on_wheel], plan.path.q)
+    np.testing.assert_array_equal(motion.contact_position[on_wheel], plan.path.contact_position)
 
 
 @MOTIONS
-def test_approach_and_retract_run_along_the_contact_normal(problem, motion):
-    cell, motion = problem().cell, motion()
-    stretch = np.array([s.value for s in motion.stretch])
+def test_approach_and_retract_run_along_the_contact_normal(problem, timed):
+    cell, motion = problem().cell, timed().motion
+    kinds = np.array([kind.value for kind in motion.kind])
     for index in range(problem().points.n_passes):
         on_pass = motion.pass_index == index
         on_wheel = np.flatnonzero(on_pass & ~np.isnan(motion.cutter_point))
         for kind, touch in (("approach", on_wheel[0]), ("retract", on_wheel[-1])):
-            lead = np.flatnonzero(on_pass & (stretch == kind))
+            lead = np.flatnonzero(on_pass & (kinds == kind))
             if kind == "approach":
                 lead = np.concatenate([[lead[0] - 1], lead])  # the air move ends at its start
             Ts = forward_kinematics(cell.robot, motion.q[np.append(lead, touch)])
@@ -372,35 +393,36 @@ def test_approach_and_retract_run_along_the_contact_normal(problem, motion):
             np.testing.assert_allclose(away - np.outer(away @ into, into), 0.0, atol=1e-9)
             np.testing.assert_allclose(Ts[:, :3, :3], Ts[[-1] * len(Ts), :3, :3], atol=1e-9)
             distance = (away @ into)[:-1]
-            assert distance.max() == pytest.approx(problem().pace.approach_length)
+            assert distance.max() == pytest.approx(problem().process.approach_length)
             steps = np.diff(away @ into)
             assert (steps[:-1] * (-1 if kind == "approach" else 1) > 0.0).all()
 
 
 @MOTIONS
-def test_the_last_move_of_an_approach_touches(problem, motion):
-    motion = motion()
-    for k, stretch in enumerate(motion.stretch):
-        if stretch is Stretch.APPROACH and motion.stretch[k + 1] is not Stretch.APPROACH:
-            assert motion.stretch[k + 1] is Stretch.GRIND
+def test_the_last_move_of_an_approach_touches(problem, timed):
+    motion = timed().motion
+    for k, kind in enumerate(motion.kind):
+        if kind is MoveKind.APPROACH and motion.kind[k + 1] is not MoveKind.APPROACH:
+            assert motion.kind[k + 1] is MoveKind.GRIND
             assert motion.cutter_point[k + 1] % 1.0 == 0.0
 
 
 @MOTIONS
-def test_no_joint_is_asked_for_more_than_its_speed(problem, motion):
-    motion = motion()
-    speed = np.abs(np.diff(motion.q, axis=0)) / motion.duration[1:, None]
+def test_no_joint_is_asked_for_more_than_its_speed(problem, timed):
+    motion, duration = timed().motion, timed().duration
+    speed = np.abs(np.diff(motion.q, axis=0)) / duration[1:, None]
     assert (speed <= problem().cell.robot.max_speed * (1 + 1e-9)).all()
-    assert motion.duration[0] == 0.0
-    assert (motion.duration[1:] > 0.0).all()
+    assert duration[0] == 0.0
+    assert (duration[1:] > 0.0).all()
 
 
 @MOTIONS
-def test_the_feed_is_kept_on_the_wheel_unless_a_joint_could_not_follow(problem, motion):
-    pace, points = problem().pace, problem().points
+def test_the_feed_is_kept_on_the_wheel_unless_a_joint_could_not_follow(problem, timed):
+    process, points = problem().process, problem().points
     # what slow acceleration does to the feed is told in test_timing.py
     robot = replace(problem().cell.robot, max_acceleration=np.full(6, 1e6))
-    motion = timed(motion(), points, pace, robot)
+    motion = timed().motion
+    duration = time_motion(motion, points, process, robot).timed.duration
     fastest = robot.max_speed
     arc_length = problem().points.arc_length
     arc = np.interp(motion.cutter_point, np.arange(len(arc_length)), arc_length)
@@ -408,46 +430,46 @@ def test_the_feed_is_kept_on_the_wheel_unless_a_joint_could_not_follow(problem, 
     for k in range(1, len(motion)):
         on_wheel = not np.isnan(motion.cutter_point[[k - 1, k]]).any()
         if on_wheel:
-            needed = abs(arc[k] - arc[k - 1]) / pace.feed
+            needed = abs(arc[k] - arc[k - 1]) / process.feed
             least = (np.abs(motion.q[k] - motion.q[k - 1]) / fastest).max()
             t = motion.contact_position
-            over_wheel = abs(t[k] - t[k - 1]) / pace.contact_speed
-            assert motion.duration[k] == pytest.approx(max(needed, least, over_wheel))
+            over_wheel = abs(t[k] - t[k - 1]) / process.contact_speed
+            assert duration[k] == pytest.approx(max(needed, least, over_wheel))
             checked += 1
     assert checked > 100
 
 
 @MOTIONS
-def test_free_moves_run_at_their_share_of_the_joint_speeds(problem, motion):
-    motion, pace = motion(), problem().pace
-    for k, stretch in enumerate(motion.stretch):
-        if k and stretch in (Stretch.HOME, Stretch.LINK):
-            speed = np.abs(motion.q[k] - motion.q[k - 1]) / motion.duration[k]
+def test_free_moves_run_at_their_share_of_the_joint_speeds(problem, timed):
+    motion, duration, process = timed().motion, timed().duration, problem().process
+    for k, kind in enumerate(motion.kind):
+        if k and kind in (MoveKind.HOME, MoveKind.LINK):
+            speed = np.abs(motion.q[k] - motion.q[k - 1]) / duration[k]
             share = (speed / problem().cell.robot.max_speed).max()
-            assert share == pytest.approx(pace.air_speed)
+            assert share == pytest.approx(process.air_speed)
 
 
 @MOTIONS
-def test_leads_run_at_the_approach_speed(problem, motion):
-    motion, pace = motion(), problem().pace
+def test_leads_run_at_the_approach_speed(problem, timed):
+    motion, duration, process = timed().motion, timed().duration, problem().process
     Ts = forward_kinematics(problem().cell.robot, motion.q)
-    for k, stretch in enumerate(motion.stretch):
-        if stretch in (Stretch.APPROACH, Stretch.RETRACT):
+    for k, kind in enumerate(motion.kind):
+        if kind in (MoveKind.APPROACH, MoveKind.RETRACT):
             way = np.linalg.norm(Ts[k, :3, 3] - Ts[k - 1, :3, 3])
-            assert way / motion.duration[k] == pytest.approx(pace.approach_speed, rel=1e-6)
+            assert way / duration[k] == pytest.approx(process.approach_speed, rel=1e-6)
 
 
 def test_a_slow_robot_takes_the_time_it_needs():
     problem, plan = small_problem(), small_plan()
     robot = replace(problem.cell.robot, max_speed=np.full(6, 0.01))
-    slow = timed(plan.motion, problem.points, problem.pace, robot)
-    speed = np.abs(np.diff(slow.q, axis=0)) / slow.duration[1:, None]
+    slow = time_motion(plan.motion, problem.points, problem.process, robot).timed
+    speed = np.abs(np.diff(plan.motion.q, axis=0)) / slow.duration[1:, None]
     assert speed.max() == pytest.approx(0.01)
 
 
 def test_a_retract_beyond_a_limit_is_refused():
     problem, plan = small_problem(), small_plan()
-    leads = [k for k, s in enumerate(plan.motion.stretch) if s is Stretch.RETRACT]
+    leads = [k for k, s in enumerate(plan.motion.kind) if s is MoveKind.RETRACT]
     last = plan.motion.q[leads[-1]]
     robot, joint = problem.cell.robot, 2
     # only the limits of the leads are looked at here: nodes beyond them were never made
@@ -455,44 +477,12 @@ def test_a_retract_beyond_a_limit_is_refused():
     lower[joint] = last[joint] + 1e-6
     cell = replace(problem.cell, robot=replace(robot, lower=lower))
     with pytest.raises(UnreachableApproachError) as caught:
-        whole_motion(cell, problem.points, plan.path, problem.pace)
+        whole_motion(cell, problem.points, plan.path, problem.process)
     assert caught.value.cause == "limits of U"
 
 
 def test_an_approach_from_out_of_reach_is_refused():
     problem, plan = small_problem(), small_plan()
-    pace = replace(problem.pace, approach_length=5.0)
+    process = replace(problem.process, approach_length=5.0)
     with pytest.raises(UnreachableApproachError, match="approach to cutter point 0: reach"):
-        whole_motion(problem.cell, problem.points, plan.path, pace)
-
-
-# motions as values
-
-
-def test_a_motion_is_a_read_only_copy():
-    q = np.zeros((2, 6))
-    motion = Motion(**_two_postures(q))
-    q[0, 0] = 9.0
-    assert motion.q[0, 0] == 0.0
-    with pytest.raises(ValueError, match="read-only"):
-        motion.q[0, 0] = 1.0
-
-
-def test_a_motion_with_a_missing_value_is_refused():
-    values = _two_postures(np.zeros((2, 6)))
-    values["duration"] = np.zeros(3)
-    with pytest.raises(ValueError, match="duration has 3 items for 2 postures"):
-        Motion(**values)
-
-
-def _two_postures(q):
-    n = len(q)
-    return {
-        "q": q,
-        "duration": np.zeros(n),
-        "stretch": (Stretch.HOME,) * n,
-        "contact_position": np.full(n, np.nan),
-        "cutter_point": np.full(n, np.nan),
-        "pass_index": np.full(n, -1),
-        "clearance": np.full(n, np.nan),
-    }
+        whole_motion(problem.cell, problem.points, plan.path, process)

@@ -1,4 +1,4 @@
-"""What is ground is recognised from postures alone."""
+"""What is ground is recognised from configurations alone."""
 
 from dataclasses import replace
 from functools import cache
@@ -8,36 +8,46 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from opl.files.resources import folder
 from opl.geometry.frames import inverse
-from opl.job.load import load
-from opl.motion.motion import Stretch
-from opl.pipeline import cutter_points
-from opl.resources import folder
+from opl.job.load import load_job
+from opl.motion.motion import MoveKind
+from opl.run.surfacing import cut_surface
 from opl.verification.align import align
-from opl.verification.between import frames_at, place_between
 from opl.verification.contact import Touches, contact_positions, find_touches, misfit
+from opl.verification.contact_segments import ContactSegments, place_between
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import replay
-from opl.verification.ways import Ways
-from tests.support.planned import small_job, small_motion, small_problem, tiny_motion, tiny_problem
+from tests.support.planned import (
+    small_job,
+    small_motion,
+    small_problem,
+    small_timed,
+    tiny_motion,
+    tiny_problem,
+    tiny_timed,
+)
 
 RULE = Rule(
-    1e-4, small_job().search.interpolation.max_contact_step, small_job().pace.approach_length, 0.0
+    1e-4,
+    small_job().search.interpolation.max_contact_step,
+    small_job().process.approach_length,
+    0.0,
 )
 
 
 def recognised(problem, q, duration=None):
-    """Recognise postures, all of them written."""
+    """Recognise configurations, all of them written."""
     time = np.ones(len(q)) if duration is None else duration
     return recognise(problem.cell, problem.points, q, time, np.arange(len(q)), RULE)
 
 
 def test_the_labels_of_a_planned_motion_are_found_again():
     motion = small_motion()
-    found = recognised(small_problem(), motion.q, motion.duration).motion
-    assert found.stretch == motion.stretch
+    found = recognised(small_problem(), motion.q, small_timed().duration).timed.motion
+    assert found.kind == motion.kind
     np.testing.assert_array_equal(found.pass_index, motion.pass_index)
-    at_points = [k for k, s in enumerate(motion.stretch) if s is Stretch.GRIND]
+    at_points = [k for k, s in enumerate(motion.kind) if s is MoveKind.GRIND]
     np.testing.assert_array_equal(found.cutter_point[at_points], motion.cutter_point[at_points])
     np.testing.assert_allclose(
         found.contact_position[at_points], motion.contact_position[at_points], atol=0.01
@@ -51,47 +61,46 @@ def test_the_labels_of_a_planned_motion_are_found_again():
 
 def test_what_was_recognised_is_proven_by_the_same_replay():
     problem = tiny_problem()
-    found = recognised(problem, tiny_motion().q, tiny_motion().duration)
+    found = recognised(problem, tiny_motion().q, tiny_timed().duration)
     assert found.findings == ()
-    assert replay(problem.cell, problem.points, found.motion, 1e-4).verified is not None
+    assert replay(problem.cell, problem.points, found.timed, 1e-4).verified is not None
 
 
 def about_an_edge():
-    """Return a posture about an edge; flat on the flat, those beside it touch the same points."""
+    """Return where the part leans on an edge; flat on it, neighbours touch the same points."""
     motion, wheel = small_motion(), small_problem().cell.wheel
     at_edge = np.abs(motion.contact_position) > wheel.flat_end + 5.0
-    grinds = [k for k, s in enumerate(motion.stretch) if s is Stretch.GRIND and at_edge[k]]
+    grinds = [k for k, s in enumerate(motion.kind) if s is MoveKind.GRIND and at_edge[k]]
     return grinds[len(grinds) // 4]
 
 
-def test_a_posture_off_the_wheel_costs_its_cutter_point_alone():
+def test_a_configuration_off_the_wheel_costs_its_cutter_point_alone():
     motion, problem, k = small_motion(), small_problem(), about_an_edge()
     q = motion.q.copy()
     q[k, 5] += 0.02
-    found = recognised(problem, q, motion.duration)
-    labels = zip(found.motion.cutter_point, found.motion.stretch, strict=True)
-    ground = [int(point) for point, stretch in labels if stretch is Stretch.GRIND]
-    assert ground == [p for p in range(len(problem.points)) if p != motion.cutter_point[k]]
-    assert found.motion.stretch[k] is Stretch.BETWEEN
-    assert any("off the way" in one.message for one in found.findings)
+    found = recognised(problem, q, small_timed().duration)
+    others = [p for p in range(len(problem.points)) if p != motion.cutter_point[k]]
+    assert found.timed.motion.ground_points.tolist() == others
+    assert found.timed.motion.kind[k] is MoveKind.BETWEEN
+    assert any("off the contact model" in one.message for one in found.findings)
 
 
 def test_nothing_is_recognised_where_nothing_is_ground():
-    found = recognised(tiny_problem(), tiny_motion().q[:2])
-    assert set(found.motion.stretch) == {Stretch.HOME}
-    assert (found.motion.pass_index == -1).all()
+    found = recognised(tiny_problem(), tiny_motion().q[:2]).timed.motion
+    assert set(found.kind) == {MoveKind.HOME}
+    assert (found.pass_index == -1).all()
 
 
 def test_an_approach_from_the_side_is_no_approach():
     motion, problem = tiny_motion(), tiny_problem()
-    k = next(k for k, s in enumerate(motion.stretch) if s is Stretch.APPROACH)
+    k = next(k for k, s in enumerate(motion.kind) if s is MoveKind.APPROACH)
     q = motion.q.copy()
     q[k, 0] += 0.01
-    found = recognised(problem, q, motion.duration).motion
-    assert found.stretch[k] is Stretch.HOME
+    found = recognised(problem, q, tiny_timed().duration).timed.motion
+    assert found.kind[k] is MoveKind.HOME
     # the next one is now where the approach begins: the move to it is free
-    assert found.stretch[k + 1] is Stretch.HOME
-    assert found.stretch[k + 2 : k + 4] == motion.stretch[k + 2 : k + 4]
+    assert found.kind[k + 1] is MoveKind.HOME
+    assert found.kind[k + 2 : k + 4] == motion.kind[k + 2 : k + 4]
 
 
 @pytest.mark.parametrize("t", [-69.0, -40.0, -25.0, -24.9, 0.0, 3.0, 25.0, 26.0, 70.0])
@@ -106,13 +115,13 @@ def test_contact_positions_are_those_of_the_contact_model(t):
 @cache
 def hollow():
     """Return wheel and cutter points of the S part; its hollow half is ground at an edge."""
-    job = load(folder("workpieces") / "s_shape" / "job.yaml")
-    return job.cell.wheel, cutter_points(job)
+    job = load_job(folder("workpieces") / "s_shape" / "job.yaml")
+    return job.cell.wheel, cut_surface(job).points
 
 
 def parts_at(wheel, points, place, t):
     """Return where the part is when places are ground at contact positions, seen from contact0."""
-    return wheel.T_contact0_contact(np.asarray(t)) @ inverse(frames_at(points, np.asarray(place)))
+    return wheel.T_contact0_contact(np.asarray(t)) @ inverse(points.frames_at(np.asarray(place)))
 
 
 def test_a_place_between_two_cutter_points_is_found():
@@ -134,8 +143,8 @@ def test_a_pivot_through_the_hollow_is_followed(forwards):
     if not forwards:
         t = t[::-1]
     Ts = parts_at(wheel, points, place, t)
-    # alone, a posture may as well be a millimetre farther on
-    again = Ts[:, None] @ frames_at(points, place[:, None] + np.linspace(0.1, 0.3, 401))
+    # alone, a configuration may as well be a millimetre farther on
+    again = Ts[:, None] @ points.frames_at(place[:, None] + np.linspace(0.1, 0.3, 401))
     distance, _ = misfit(wheel, again, contact_positions(wheel, again))
     assert distance.min() < 1e-5
     found, position, apart = place_between(
@@ -175,7 +184,7 @@ def test_what_goes_back_is_not_explained():
     assert apart[1:3].sum() > 0.25 * step  # it went back by 0.3 of the step
 
 
-def test_of_several_touches_of_a_flat_the_one_is_taken_that_the_ways_around_bear():
+def test_of_several_touches_of_a_flat_the_one_is_taken_that_the_segments_around_it_fit():
     problem = small_problem()
     wheel, points = problem.cell.wheel, problem.points
     # a flat slides off the wheel's flat onto its edge: it touches point 26 three times
@@ -183,12 +192,12 @@ def test_of_several_touches_of_a_flat_the_one_is_taken_that_the_ways_around_bear
     t = [-23.7, 24.696, 24.943, 25.190, 25.684, 27.5, 29.7]
     found = find_touches(wheel, points, parts_at(wheel, points, place, t), 5e-5)
     at = [int(k) for k in np.flatnonzero(found.point == 26)]
-    assert found.posture[at].tolist() == [1, 3, 4]
+    assert found.configuration[at].tolist() == [1, 3, 4]
     ends = [int(np.flatnonzero(found.point == n)[0]) for n in (25, 27)]
-    ways = Ways(wheel, points, parts_at(wheel, points, place, t), np.ones(7), found)
-    assert ways.between(at[0], ends[1]).farthest > 1e-4
-    settled = ways.settled(np.array([ends[0], at[0], ends[1]]), 1e-4)
-    assert found.posture[settled].tolist() == [0, 4, 6]
+    segments = ContactSegments(wheel, points, parts_at(wheel, points, place, t), np.ones(7), found)
+    assert segments.between(at[0], ends[1]).farthest > 1e-4
+    settled = segments.settled(np.array([ends[0], at[0], ends[1]]), 1e-4)
+    assert found.configuration[settled].tolist() == [0, 4, 6]
 
 
 def test_only_points_at_their_place_on_the_wheel_touch():
@@ -198,28 +207,28 @@ def test_only_points_at_their_place_on_the_wheel_touch():
     lifted = T.copy()
     lifted[2, 3] -= 2e-4
     found = find_touches(wheel, points, np.stack([T, lifted]), 1e-4)
-    assert 20 in found.point[found.posture == 0]
-    assert not (found.posture == 1).any()
+    assert 20 in found.point[found.configuration == 0]
+    assert not (found.configuration == 1).any()
 
 
 # alignment: a flat part touches in many places at once
 
 
 def touches(*rows):
-    posture, point, t, distance = (np.array(column) for column in zip(*rows, strict=True))
-    return Touches(posture, point, t.astype(float), distance * 1e-5)
+    configuration, point, t, distance = (np.array(column) for column in zip(*rows, strict=True))
+    return Touches(configuration, point, t.astype(float), distance * 1e-5)
 
 
 def test_of_many_touches_the_way_that_moves_least_is_taken():
-    # the part lies flat on the wheel: each of three postures touches all three points
+    # the part lies flat on the wheel: each of three configurations touches all three points
     rows = [(k, i, 4.0 * (i - k), 0.0) for k in range(3) for i in range(3)]
     found = touches(*rows)
     chosen = align(found, np.zeros(3, dtype=int), 1e-4, 1.0)
-    assert found.posture[chosen].tolist() == [0, 1, 2]
+    assert found.configuration[chosen].tolist() == [0, 1, 2]
     assert found.point[chosen].tolist() == [0, 1, 2]
 
 
-def test_one_posture_may_grind_two_points():
+def test_one_configuration_may_grind_two_points():
     found = touches((0, 0, 0.0, 0.0), (0, 1, 4.0, 0.0), (3, 2, 4.0, 0.0))
     assert len(align(found, np.zeros(3, dtype=int), 1e-4, 1.0)) == 3
 
@@ -236,14 +245,15 @@ def test_nothing_aligned_is_nothing():
     assert len(align(nothing, np.zeros(3, dtype=int), 1e-4, 1.0)) == 0
 
 
-def test_postures_that_grind_several_points_are_repeated():
+def test_configurations_that_grind_several_points_are_repeated():
     motion, problem, k = small_motion(), small_problem(), about_an_edge()
     point = int(motion.cutter_point[k])
     Ts = problem.points.Ts_workpiece_cutter.copy()
     Ts[point + 1] = Ts[point]
     twice = replace(problem.points, Ts_workpiece_cutter=Ts)
-    found = recognise(problem.cell, twice, motion.q, motion.duration, np.arange(len(motion)), RULE)
+    duration = small_timed().duration
+    found = recognise(problem.cell, twice, motion.q, duration, np.arange(len(motion)), RULE)
     rows = np.flatnonzero(found.source == k)
-    assert found.motion.cutter_point[rows].tolist() == [point, point + 1]
-    assert [found.motion.stretch[row] for row in rows] == [Stretch.GRIND] * 2
-    assert found.motion.duration[rows[1]] == 0.0
+    assert found.timed.motion.cutter_point[rows].tolist() == [point, point + 1]
+    assert [found.timed.motion.kind[row] for row in rows] == [MoveKind.GRIND] * 2
+    assert found.timed.duration[rows[1]] == 0.0

@@ -11,7 +11,7 @@ import pytest
 
 from opl.cell.robot import forward_kinematics, known_robots, load_robot
 from opl.errors import InputError
-from opl.resources import folder
+from opl.files.resources import folder
 
 MH24 = load_robot("mh24")
 
@@ -41,7 +41,7 @@ def dh_forward(q):
     return T
 
 
-def random_postures(n, seed=0):
+def random_configurations(n, seed=0):
     return np.random.default_rng(seed).uniform(MH24.lower, MH24.upper, (n, 6))
 
 
@@ -61,20 +61,20 @@ def spoil(path: Path, old: str, new: str):
 # forward kinematics
 
 
-def test_zero_posture_has_the_flange_ahead_facing_forward_with_x_up():
+def test_zero_configuration_has_the_flange_ahead_facing_forward_with_x_up():
     expected = [[0, 0, 1, 1.045], [0, -1, 0, 0], [1, 0, 0, 0.960], [0, 0, 0, 1]]
     np.testing.assert_allclose(forward_kinematics(MH24, np.zeros(6)), expected, atol=1e-12)
 
 
 def test_forward_agrees_with_denavit_hartenberg():
-    q = random_postures(200)
+    q = random_configurations(200)
     np.testing.assert_allclose(
         forward_kinematics(MH24, q), [dh_forward(row) for row in q], atol=1e-12
     )
 
 
 def test_forward_keeps_the_shape_of_the_stack():
-    q = random_postures(6).reshape(2, 3, 6)
+    q = random_configurations(6).reshape(2, 3, 6)
     assert forward_kinematics(MH24, q).shape == (2, 3, 4, 4)
     np.testing.assert_array_equal(
         forward_kinematics(MH24, q)[1, 2], forward_kinematics(MH24, q[1, 2])

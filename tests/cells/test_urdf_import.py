@@ -15,7 +15,7 @@ from opl.cell.robot_file import read_robot_file
 from opl.cell.urdf_arm import arm_of_urdf
 from opl.cell.urdf_import import import_urdf
 from opl.errors import InputError
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.verification.world import World
 from tests.support.jobs import V_JOB, opl
 
@@ -175,7 +175,7 @@ def test_planner_and_replay_take_a_mesh_of_a_link_alike(tmp_path):
         [points for joint, points in drawn_arm(made.robot).outlines if joint == 4]
     )
     assert np.ptp(drawn[:, 1]) == pytest.approx(0.181)
-    cell = replace(load(V_JOB).cell, robot=made.robot)
+    cell = replace(load_job(V_JOB).cell, robot=made.robot)
     scene = CollisionScene(cell)
     q = np.random.default_rng(0).uniform(MH24.lower, MH24.upper, (150, 6))
     seen = set()
@@ -332,7 +332,7 @@ def test_a_xacro_is_expanded_and_its_meshes_are_found(tmp_path):
         ('<link name="$(arg n)"/>', r"line 3: Undefined .* n: give it a default, or expand it by"),
         (
             '<xacro:include filename="$(find ur)/ur.xacro"/>',
-            r"line 3: \$\(find \.\.\.\) asks for a ROS package, .*: xacro arm\.xacro ARGUMENT:=",
+            r"line 3: \$\(find \.\.\.\) needs a ROS package, .*: xacro arm\.xacro ARGUMENT:=",
         ),
         ('<xacro:include filename="none.xacro"/>', r"arm\.xacro: xacro refuses it: line 3: .*none"),
         ('<xacro:include filename="bad.xacro"/>', r"bad\.xacro: is not XML: .* line 2"),

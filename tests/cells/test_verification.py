@@ -14,8 +14,8 @@ from opl.cell.robot import forward_kinematics
 from opl.findings import Level
 from opl.geometry.frames import pose
 from opl.geometry.shapes import Body, Cylinder
-from opl.motion.motion import Motion, Stretch, VerifiedMotion
-from opl.verification.replay import HORIZON, STEP, TURN, replay, where
+from opl.motion.motion import MoveKind, TimedMotion, VerifiedMotion
+from opl.verification.replay import HORIZON, STEP, TURN, replay
 from opl.verification.world import World
 from tests.support.bare_cells import (
     NO_POINTS,
@@ -24,7 +24,7 @@ from tests.support.bare_cells import (
     c_shape,
     convex_hull,
     free_move,
-    random_postures,
+    random_configurations,
     with_obstacle,
 )
 from tests.support.fcl_scene import FclScene
@@ -33,9 +33,10 @@ from tests.support.planned import (
     small_motion,
     tiny_motion,
     tiny_problem,
+    tiny_timed,
     v_job,
-    v_motion,
     v_problem,
+    v_timed,
 )
 
 PACKAGE = Path(opl.__file__).parent
@@ -44,7 +45,7 @@ STATED = 1e-3  # [m] Bullet rounds the edges and corners of the links' boxes by 
 
 @cache
 def v_verification():
-    return replay(v_job().cell, v_problem().points, v_motion(), v_job().search.max_contact_error)
+    return replay(v_job().cell, v_problem().points, v_timed(), v_job().search.max_contact_error)
 
 
 def kinds(verification):
@@ -60,8 +61,8 @@ def refuses(verification, kind, *words):
     return True
 
 
-def indices(motion, stretch):
-    return [k for k, each in enumerate(motion.stretch) if each is stretch]
+def indices(motion, kind):
+    return [k for k, each in enumerate(motion.kind) if each is kind]
 
 
 # PyBullet against the other libraries
@@ -69,10 +70,10 @@ def indices(motion, stretch):
 
 def test_bullets_link_poses_agree_with_forward_kinematics():
     cell = v_job().cell
-    postures = random_postures(cell.robot, 200)
+    configurations = random_configurations(cell.robot, 200)
     with World(cell) as world:
-        found = np.array([world.move_to(q) for q in postures])
-    wanted = forward_kinematics(cell.robot, postures) @ cell.T_flange_workpiece
+        found = np.array([world.move_to(q) for q in configurations])
+    wanted = forward_kinematics(cell.robot, configurations) @ cell.T_flange_workpiece
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-6)
 
 
@@ -82,13 +83,13 @@ def test_bullet_and_fcl_agree_on_what_is_too_near():
     random = np.random.default_rng(0)
     near = small_motion().q[random.integers(0, len(small_motion()), 150)]
     near = near + random.normal(scale=0.15, size=near.shape)
-    postures = np.concatenate(
-        [random_postures(cell.robot, 150), np.clip(near, cell.robot.lower, cell.robot.upper)]
+    configurations = np.concatenate(
+        [random_configurations(cell.robot, 150), np.clip(near, cell.robot.lower, cell.robot.upper)]
     )
     n_hits = 0
     with World(cell) as world:
         pairs = world.pairs()
-        for q in postures:
+        for q in configurations:
             margins = {frozenset(pair): margin for pair, margin in other.clearances(q).items()}
             world.move_to(q)
             for pair in pairs:
@@ -198,26 +199,26 @@ def test_the_v_motion_is_proven():
 
 
 def test_the_verified_motion_is_the_motion_with_its_clearances():
-    verified = v_verification().verified.motion
-    np.testing.assert_array_equal(verified.q, v_motion().q)
-    np.testing.assert_array_equal(verified.duration, v_motion().duration)
-    assert verified.stretch == v_motion().stretch
+    verified = v_verification().verified
+    assert verified.timed is v_timed()
     assert verified.clearance.min() == v_verification().min_clearance
     assert (verified.clearance <= HORIZON).all()
-    assert np.isnan(v_motion().clearance).all()
 
 
 def test_the_replay_is_dense():
     # no joint turns by more than half a degree between two poses, so there are at least so many
-    turned = np.abs(np.diff(v_motion().q, axis=0)).max(axis=1)
+    turned = np.abs(np.diff(v_timed().motion.q, axis=0)).max(axis=1)
     assert v_verification().poses >= np.ceil(turned / TURN).sum()
-    Ts = forward_kinematics(v_job().cell.robot, v_motion().q) @ v_job().cell.T_flange_workpiece
+    Ts = (
+        forward_kinematics(v_job().cell.robot, v_timed().motion.q) @ v_job().cell.T_flange_workpiece
+    )
     way = np.linalg.norm(np.diff(Ts[:, :3, 3], axis=0), axis=1)
     assert v_verification().poses >= way.sum() / STEP
 
 
 def test_clearances_are_those_of_an_independent_scene():
-    motion = v_verification().verified.motion
+    verified = v_verification().verified
+    motion = verified.motion
     scene = FclScene(v_job().cell)
     needed = {
         (scene.pieces[a][0], scene.pieces[b][0]): clearance for a, b, clearance in scene.pairs
@@ -227,8 +228,8 @@ def test_clearances_are_those_of_an_independent_scene():
         nearest = min(
             margin + needed[pair] for pair, margin in margins.items() if needed[pair] > 0.0
         )
-        # that of the move is the least on the way to the posture
-        assert motion.clearance[k] <= min(nearest, HORIZON) + STATED
+        # that of the move is the least on the way to the configuration
+        assert verified.clearance[k] <= min(nearest, HORIZON) + STATED
 
 
 def test_progress_is_told():
@@ -241,9 +242,9 @@ def test_progress_is_told():
 # faults put in, each of which must be found
 
 
-def moved_into_wheel(motion, index, depth):
-    """Return a motion with one posture moved towards the wheel."""
-    cell = tiny_problem().cell
+def moved_into_wheel(index, depth):
+    """Return the tiny motion with one configuration moved towards the wheel."""
+    cell, motion = tiny_problem().cell, tiny_motion()
     T_base_flange = forward_kinematics(cell.robot, motion.q[index])
     into = cell.wheel.T_base_contact(motion.contact_position[index])[:3, 2]
     T_base_flange[:3, 3] += depth * into
@@ -251,7 +252,7 @@ def moved_into_wheel(motion, index, depth):
     found = found + 2 * np.pi * np.round((motion.q[index] - found) / (2 * np.pi))
     q = motion.q.copy()
     q[index] = found[np.nanargmin(np.abs(found - q[index]).max(axis=1))]
-    return replace(motion, q=q, duration=np.maximum(motion.duration, 1.0))
+    return TimedMotion(replace(motion, q=q), np.maximum(tiny_timed().duration, 1.0))
 
 
 def test_the_tiny_motion_is_proven():
@@ -259,9 +260,9 @@ def test_the_tiny_motion_is_proven():
 
 
 @pytest.mark.parametrize("which", [2, 8, 15])
-def test_a_posture_that_cuts_into_the_wheel_is_caught(which):
-    index = indices(tiny_motion(), Stretch.GRIND)[which]
-    verification = replay_tiny(moved_into_wheel(tiny_motion(), index, 0.002))
+def test_a_configuration_that_cuts_into_the_wheel_is_caught(which):
+    index = indices(tiny_motion(), MoveKind.GRIND)[which]
+    verification = replay_tiny(moved_into_wheel(index, 0.002))
     assert refuses(verification, "collision", "part and wheel", "into each other")
     assert verification.collisions > 0
     depth = max(
@@ -273,28 +274,28 @@ def test_a_posture_that_cuts_into_the_wheel_is_caught(which):
     assert 1.0 < depth < 2.2
 
 
-def test_a_posture_that_leaves_the_wheel_is_caught():
-    index = indices(tiny_motion(), Stretch.GRIND)[8]
-    verification = replay_tiny(moved_into_wheel(tiny_motion(), index, -0.001))
+def test_a_configuration_that_leaves_the_wheel_is_caught():
+    index = indices(tiny_motion(), MoveKind.GRIND)[8]
+    verification = replay_tiny(moved_into_wheel(index, -0.001))
     assert refuses(verification, "contact", "part and wheel", "do not touch")
     assert verification.collisions == 0
     assert verification.max_contact_error == pytest.approx(0.001, abs=2e-4)
 
 
-@pytest.mark.parametrize("stretch", [Stretch.HOME, Stretch.LINK])
-def test_an_obstacle_on_a_free_move_is_caught(stretch):
+@pytest.mark.parametrize("kind", [MoveKind.HOME, MoveKind.LINK])
+def test_an_obstacle_on_a_free_move_is_caught(kind):
     motion, problem = tiny_motion(), tiny_problem()
-    move = indices(motion, stretch)[1 if stretch is Stretch.HOME else 0]
+    move = indices(motion, kind)[1 if kind is MoveKind.HOME else 0]
     middle = (motion.q[move - 1] + motion.q[move]) / 2.0
     p = (forward_kinematics(problem.cell.robot, middle) @ problem.cell.T_flange_workpiece)[:3, 3]
     cell = with_obstacle(problem.cell, p, (0.01, 0.01, 0.01))
     verification = replay_tiny(cell=cell)
     assert refuses(verification, "collision", "post")
-    place = "way from home" if stretch is Stretch.HOME else "link of pass 2"
+    place = "free move from home" if kind is MoveKind.HOME else "link of pass 2"
     assert any(finding.where == place for finding in verification.findings)
 
 
-def test_a_collision_that_exists_only_between_two_postures_is_caught():
+def test_a_collision_that_exists_only_between_two_configurations_is_caught():
     ends = small_motion().q[:2]  # from home to the first pass, a long way
     middle = ends.mean(axis=0)
     cell = v_job().cell
@@ -320,53 +321,43 @@ def test_an_obstacle_thinner_than_a_large_step_is_caught():
     assert not FclScene(cell).clearances(q[0]).get(("part", "post"), 1.0) <= 0.0
 
 
-def test_a_posture_beyond_a_joint_limit_is_caught():
+def test_a_configuration_beyond_a_joint_limit_is_caught():
     motion, robot = tiny_motion(), tiny_problem().cell.robot
     q = motion.q.copy()
     q[0, 5] = robot.lower[5] - np.radians(0.5)
-    moved = replace(motion, q=q, duration=np.maximum(motion.duration, 20.0))
+    moved = TimedMotion(replace(motion, q=q), np.maximum(tiny_timed().duration, 20.0))
     verification = replay_tiny(moved)
     assert refuses(verification, "limit", "joint T", "0.500 deg beyond its limit")
     assert verification.limit_violations == 1
 
 
-@pytest.mark.parametrize("stretch", [Stretch.HOME, Stretch.GRIND, Stretch.RETRACT])
-def test_a_move_that_is_too_fast_is_caught(stretch):
+@pytest.mark.parametrize("kind", [MoveKind.HOME, MoveKind.GRIND, MoveKind.RETRACT])
+def test_a_move_that_is_too_fast_is_caught(kind):
     motion, robot = tiny_motion(), tiny_problem().cell.robot
-    move = indices(motion, stretch)[1]
+    move = indices(motion, kind)[1]
     turned = np.abs(motion.q[move] - motion.q[move - 1])
     least = (turned / robot.max_speed).max()
-    duration = motion.duration.copy()
+    duration = tiny_timed().duration.copy()
     duration[move] = 0.99 * least
-    verification = replay_tiny(replace(motion, duration=duration))
+    verification = replay_tiny(TimedMotion(motion, duration))
     joint = robot.joint_names[int(np.argmax(turned / robot.max_speed))]
     assert refuses(verification, "speed", f"joint {joint}", "deg/s")
     duration[move] = 1.001 * least
-    assert replay_tiny(replace(motion, duration=duration)).findings == ()
+    assert replay_tiny(TimedMotion(motion, duration)).findings == ()
 
 
 def test_a_move_that_takes_no_time_is_caught():
-    duration = tiny_motion().duration.copy()
+    duration = tiny_timed().duration.copy()
     duration[15] = 0.0
-    assert refuses(replay_tiny(replace(tiny_motion(), duration=duration)), "speed")
-
-
-def cut(motion, keep):
-    """Return a motion with only some of its postures."""
-    keep = np.asarray(keep)
-    stretch = tuple(motion.stretch[k] for k in keep)
-    arrays = {
-        name: getattr(motion, name)[keep]
-        for name in ("q", "contact_position", "cutter_point", "pass_index", "clearance")
-    }
-    return Motion(duration=np.maximum(motion.duration[keep], 5.0), stretch=stretch, **arrays)
+    assert refuses(replay_tiny(TimedMotion(tiny_motion(), duration)), "speed")
 
 
 @pytest.mark.parametrize("which", [0, 7, -1])
 def test_a_missing_cutter_point_is_caught(which):
     motion = tiny_motion()
-    missing = indices(motion, Stretch.GRIND)[which]
-    left = cut(motion, [k for k in range(len(motion)) if k != missing])
+    missing = indices(motion, MoveKind.GRIND)[which]
+    rest = np.delete(np.arange(len(motion)), missing)
+    left = TimedMotion(motion.take(rest), np.maximum(tiny_timed().duration[rest], 5.0))
     point = int(motion.cutter_point[missing])
     verification = replay_tiny(left)
     told = [finding for finding in verification.findings if finding.kind == "order"]
@@ -378,9 +369,10 @@ def test_a_missing_cutter_point_is_caught(which):
 def test_cutter_points_out_of_order_are_caught():
     motion = tiny_motion()
     place = motion.cutter_point.copy()
-    one, other = indices(motion, Stretch.GRIND)[5:7]
+    one, other = indices(motion, MoveKind.GRIND)[5:7]
     place[[one, other]] = place[[other, one]]
-    assert refuses(replay_tiny(replace(motion, cutter_point=place)), "order", "cutter point 5")
+    mixed = replace(tiny_timed(), motion=replace(motion, cutter_point=place))
+    assert refuses(replay_tiny(mixed), "order", "cutter point 5")
 
 
 @pytest.mark.parametrize(
@@ -405,8 +397,8 @@ def test_another_part_than_was_planned_for_is_caught():
 def test_a_free_move_too_near_the_wheel_is_caught():
     # retracted by 3 mm only, where 5 mm are to be kept
     problem, motion = tiny_problem(), tiny_motion()
-    index = indices(motion, Stretch.GRIND)[8]
-    q = moved_into_wheel(motion, index, -0.003).q[[index, index]]
+    index = indices(motion, MoveKind.GRIND)[8]
+    q = moved_into_wheel(index, -0.003).motion.q[[index, index]]
     verification = replay(problem.cell, NO_POINTS, free_move(q), 1e-4)
     assert refuses(verification, "collision", "part and wheel", " mm apart, 5 mm needed")
 
@@ -453,9 +445,7 @@ def test_skipping_leaves_the_proven_motion_its_clearances(monkeypatch):
     skipping = replay_tiny()
     monkeypatch.setattr(World, "levers", lambda self: np.full(6, 1e12))
     measuring = replay_tiny()
-    np.testing.assert_array_equal(
-        skipping.verified.motion.clearance, measuring.verified.motion.clearance
-    )
+    np.testing.assert_array_equal(skipping.verified.clearance, measuring.verified.clearance)
     assert skipping.findings == measuring.findings == ()
 
 
@@ -468,7 +458,7 @@ def test_levers_are_as_long_as_anything_moves():
             np.meshgrid(*zip(cell.part.vertices.min(0), cell.part.vertices.max(0), strict=True))
         )
         corners = corners.reshape(3, -1).T
-        for q in random_postures(cell.robot, 100):
+        for q in random_configurations(cell.robot, 100):
             for joint in range(6):
                 turned = q.copy()
                 turned[joint] += 1e-3 * random.choice([-1, 1])
@@ -477,18 +467,6 @@ def test_levers_are_as_long_as_anything_moves():
                     corners @ (after - before)[:3, :3].T + (after - before)[:3, 3], axis=1
                 )
                 assert moved.max() <= 1e-3 * levers[joint] + 2e-6  # Bullet's own digits
-
-
-# what places are called
-
-
-def test_places_are_called_as_people_look_for_them():
-    motion = tiny_motion()
-    names = {where(motion, k) for k in range(len(motion))}
-    assert {"way from home", "way home", "approach of pass 1", "link of pass 2"} <= names
-    assert "pass 1, cutter point 0" in names
-    assert where(motion, 0) == "way from home"
-    assert where(motion, len(motion) - 1) == "way home"
 
 
 # who may say that a motion is proven

@@ -5,13 +5,15 @@ import multiprocessing
 import os
 import re
 from concurrent.futures import Future
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
-from opl import batch
-from opl.batch import Row, find_jobs
 from opl.errors import InputError
+from opl.run import batch
+from opl.run.batch import BatchRow, find_jobs
+from opl.run.result import PathReport, Report
 from tests.support.jobs import Ended, opl, write_job, write_trough
 
 
@@ -116,7 +118,7 @@ def test_every_failure_says_why(mixed):
         "jobs/bad/job.yaml: 2 faults",
         "wheel.width_mm: must be more than 0, got -3",
     ]
-    assert narrow.startswith("no path: no free posture at cutter point 0")
+    assert narrow.startswith("no path: no free configuration at cutter point 0")
     assert "part cuts into wheel" in narrow
     assert first == (
         "jobs/twin1/job.yaml: name: must be another for each job, TWIN is also that of "
@@ -133,13 +135,18 @@ def pretend(path, out):
     if path.stem == "dies":
         os._exit(9)
     if path.stem == "fails":
-        return Row(path, "no_path", 3, "no path: none\nbecause", out / "F", None)
-    result = {
+        return BatchRow(path, "no_path", 3, out / "F", "no path: none\nbecause", None)
+    values = {
         "cutter_points": 7,
         "seconds": {"total": 1.25},
-        "path": {"joint_range_sum_rad": 2.0},
+        "path": made_of(PathReport, {"joint_range_sum_rad": 2.0}),
     }
-    return Row(path, "ok", 0, "", out / path.stem, result)
+    return BatchRow(path, "ok", 0, out / path.stem, "", made_of(Report, values))
+
+
+def made_of(kind, values):
+    """Return a report with some values; None stands for the others."""
+    return kind(**{field.name: values.get(field.name) for field in fields(kind)})
 
 
 class OneByOne:
@@ -207,7 +214,7 @@ def test_a_bug_in_one_job_is_a_row_that_says_so(tmp_path, monkeypatch):
     def stumble(path):
         raise ZeroDivisionError("oh")
 
-    monkeypatch.setattr(batch, "load", stumble)
+    monkeypatch.setattr(batch, "load_job", stumble)
     row = batch._run_one(tmp_path / "job.yaml", tmp_path)
     assert (row.status, row.exit_status, row.folder) == ("error", 1, None)
     assert re.fullmatch(r"ZeroDivisionError: oh \(a bug: .*\)", row.message)

@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import link_names, load_robot
 from opl.errors import InputError
+from opl.files.resources import folder
 from opl.geometry.frames import pose, rotation_angle, transform
 from opl.geometry.mesh import TriangleMesh
 from opl.job.cell import load_cell
-from opl.job.load import load
-from opl.resources import folder
+from opl.job.load import load_job
 from tests.support.jobs import GONE, QUICK, opl, write_job
 from tests.support.schema_check import schema_faults
 
@@ -83,7 +83,7 @@ def refusal(path):
 def test_the_cell_that_comes_with_opl_is_in_the_base_frame():
     cell = load_cell(CELL)
     (wheel,) = cell.wheels
-    direct = load(WORKPIECES / "v_shape" / "job.yaml").cell
+    direct = load_job(WORKPIECES / "v_shape" / "job.yaml").cell
     np.testing.assert_allclose(wheel.wheel.T_base_contact0, direct.wheel.T_base_contact0, atol=1e-9)
     bodies = {body.name: body for body in cell.obstacles}
     assert bodies["floor"].T_parent_body[2, 3] == pytest.approx(-0.505 - 0.011)
@@ -94,18 +94,20 @@ def test_the_cell_that_comes_with_opl_is_in_the_base_frame():
     np.testing.assert_allclose(corners.max(axis=0), [1.9, 0.4825, 0.695], atol=1e-6)
     assert [limit.name for limit in cell.limits] == ["R", "R+T"]
     assert cell.limits[1].coefficients.tolist() == [0, 0, 0, 1, 0, 1]
-    rules = cell.said.rules("belt grinder", ())
+    rules = cell.pairs.rules("belt grinder", ())
     assert rules.required[frozenset(["B_link", "machine frame"])] == pytest.approx(0.02)
     assert rules.required[frozenset(["T_link", "fence left"])] == pytest.approx(0.05)
     assert rules.allowed == {frozenset(["gripper", "part"])}
 
 
 def test_a_job_in_a_cell_without_frills_is_the_job_that_says_it_all_itself(tmp_path):
-    own = load(write_job(tmp_path / "own", {"obstacles": PLAIN["obstacles"]}, quick=False)).cell
-    shared = load(write_both(tmp_path / "shared")).cell
+    own = load_job(write_job(tmp_path / "own", {"obstacles": PLAIN["obstacles"]}, quick=False)).cell
+    shared = load_job(write_both(tmp_path / "shared")).cell
     np.testing.assert_array_equal(own.wheel.T_base_contact0, shared.wheel.T_base_contact0)
-    assert own.required_clearance == shared.required_clearance
-    assert own.contact_allowance == shared.contact_allowance
+    assert (own.required_clearance, own.max_belt_penetration) == (
+        shared.required_clearance,
+        shared.max_belt_penetration,
+    )
     for mine, theirs in zip(
         (*own.obstacles, *own.fixture), (*shared.obstacles, *shared.fixture), strict=True
     ):
@@ -116,10 +118,10 @@ def test_a_job_in_a_cell_without_frills_is_the_job_that_says_it_all_itself(tmp_p
 @pytest.mark.parametrize("robot", ["mh24", "gp12", "kr16"])
 def test_what_stands_in_the_cell_stays_when_the_arm_is_exchanged(robot, tmp_path):
     joints = len(load_robot(robot).joint_names)
-    stands = {"at_mm": [100, -200, 300], "rotation_deg": [0, 0, 90]}
+    face = {"at_mm": [100, -200, 300], "rotation_deg": [0, 0, 90]}
     wheel = {**WHEEL, "T_cell_contact0_mm": CONTACT0}
     del wheel["T_base_contact0_mm"]
-    changes = {"robot": robot, "stands": stands, "wheels": [wheel], "home_deg": [0.0] * joints}
+    changes = {"robot": robot, "mounting_face": face, "wheels": [wheel], "home_deg": [0.0] * joints}
     cell = load_cell(write_cell(tmp_path, changes))
     height = load_robot(robot).base_height
     np.testing.assert_allclose(cell.T_cell_base[:3, 3], [0.1, -0.2, 0.3 + height])
@@ -158,9 +160,9 @@ def test_matrix_pendant_and_touched_points_tell_the_same_place(tmp_path):
         assert rotation_angle(there, T) < 2e-6
         # a job says its own wheel in the same ways
         job = write_job(
-            tmp_path / key, {"wheel": {**wheel, "contact_allowance_mm": 0.5}}, quick=False
+            tmp_path / key, {"wheel": {**wheel, "max_belt_penetration_mm": 0.5}}, quick=False
         )
-        np.testing.assert_array_equal(load(job).cell.wheel.T_base_contact0, there)
+        np.testing.assert_array_equal(load_job(job).cell.wheel.T_base_contact0, there)
 
 
 def test_positions_are_taken_from_where_the_controller_counts(tmp_path):
@@ -174,7 +176,7 @@ def test_positions_are_taken_from_where_the_controller_counts(tmp_path):
     z = load_cell(write_cell(tmp_path, changes)).wheels[0].wheel.T_base_contact0[2, 3]
     assert z == pytest.approx(0.8 - (robot.base_height - robot.controller_base_height))
     changes["wheels"] = [{**wheel, "pendant": {**shown, "frame": "cell"}}]
-    changes["stands"] = {"at_mm": [0, 0, 0]}
+    changes["mounting_face"] = {"at_mm": [0, 0, 0]}
     z = load_cell(write_cell(tmp_path, changes)).wheels[0].wheel.T_base_contact0[2, 3]
     assert z == pytest.approx(0.8 - robot.base_height)
 
@@ -214,9 +216,9 @@ def test_residuals_are_printed_and_too_large_ones_refused(tmp_path):
 def test_a_job_picks_a_wheel_and_keeps_away_from_the_others(tmp_path):
     away = [[*row[:3], row[3] + shift] for row, shift in zip(CONTACT0, (0, 900, 0, 0), strict=True)]
     wheels = [{**WHEEL, "name": "coarse"}, {**WHEEL, "name": "fine", "T_base_contact0_mm": away}]
-    two = {"wheels": wheels, "clearances": [{"pair": ["part", "fine"], "clearance_mm": 30}]}
+    two = {"wheels": wheels, "pair_clearances": [{"pair": ["part", "fine"], "clearance_mm": 30}]}
     for picked, other in (("coarse", "fine"), ("fine", "coarse")):
-        job = load(write_both(tmp_path, two, {"wheel_name": picked}))
+        job = load_job(write_both(tmp_path, two, {"wheel_name": picked}))
         assert [body.name for body in job.cell.obstacles] == ["post", other]
         named = other if picked == "coarse" else "wheel"
         assert job.cell.pairs.required == {frozenset(["part", named]): pytest.approx(0.03)}
@@ -231,12 +233,12 @@ def test_a_job_picks_a_wheel_and_keeps_away_from_the_others(tmp_path):
         ({"wheel_name": "rough"}, "no wheel 'rough' in "),
     ):
         with pytest.raises(InputError, match=told):
-            load(write_both(tmp_path, two, changes))
+            load_job(write_both(tmp_path, two, changes))
 
 
 def test_a_pair_of_one_link_goes_before_all_links(tmp_path):
     said = {
-        "clearances": [
+        "pair_clearances": [
             {"pair": ["B_link", "post"], "clearance_mm": 1},
             {"pair": ["robot", "post"], "clearance_mm": 40},
             {"pair": ["fixture", "post"], "clearance_mm": 30},
@@ -244,7 +246,7 @@ def test_a_pair_of_one_link_goes_before_all_links(tmp_path):
         "allowed_contacts": [["robot", "jaw"], ["post", "T_link"]],
     }
     held = [{"name": "clamp", "box_mm": [5, 5, 5], "at_mm": [0, 0, 60]}]
-    pairs = load(write_both(tmp_path, said, {"fixture.bodies": held})).cell.pairs
+    pairs = load_job(write_both(tmp_path, said, {"fixture.bodies": held})).cell.pairs
     of_post = {
         name: round(1e3 * distance)
         for both, distance in pairs.required.items()
@@ -307,36 +309,36 @@ LIMIT = {"lower_deg": -100, "upper_deg": 100}
             "gripper.0.mesh: ",
         ),
         (
-            {"clearances": [{"pair": ["post", "pots"], "clearance_mm": 5}]},
-            "clearances.0.pair: no body 'pots' in the cell; have: robot, part, fixture, jaw, wheel,"
-            " post, base_link, S_link, L_link, U_link, R_link, B_link, T_link",
+            {"pair_clearances": [{"pair": ["post", "pots"], "clearance_mm": 5}]},
+            "pair_clearances.0.pair: no body 'pots' in the cell; have: robot, part, fixture, jaw, "
+            "wheel, post, base_link, S_link, L_link, U_link, R_link, B_link, T_link",
         ),
         (
-            {"clearances": [{"pair": ["post"], "clearance_mm": 5}]},
-            "clearances.0.pair: must have at least 2 values, got 1",
+            {"pair_clearances": [{"pair": ["post"], "clearance_mm": 5}]},
+            "pair_clearances.0.pair: must have at least 2 values, got 1",
         ),
         (
-            {"clearances": [{"pair": ["post", "part"], "clearance_mm": -5}]},
-            "clearances.0.clearance_mm: must be at least 0, got -5",
+            {"pair_clearances": [{"pair": ["post", "part"], "clearance_mm": -5}]},
+            "pair_clearances.0.clearance_mm: must be at least 0, got -5",
         ),
         (
-            {"clearances": [{"pair": ["jaw", "part"], "clearance_mm": 5}]},
-            "clearances.0.pair: jaw and part: do not move against each other",
+            {"pair_clearances": [{"pair": ["jaw", "part"], "clearance_mm": 5}]},
+            "pair_clearances.0.pair: jaw and part: do not move against each other",
         ),
         (
-            {"clearances": [{"pair": ["U_link", "L_link"], "clearance_mm": 5}]},
-            "clearances.0.pair: U_link and L_link: do not move against each other, or share a",
+            {"pair_clearances": [{"pair": ["U_link", "L_link"], "clearance_mm": 5}]},
+            "pair_clearances.0.pair: U_link and L_link: do not move against each other, or share a",
         ),
         (
-            {"clearances": [{"pair": ["base_link", "post"], "clearance_mm": 5}]},
-            "clearances.0.pair: base_link and post: do not move against each other",
+            {"pair_clearances": [{"pair": ["base_link", "post"], "clearance_mm": 5}]},
+            "pair_clearances.0.pair: base_link and post: do not move against each other",
         ),
         (
             {
-                "clearances": [{"pair": ["post", "part"], "clearance_mm": 5}],
+                "pair_clearances": [{"pair": ["post", "part"], "clearance_mm": 5}],
                 "allowed_contacts": [["part", "post"]],
             },
-            "clearances.0.pair: post and part: are given in allowed_contacts.0 already",
+            "pair_clearances.0.pair: post and part: are given in allowed_contacts.0 already",
         ),
         ({"allowed_contacts": [["post", "post"]]}, "allowed_contacts.0: post and post: are one"),
         ({"allowed_contacts": [["post", "nut"]]}, "allowed_contacts.0: no body 'nut' in the cell"),
@@ -418,7 +420,7 @@ def test_a_bad_cell_is_refused_with_file_and_key(tmp_path, changes, told):
 def test_what_job_and_cell_say_must_go_together(tmp_path, of_cell, of_job, told):
     job = write_both(tmp_path, of_cell, of_job)
     with pytest.raises(InputError) as refused:
-        load(job)
+        load_job(job)
     assert told in str(refused.value)
     if "cell file, " in told or "home_deg in " in told:
         assert str(tmp_path / "cell.yaml") in str(refused.value)
@@ -427,9 +429,9 @@ def test_what_job_and_cell_say_must_go_together(tmp_path, of_cell, of_job, told)
 def test_a_job_without_a_cell_says_all_itself(tmp_path):
     for key in ("robot", "wheel", "process.home_deg"):
         with pytest.raises(InputError, match=f"job.yaml: {key}: is missing, and there is no cell"):
-            load(write_job(tmp_path, {key: GONE}))
+            load_job(write_job(tmp_path, {key: GONE}))
     with pytest.raises(InputError, match="wheel_name: goes with a cell file"):
-        load(write_job(tmp_path, {"wheel_name": "wheel"}))
+        load_job(write_job(tmp_path, {"wheel_name": "wheel"}))
 
 
 def test_a_mesh_in_the_wrong_unit_is_refused(tmp_path):

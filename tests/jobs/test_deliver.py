@@ -2,14 +2,17 @@
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from opl import deliver
 from opl.errors import InputError, NoPathError
-from opl.job.load import load
-from opl.pipeline import Outcome
+from opl.files import writing
+from opl.job.load import load_job
+from opl.run.delivery import deliver
+from opl.run.stages import run_job
+from opl.run.values import Refused
 from tests.support.jobs import POST, document, opl, write_job, write_robot, write_trough
 
 PROGRAM = ["V_SHAPE.JBI", "V_SHAPE.csv", "V_SHAPE_contact.svg", "V_SHAPE_joints.svg"]
@@ -34,80 +37,82 @@ def leave_earlier_run(folder):
 
 
 @pytest.fixture(scope="module")
-def job(tmp_path_factory):
-    return load(write_job(tmp_path_factory.mktemp("job")))
+def run(tmp_path_factory):
+    changes = {"search.method": "recursive"}
+    return run_job(load_job(write_job(tmp_path_factory.mktemp("job"), changes)))
 
 
-def outcome_with(job, *names):
-    """An outcome with files, of which only the names matter."""
-    return Outcome(job, files=dict.fromkeys(names, "new\r\n"))
+def with_files(run, *names):
+    """A run with files, of which only the names matter."""
+    return replace(run, files=dict.fromkeys(names, "new\r\n"))
 
 
-def refused(job):
-    return Outcome(job, status="no_path", refusal=NoPathError("no path", ["because"]))
+def refused(run):
+    prepared = run.proven.planned.prepared
+    return Refused(prepared, NoPathError("no path", ["because"]), (), run.seconds)
 
 
 # the folder
 
 
-def test_files_are_written_to_the_byte(job, tmp_path):
-    paths = deliver.deliver(outcome_with(job, "A.JBI"), tmp_path / "new" / "folder")
+def test_files_are_written_to_the_byte(run, tmp_path):
+    paths = deliver(with_files(run, "A.JBI"), tmp_path / "new" / "folder")
     assert [path.name for path in paths] == ["A.JBI", "result.json"]
     assert paths[0].read_bytes() == b"new\r\n"
     assert written(tmp_path / "new" / "folder") == ["A.JBI", "result.json"]
 
 
-def test_a_run_without_a_program_takes_the_earlier_program_away(job, tmp_path):
+def test_a_run_without_a_program_takes_the_earlier_program_away(run, tmp_path):
     leave_earlier_run(tmp_path / "out")
-    deliver.deliver(refused(job), tmp_path / "out")
+    deliver(refused(run), tmp_path / "out")
     assert written(tmp_path / "out") == ["notes.txt", "result.json"]
     assert result_in(tmp_path / "out")["status"] == "no_path"
     assert (tmp_path / "outside.txt").is_file()
 
 
-def test_a_run_with_other_files_takes_the_earlier_ones_away(job, tmp_path):
+def test_a_run_with_other_files_takes_the_earlier_ones_away(run, tmp_path):
     leave_earlier_run(tmp_path / "out")
-    deliver.deliver(outcome_with(job, "V_SHAPE.JBI"), tmp_path / "out")
+    deliver(with_files(run, "V_SHAPE.JBI"), tmp_path / "out")
     assert written(tmp_path / "out") == ["V_SHAPE.JBI", "notes.txt", "result.json"]
     assert (tmp_path / "out" / "V_SHAPE.JBI").read_text() == "new\n"
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"program": null}', '{"program": {"files": 3}}'])
-def test_a_result_that_cannot_be_read_hinders_nothing(job, tmp_path, text):
+def test_a_result_that_cannot_be_read_hinders_nothing(run, tmp_path, text):
     (tmp_path / "result.json").write_text(text)
-    deliver.deliver(outcome_with(job, "A.JBI"), tmp_path)
+    deliver(with_files(run, "A.JBI"), tmp_path)
     assert written(tmp_path) == ["A.JBI", "result.json"]
 
 
-def test_a_write_that_fails_leaves_no_file_of_the_run(job, tmp_path, monkeypatch):
+def test_a_write_that_fails_leaves_no_file_of_the_run(run, tmp_path, monkeypatch):
     class FullDisk(type(tmp_path)):
         def write_bytes(self, data):
             raise OSError(28, "No space left on device")
 
     leave_earlier_run(tmp_path / "out")
-    monkeypatch.setattr(deliver, "Path", FullDisk)
+    monkeypatch.setattr(writing, "Path", FullDisk)
     with pytest.raises(InputError, match="out: cannot be written to: No space left on device"):
-        deliver.deliver(outcome_with(job, "A.JBI", "B.JBI"), tmp_path / "out")
+        deliver(with_files(run, "A.JBI", "B.JBI"), tmp_path / "out")
     assert written(tmp_path / "out") == ["notes.txt"]
 
 
 def test_the_folder_is_checked_before_the_work_and_not_made(tmp_path, monkeypatch):
-    deliver.check_folder(tmp_path / "a" / "b")
+    writing.check_folder(tmp_path / "a" / "b")
     assert list(tmp_path.iterdir()) == []
     monkeypatch.chdir(tmp_path)
-    deliver.check_folder(Path("out/x"))
+    writing.check_folder(Path("out/x"))
     (tmp_path / "file").write_text("")
     (tmp_path / "dangling").symlink_to("nowhere")
     for place in ("file", "file/below", "dangling"):
         with pytest.raises(InputError, match="must be a folder for the files, is something else"):
-            deliver.check_folder(tmp_path / place)
+            writing.check_folder(tmp_path / place)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
 def test_a_folder_without_leave_to_write_is_refused(tmp_path):
     (tmp_path / "closed").mkdir(mode=0o500)
     with pytest.raises(InputError, match="closed: is a folder that cannot be written to"):
-        deliver.check_folder(tmp_path / "closed" / "out")
+        writing.check_folder(tmp_path / "closed" / "out")
 
 
 def test_leave_to_write_is_asked_for(tmp_path, monkeypatch):
@@ -146,7 +151,7 @@ def run_without_path(job, out):
 
 def test_a_trough_too_narrow_for_the_wheel_says_how_deep_the_part_would_cut(tmp_path):
     first, *why = run_without_path(write_trough(tmp_path / "t"), tmp_path / "out")
-    assert first == "no path: no free posture at cutter point 0 (0 of 3 reached)"
+    assert first == "no path: no free configuration at cutter point 0 (0 of 3 reached)"
     assert len(why) == 1
     assert why[0].startswith(
         "cutter points 0 to 2 (pass 1): nothing is free: 100 % part cuts into wheel; the part cuts "
@@ -169,7 +174,7 @@ def test_a_joint_that_ends_short_is_named(tmp_path):
     write_robot(tmp_path / "j" / "tight", {"S": (60, 180)})
     changes = {"robot": "tight", "process.home_deg": [90, -45, -50, 0, 50, -180]}
     first, *why = run_without_path(write_job(tmp_path / "j", changes), tmp_path / "out")
-    assert first.startswith("no path: no free posture at cutter point 0 (0 of 19 reached)")
+    assert first.startswith("no path: no free configuration at cutter point 0 (0 of 19 reached)")
     assert why == ["cutter points 0 to 18 (pass 1): nothing is free: 100 % beyond the limits of S"]
 
 
@@ -187,7 +192,7 @@ def test_an_obstacle_in_the_way_is_named_with_what_hits_it(tmp_path):
 
 
 def test_what_the_planner_overlooks_pybullet_finds_and_no_program_is_written(tmp_path, monkeypatch):
-    monkeypatch.setattr("opl.planning.track_check.find_faults", lambda *arguments: [])
+    monkeypatch.setattr("opl.planning.track_check.colliding_moves", lambda *arguments: [])
     monkeypatch.setattr("opl.planning.track_check.linked", lambda motion, links: motion)
     leave_earlier_run(tmp_path / "out")
     obstacles = [*document()["obstacles"], POST]

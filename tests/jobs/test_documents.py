@@ -1,12 +1,13 @@
 """YAML and JSON as people write them, right and wrong."""
 
 import json
+from typing import ClassVar
 
 import pytest
 
-from opl import documents
-from opl.documents import Document
 from opl.errors import InputError
+from opl.files import documents
+from opl.files.documents import Document
 
 
 class Part(Document):
@@ -128,3 +129,38 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path):
         documents.read(tmp_path / "none.yaml", Sample)
     with pytest.raises(InputError, match="cannot be read: Is a directory"):
         documents.read(tmp_path, Sample)
+
+
+class Wheel(Document):
+    renamed: ClassVar = {"gap_mm": "clearance_mm", "speed": "speed_mm_s"}
+
+    clearance_mm: float
+    speed_mm_s: float = 1.0
+
+
+class Cell(Document):
+    wheels: list[Wheel] = []  # noqa: RUF012, pydantic copies it
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("wheels: [{gap_mm: 3}]\n", "wheels.0.gap_mm: was renamed, write clearance_mm"),
+        (
+            "wheels: [{clearance_mm: 3, speed: 2}]\n",
+            "wheels.0.speed: was renamed, write speed_mm_s",
+        ),
+        (
+            "wheels: [{gap_mm: 3, clearance_mm: 3}]\n",
+            "wheels.0.gap_mm: was renamed, write clearance_mm",
+        ),
+        ("gap_mm: 3\n", "gap_mm: unknown key; known here: wheels"),
+        ("wheels: [{speed_mm_s: 3}]\n", "wheels.0.clearance_mm: is missing"),
+    ],
+)
+def test_a_key_of_an_earlier_version_is_told_its_new_name(tmp_path, text, told):
+    path = tmp_path / "sample.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        documents.read(path, Cell)
+    assert caught.value.message == told

@@ -15,20 +15,17 @@ import trimesh
 import yaml
 from scipy.spatial import KDTree
 
-from opl import pipeline
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
+from opl.files.resources import folder
 from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job, load
-from opl.pipeline import cutter_points
-from opl.program.inform.files import program_jobs
-from opl.program.inform.playback import play
+from opl.job.load import Job, load_job
 from opl.program.pulses import PulseScale
-from opl.proof.prove import profile_of, prove
-from opl.resources import folder
+from opl.proof.prove import prove, reader_of
+from opl.run.surfacing import cut_surface
 from tests.support.bare_cells import with_obstacle
 from tests.support.jobs import opl
 
@@ -47,8 +44,8 @@ class Written:
         job: Its job.
         points: The cutter points of the job.
         file: The program, with result.json beside it.
-        moves: Of each cutter point the number of the posture that grinds it.
-        last: Number of the last posture.
+        moves: Of each cutter point the number of the configuration that grinds it.
+        last: Number of the last configuration.
     """
 
     job: Job
@@ -71,17 +68,17 @@ def written(request, tmp_path_factory):
     content = yaml.safe_load((home / "job.yaml").read_text())
     own = PARTS[request.param]
     content["passes"].update(
-        rows=2, largest_step_mm=12, bow_height_mm=0.09, end_margin_mm=own["end_margin_mm"]
+        rows=2, max_step_mm=12, max_chord_error_mm=0.09, end_margin_mm=own["end_margin_mm"]
     )
     content["search"].update(method="recursive", contact_positions=45)
     content["process"].update(approach_mm=20, home_deg=own["home_deg"])
     (home / "job.yaml").write_text(yaml.safe_dump(content))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "draw", lambda outcome, problem: None)
+        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
         ended = opl("run", home / "job.yaml", "--out", home / "out")
     assert ended.status == 0, ended.err
-    job = load(home / "job.yaml")
-    points = cutter_points(job)
+    job = load_job(home / "job.yaml")
+    points = cut_surface(job).points
     lines = (home / "out" / f"{job.name}.csv").read_text().splitlines()
     labels = [line.split(",")[1] for line in lines[1:]]
     moves = [labels.index(f"{point:.4f}") for point in range(len(points))]
@@ -89,7 +86,7 @@ def written(request, tmp_path_factory):
 
 
 class Text:
-    """A program that is tampered with; postures are told by their numbers."""
+    """A program that is tampered with; configurations are told by their numbers."""
 
     def __init__(self, written):
         self.text = written.file.read_bytes().decode("ascii")
@@ -111,20 +108,20 @@ class Text:
         return self
 
     def place(self, number):
-        """Return where a message says that the move to a posture is."""
+        """Return where a message says that the move to a configuration is."""
         before = self.text[: self.text.index(f"C{number:05d} ")]
         return f"line {before.count(chr(10)) + 1}"
 
     def reorder(self, numbers):
-        """Leave these postures and their moves, in this order, numbered anew."""
-        postures = dict(re.findall(r"C(\d{5})=(.*)\r\n", self.text))
+        """Leave these configurations and their moves, in this order, numbered anew."""
+        configurations = dict(re.findall(r"C(\d{5})=(.*)\r\n", self.text))
         moves = dict(re.findall(r"MOV[JL] C(\d{5}) (.*)\r\n", self.text))
         head, foot = self.text.split("C00000=")[0], self.text.split("MOVJ C00000 ")[0]
-        between = foot[foot.rindex(postures[max(postures)]) :].split("\r\n", 1)[1]
+        between = foot[foot.rindex(configurations[max(configurations)]) :].split("\r\n", 1)[1]
         told = [f"{number:05d}" for number in numbers]
         self.text = (
             re.sub(r"NPOS \d+,", f"NPOS {len(told)},", head)
-            + "".join(f"C{k:05d}={postures[number]}\r\n" for k, number in enumerate(told))
+            + "".join(f"C{k:05d}={configurations[number]}\r\n" for k, number in enumerate(told))
             + between
             + "".join(f"MOVJ C{k:05d} {moves[number]}\r\n" for k, number in enumerate(told))
             + "END\r\n"
@@ -151,7 +148,7 @@ def refuses(proof, *words):
 
 
 def test_the_unharmed_program_is_proven(written):
-    ended = opl("verify", written.job.path, written.file, "--json")
+    ended = opl("verify", written.job.source.label, written.file, "--json")
     assert ended.status == 0, ended.err
     told = json.loads(ended.out)
     assert told["proven"] is True and told["as_written"] is True
@@ -170,7 +167,7 @@ def test_one_pulse_more_is_found_beside_the_result_of_the_run(written, tmp_path)
     pulses = text.pulses(number)
     pulses[4] += 1
     (tmp_path / written.file.name).write_bytes(text.put(number, pulses).text.encode("ascii"))
-    ended = opl("verify", written.job.path, tmp_path / written.file.name)
+    ended = opl("verify", written.job.source.label, tmp_path / written.file.name)
     assert ended.status == 4
     assert "file at" in ended.err and written.file.name in ended.err
     assert "not the bytes that opl run proved" in ended.err
@@ -269,7 +266,7 @@ def test_a_part_two_millimetres_too_big_is_found(written):
         assert refuses(proof, f"collision at {place}", "part and wheel", "into each other")
 
 
-def test_a_limit_that_cuts_the_farthest_posture_is_found(written):
+def test_a_limit_that_cuts_the_farthest_configuration_is_found(written):
     text, robot = Text(written), written.job.cell.robot
     q = np.array([text.angles(number) for number in written.moves])
     point, upper = int(q[:, 0].argmax()), robot.upper.copy()
@@ -281,12 +278,12 @@ def test_a_limit_that_cuts_the_farthest_posture_is_found(written):
 
 
 @pytest.mark.parametrize("written", ["s_shape"], indirect=True)  # the V has one in test_verify.py
-def test_a_limit_crossed_between_two_postures_is_found(written):
+def test_a_limit_crossed_between_two_configurations_is_found(written):
     """On a straight move a joint can go beyond what both ends have; on a joint move none can."""
     text = Text(written).replace(r"MOVJ (C00001) VJ=\S+", r"MOVL \1 V=50.0")
     robot = written.job.cell.robot
-    jobs, _ = program_jobs({"a": text.text.encode("ascii")}, profile_of(written.job))
-    playback, _ = play(jobs, robot, written.job.program)
+    files = {"a": text.text.encode("ascii")}
+    playback = reader_of(written.job).read(files, robot, written.job.program).playback
     end = int(playback.stations[1])
     rest = np.concatenate([playback.q[:1], playback.q[end:]])
     above = playback.q[:end].max(axis=0) - rest.max(axis=0)
@@ -299,27 +296,30 @@ def test_a_limit_crossed_between_two_postures_is_found(written):
     else:
         lower[joint] = rest.min(axis=0)[joint] - below[joint] / 2.0
     narrow = in_cell(written, robot=replace(robot, lower=lower, upper=upper))
-    # as it was written, joint moves between the same postures, it stays within
+    # as it was written, joint moves between the same configurations, it stays within
     q = np.array([Text(written).angles(number) for number in range(written.last + 1)])
     assert (q > lower).all() and (q < upper).all()
     proof = proof_of(written, text, narrow)
     name = robot.joint_names[joint]
-    assert refuses(proof, "limit at way from home", f"joint {name}", "beyond its limit")
+    assert refuses(proof, "limit at free move from home", f"joint {name}", "beyond its limit")
 
 
-def test_a_collision_only_between_two_postures_is_found(written):
+def test_a_collision_only_between_two_configurations_is_found(written):
     text, cell = Text(written), written.job.cell
     q = np.array([text.angles(number) for number in range(written.last + 1)])
 
-    def corners(postures):
-        Ts = forward_kinematics(cell.robot, postures) @ cell.T_flange_workpiece
+    def corners(configurations):
+        Ts = forward_kinematics(cell.robot, configurations) @ cell.T_flange_workpiece
         return transform(Ts[:, None], cell.part.vertices)
 
-    # the corner that, half-way, is farthest from all corners at the written postures
+    # the corner that, half-way, is farthest from all corners at the written configurations
     half_way = corners(q[:2].mean(axis=0)[None])[0]
     distance, _ = KDTree(corners(q).reshape(-1, 3)).query(half_way)
     narrow = with_obstacle(cell, half_way[distance.argmax()], (2e-3, 2e-3, 2e-3), "pin")
     assert not CollisionScene(narrow).collides(q).any()
     proof = proof_of(written, job=replace(written.job, cell=narrow))
-    assert refuses(proof, "collision at way from home", "part and pin", "into each other")
-    assert {finding.where for finding in proof.findings} <= {"way from home", "way home"}
+    assert refuses(proof, "collision at free move from home", "part and pin", "into each other")
+    assert {finding.where for finding in proof.findings} <= {
+        "free move from home",
+        "free move to home",
+    }

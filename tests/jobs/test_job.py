@@ -9,7 +9,7 @@ import trimesh
 from opl.cell.robot import known_robots
 from opl.errors import InputError
 from opl.geometry.frames import inverse
-from opl.job.load import load
+from opl.job.load import load_job
 from tests.support.jobs import (
     GONE,
     V_JOB,
@@ -48,18 +48,18 @@ def one_message(job, *options, status=2):
 
 
 def test_values_are_in_si(tmp_path):
-    job = load(write_job(tmp_path, quick=False))
+    job = load_job(write_job(tmp_path, quick=False))
     wheel = job.cell.wheel
     assert (wheel.width, wheel.radius) == (0.05, 0.15)
     assert wheel.max_roll == pytest.approx(math.pi / 4)
     assert job.passes.max_bow_height == pytest.approx(5e-5)
     assert job.search.max_contact_error == pytest.approx(1e-4)
-    assert job.pace.home == pytest.approx(np.deg2rad([15, -45, -50, 0, 50, -180]))
-    assert job.pace.feed == pytest.approx(0.02)
+    assert job.process.home == pytest.approx(np.deg2rad([15, -45, -50, 0, 50, -180]))
+    assert job.process.feed == pytest.approx(0.02)
 
 
 def test_rounded_matrices_are_made_proper(tmp_path):
-    job = load(write_job(tmp_path))
+    job = load_job(write_job(tmp_path))
     for T in (job.cell.wheel.T_base_contact0, job.cell.T_flange_workpiece):
         assert np.abs(inverse(T) @ T - np.eye(4)).max() < 1e-12
         assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0, abs=1e-12)
@@ -69,25 +69,25 @@ def test_rounded_matrices_are_made_proper(tmp_path):
 def test_files_are_found_beside_the_job(tmp_path, monkeypatch):
     write_job(tmp_path / "part")
     monkeypatch.chdir(tmp_path)
-    assert load(tmp_path / "part" / "job.yaml").cell.part.volume > 0.0
+    assert load_job(tmp_path / "part" / "job.yaml").cell.part.volume > 0.0
 
 
 def test_a_robot_of_ones_own_lies_beside_the_job(tmp_path):
     write_robot(tmp_path / "mine", {"S": (-90, 90)})
-    robot = load(write_job(tmp_path, {"robot": "mine"})).cell.robot
+    robot = load_job(write_job(tmp_path, {"robot": "mine"})).cell.robot
     assert np.rad2deg(robot.lower[0]) == pytest.approx(-90)
 
 
 def test_every_job_that_comes_with_opl_is_valid():
     for path in V_SHAPE.parent.glob("*/job.yaml"):
-        assert load(path).path == path
+        assert load_job(path).source.label == str(path)
     assert V_JOB.is_file()
 
 
 def test_a_job_may_name_its_own_joint_accelerations(tmp_path):
-    assert load(write_job(tmp_path)).cell.robot.acceleration_assumed
+    assert load_job(write_job(tmp_path)).cell.robot.acceleration_assumed
     own = {"process.max_acceleration_deg_s2": [100, 200, 300, 400, 500, 600]}
-    robot = load(write_job(tmp_path, own)).cell.robot
+    robot = load_job(write_job(tmp_path, own)).cell.robot
     assert np.rad2deg(robot.max_acceleration) == pytest.approx([100, 200, 300, 400, 500, 600])
     assert not robot.acceleration_assumed
 
@@ -106,7 +106,7 @@ def test_a_job_may_name_its_own_joint_accelerations(tmp_path):
         ),
         (
             {"wheel.colour": "red"},
-            "wheel.colour: unknown key; known here: T_base_contact0_mm, contact_allowance_mm, "
+            "wheel.colour: unknown key; known here: T_base_contact0_mm, max_belt_penetration_mm, "
             "max_roll_deg, pendant, radius_mm, touched, width_mm",
         ),
         (
@@ -164,8 +164,8 @@ def test_a_job_may_name_its_own_joint_accelerations(tmp_path):
         ),
         (
             {"search.max_contact_error_mm": 0.3},
-            "search.max_contact_error_mm: must be larger than passes.bow_height_mm, which is part "
-            "of it, got 0.3 and 0.3",
+            "search.max_contact_error_mm: must be larger than passes.max_chord_error_mm, which is "
+            "part of it, got 0.3 and 0.3",
         ),
         ({"name": "my part"}, "name: must be 1 to 28 capital letters, digits, _ or -"),
         ({"name": "A\n"}, "name: must be 1 to 28 capital letters, digits, _ or -"),
@@ -190,7 +190,7 @@ def test_a_unit_in_the_key_that_is_not_known_is_told_with_the_one_that_is(tmp_pa
     assert one_message(job).split("\n") == [
         "2 faults",
         "  wheel.width_mm: is missing",
-        "  wheel.width_cm: unknown key; known here: T_base_contact0_mm, contact_allowance_mm, "
+        "  wheel.width_cm: unknown key; known here: T_base_contact0_mm, max_belt_penetration_mm, "
         "max_roll_deg, pendant, radius_mm, touched, width_mm",
     ]
 
@@ -215,7 +215,7 @@ def test_a_home_in_collision_is_refused_with_the_pairs(tmp_path):
 
 
 def test_a_home_with_the_part_in_the_wheel_is_refused(tmp_path):
-    at_home = load(write_job(tmp_path)).cell  # the wheel is put where the part is at home
+    at_home = load_job(write_job(tmp_path)).cell  # the wheel is put where the part is at home
     from opl.cell.robot import forward_kinematics
 
     T = forward_kinematics(at_home.robot, np.deg2rad(document()["process"]["home_deg"]))
@@ -328,7 +328,7 @@ def test_many_faults_read_as_a_list(tmp_path):
 
 def test_load_raises_one_kind_of_error(tmp_path):
     with pytest.raises(InputError) as caught:
-        load(write_job(tmp_path, {"wheel.width_mm": -1}))
+        load_job(write_job(tmp_path, {"wheel.width_mm": -1}))
     assert caught.value.where == str(tmp_path / "job.yaml")
 
 

@@ -3,13 +3,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from opl.documents import check, keys
-from opl.errors import InputError
+from opl.errors import (
+    InputError,
+    OplError,
+    PassTimeError,
+    SettingError,
+    TimeLawError,
+    UnsafeError,
+)
+from opl.files.documents import read
 from opl.job.program import ProgramSection
+from opl.job.refusals import keys_named
+from opl.job.source import Source
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
+from opl.program.export import try_out
 from opl.program.inform import TEMPLATE
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings
-from opl.program.write import try_out
 from tests.support.program_samples import HOME, ROBOT, UNVERIFIED
 
 EYE = "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 180], [0, 0, 0, 1]]"
@@ -18,8 +27,9 @@ EYE = "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 180], [0, 0, 0, 1]]"
 def settings(tmp_path, text, robot=ROBOT):
     path = tmp_path / "job.yaml"
     path.write_text(text)
-    section = check(keys(path), ProgramSection, path)
-    return section.in_si(path, "SAMPLE", section.robot_as_counted(path, robot), HOME)
+    source = Source.of_file(path)
+    section = read(path, ProgramSection)
+    return section.in_si(source, "SAMPLE", section.robot_as_counted(source, robot), HOME)
 
 
 def test_nothing_asked_for_is_a_pulse_job_of_joint_moves(tmp_path):
@@ -44,9 +54,9 @@ def test_every_key_reaches_the_program_in_si(tmp_path):
         positions: user
         user_frame: {{number: 2, T_base_user_mm: {EYE}}}
         accept_unverified_pulses: [T]
-        levels: {{on_wheel: 2, air: 8}}
+        position_levels: {{on_wheel: 2, free_move: 8}}
         acceleration_percent: {{on_wheel: 50}}
-        deceleration_percent: {{air: 30}}
+        deceleration_percent: {{free_move: 30}}
         comment: PART 4711
         at_start: [{{comment: BELT MUST RUN}}]
         before_pass:
@@ -74,9 +84,17 @@ def test_every_key_reaches_the_program_in_si(tmp_path):
     [
         ("controller: DX300", "controller: unknown controller 'DX300'; known: DX100, DX200"),
         ("accept_unverified_pulses: [Z]", "no such joint 'Z'; have: S, L, U, R, B, T"),
+        ("tool: 64", "program.tool: must be 0 to 63, got 64"),
+        (
+            f"positions: user\nuser_frame: {{number: 64, T_base_user_mm: {EYE}}}",
+            "program.user_frame.number: must be 1 to 63, got 64",
+        ),
         ("positions: user", "user_frame goes with positions: user, and only there"),
         ("tool: 2\nmotion: straight", "need T_flange_tool_mm, the data of tool 2"),
-        ("controller: KRL\nlevels: {air: 2}", "levels: is for Yaskawa controllers, not for KUKA"),
+        (
+            "controller: KRL\nposition_levels: {free_move: 2}",
+            "position_levels: is for Yaskawa controllers, not for KUKA",
+        ),
         ("controller: RAPID\npositions: base", "positions: is for Yaskawa controllers"),
         ("at_end: [{output: 3}]", "state .on or off. goes with output and wait_input"),
         ("at_end: [{comment: A, state: on}]", "goes with output and wait_input, and only there"),
@@ -84,7 +102,7 @@ def test_every_key_reaches_the_program_in_si(tmp_path):
         ("at_end: [{}]", "needs exactly one of"),
         ("at_end: [{dwell_s: 1, timeout_s: 2}]", "timeout_s goes with wait_input only"),
         ("at_end: [{dwell: 1}]", "unknown key; known here: call, comment, dwell_s"),
-        ("levels: {on_wheel: 9}", "levels.on_wheel: must be at most 8, got 9"),
+        ("position_levels: {on_wheel: 9}", "position_levels.on_wheel: must be at most 8, got 9"),
         (f"T_flange_tool_mm: {EYE.replace('[1, 0', '[2, 0')}", "away from a rotation"),
     ],
 )
@@ -97,7 +115,7 @@ def test_section_that_makes_no_sense_is_refused_with_its_key(tmp_path, text, mes
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"tool": 64}, "program.tool: must be 0 to 63, got 64"),
+        ({"tool": 64}, "tool: must be 0 to 63, got 64"),
         ({"title": 33 * "X"}, "program comment: has 33 characters"),
         ({"controller": "NX100", "tool": 24}, "must be 0 to 23"),
         ({"acceleration": ByKind(on_wheel=10)}, "ACC must be 20 to 100, got 10"),
@@ -111,6 +129,24 @@ def test_what_the_controller_does_not_take_is_told_before_planning(changes, mess
     try_out("SAMPLE", HOME, ROBOT, ProgramSettings())
     with pytest.raises(InputError, match=message):
         try_out("SAMPLE", HOME, ROBOT, ProgramSettings(**changes))
+
+
+@pytest.mark.parametrize(
+    ("error", "kind", "message"),
+    [
+        (SettingError("tool", "must be 0"), InputError, "job: program.tool: must be 0"),
+        (
+            PassTimeError("too slow"),
+            OplError,
+            "too slow; raise process.feed_mm_s, or write",
+        ),
+        (TimeLawError("no law"), UnsafeError, "no law; raise process.max_acceleration_deg_s2"),
+    ],
+)
+def test_refusals_of_the_rooms_below_get_the_keys_of_the_job(error, kind, message):
+    with pytest.raises(kind, match=message) as caught, keys_named(Source("job", Path())):
+        raise error
+    assert caught.type is kind and caught.value.exit_status == error.exit_status
 
 
 def test_pulse_ratios_of_the_controller_make_acceptance_needless(tmp_path):

@@ -4,7 +4,6 @@ import csv
 import json
 import subprocess
 import sys
-from contextlib import nullcontext
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
@@ -13,14 +12,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import forward_kinematics, load_robot
-from opl.deliver import deliver
-from opl.job.load import load
-from opl.pipeline import cutter_points, pose_problem, run
-from opl.planning.starts import plan_recursive
+from opl.job.load import load_job
+from opl.planning.multi_start import plan_recursive
+from opl.run.delivery import deliver
+from opl.run.preparing import prepare
+from opl.run.stages import run_job
+from opl.run.surfacing import cut_surface
 from tests.support.fcl_scene import margin_along
 from tests.support.jobs import document, opl, write_job
 
-# a plate of the machine's frame above the wheel, across the straight way from home
+# a plate of the machine's frame above the wheel, across the straight move from home
 HOOD = {"name": "hood", "box_mm": [456, 245, 30], "at_mm": [827, 277, 734]}
 # two passes the same way, so that the robot comes back under the plate between them
 BACK_UNDER_IT = {
@@ -31,8 +32,8 @@ BACK_UNDER_IT = {
     "search.contact_positions": 12,
     "search.max_contact_step": 20,
     "search.max_contact_error_mm": 1.5,
-    "passes.bow_height_mm": 1.0,
-    "passes.largest_step_mm": 60,
+    "passes.max_chord_error_mm": 1.0,
+    "passes.max_step_mm": 60,
     # so near the wheel that ways in the air graze the plate
     "process.approach_mm": 10,
 }
@@ -48,13 +49,13 @@ def under_the_hood():
     """Run the job under the hood; return what became of it, the job file and the folder."""
     home = Path(mkdtemp())
     job = write_job(home / "j", {**with_bodies(HOOD), **BACK_UNDER_IT})
-    outcome = run(load(job))
-    deliver(outcome, home / "out")
-    return outcome, job, home / "out"
+    run = run_job(load_job(job))
+    deliver(run, home / "out")
+    return run, job, home / "out"
 
 
 def table(folder):
-    """Return the kind of each move of the program, and its postures in [rad]."""
+    """Return the kind of each move of the program, and its configurations in [rad]."""
     with (folder / "HOOD.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     joints = [name for name in rows[0] if name.endswith("_deg")][:6]
@@ -73,40 +74,40 @@ def test_a_frame_across_the_straight_way_is_led_around_and_proven():
 
 
 def test_a_plate_between_two_passes_is_led_around():
-    outcome, _, out = under_the_hood()
+    run, _, out = under_the_hood()
     kinds, q = table(out)
     first, last = kinds.index("link") - 1, len(kinds) - 1 - kinds[::-1].index("link")
     assert kinds[first] == "retract" and set(kinds[first + 1 : last + 1]) == {"link"}
-    way, cell = q[first : last + 1], outcome.job.cell
+    way, cell = q[first : last + 1], run.surfaced.job.cell
     assert len(way) > 2
     assert margin_along(cell, way[[0, -1]], 2.0) < 0.0
     assert margin_along(cell, way, 2.0) > 0.0
 
 
-def test_a_program_with_postures_on_the_way_is_read_back_and_proven():
+def test_a_program_with_configurations_on_the_way_is_read_back_and_proven():
     _, job, out = under_the_hood()
     ended = opl("verify", job, out / "HOOD.JBI")
     assert ended.status == 0, ended.err
 
 
 def planned(job):
-    """Return the postures of the motion of a job, as bytes; for another process."""
-    loaded = load(Path(job))
-    problem = pose_problem(loaded, cutter_points(loaded), lambda stage: nullcontext())
+    """Return the configurations of the motion of a job, as bytes; for another process."""
+    loaded = load_job(Path(job))
+    problem = prepare(cut_surface(loaded)).problem
     return plan_recursive(problem, loaded.search.start).motion.q.tobytes()
 
 
 def test_another_process_finds_the_same_ways():
-    outcome, job, _ = under_the_hood()
+    run, job, _ = under_the_hood()
     script = f"from tests.jobs import test_links_run as t;print(t.planned({str(job)!r}).hex())"
-    told = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-c", script],
         capture_output=True,
         text=True,
         check=True,
         cwd=Path(__file__).parents[2],
     ).stdout
-    assert bytes.fromhex(told) == outcome.plan.motion.q.tobytes()
+    assert bytes.fromhex(result) == run.proven.planned.plan.motion.q.tobytes()
 
 
 def cage():
@@ -143,16 +144,16 @@ def cage():
 
 
 def test_a_home_that_nothing_leads_out_of_is_refused_and_the_pair_named(tmp_path, monkeypatch):
-    monkeypatch.setattr("opl.motion.links.MOST_ASKED", 3000)
+    monkeypatch.setattr("opl.motion.free_move_search.MOST_CHECKED", 3000)
     job = write_job(tmp_path / "j", {**with_bodies(*cage()), "process.home_deg": SIDEWAYS})
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 3
-    told = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
-    message, *ways, advice = told["reasons"]
-    assert message.endswith("there is no way through the air")
-    assert ways[0].startswith("way from home: ")
-    assert " and cage " in ways[0]
-    assert advice.startswith("would help: another home posture, or cage ")
-    assert all(line in ended.err for line in told["reasons"])
+    result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    message, *moves, advice = result["reasons"]
+    assert message.endswith("no collision-free move to, from or between them was found")
+    assert moves[0].startswith("free move from home: ")
+    assert " and cage " in moves[0]
+    assert advice.startswith("would help: another home configuration, or cage ")
+    assert all(line in ended.err for line in result["reasons"])
     # nothing at the wheel is to blame, so nothing there was tried
-    assert told["remedies"] == []
+    assert result["remedies"] == []

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from opl.job.load import load
-from opl.pipeline import cutter_points
-from opl.remedies import _fed_the_other_way, _other_side, find_remedies
+from opl.job.load import load_job
+from opl.run.remedies import _fed_in_reverse, _other_side, find_remedies
+from opl.run.surfacing import cut_surface
 from tests.support.jobs import POST, opl, write_job, write_trough
 from tests.support.planned import v_job
 
@@ -28,8 +28,8 @@ def test_a_narrower_wheel_opens_a_trough_and_is_told(tmp_path):
 
 def test_a_post_before_the_wheel_is_avoided_on_another_side_of_it(tmp_path):
     path = write_job(tmp_path, {"obstacles": [POST]})
-    job = load(path)
-    told = find_remedies(job, cutter_points(job))
+    job = load_job(path)
+    told = find_remedies(job, cut_surface(job).points)
     (remedy,) = [line for line in told if "on another side of the wheel" in line]
     # tried from outside: the frame that the remedy names, written into the job
     degrees = float(remedy.split(" degrees round")[0].rsplit(" ", 1)[1])
@@ -45,7 +45,7 @@ def test_a_post_before_the_wheel_is_avoided_on_another_side_of_it(tmp_path):
     assert opl("run", changed, "--out", tmp_path / "out").status == 0
 
 
-@pytest.mark.parametrize("kind", [_other_side, _fed_the_other_way])
+@pytest.mark.parametrize("kind", [_other_side, _fed_in_reverse])
 def test_another_side_moves_the_contact_and_leaves_the_wheel_where_it_is(kind):
     cell = v_job().cell
     now = cell.wheel.T_base_contact0

@@ -11,7 +11,7 @@ import pytest
 from opl.cell.robot import load_robot
 from opl.cell.urdf_import import import_urdf
 from opl.errors import InputError, UnsafeError
-from opl.job.load import load
+from opl.job.load import load_job
 from opl.program.moves import Move, Program
 from opl.program.pulses import PulseScale, require_known
 from opl.program.settings import ProgramSettings
@@ -59,8 +59,8 @@ UR10E = {"robot": "ur10e", "process.home_deg": [0.0, -110.0, 110.0, -90.0, -90.0
     [
         (
             {**UR10E, "robot": "mine", **program(positions="base")},
-            r"program\.positions: must be pulses: poses of DX200 name a posture as that of an arm "
-            r"with a spherical wrist, which mine has not",
+            r"program\.positions: must be pulses: poses of DX200 name a configuration as that of "
+            r"an arm with a spherical wrist, which mine has not",
         ),
         (
             {**IRB2600, **program()},
@@ -82,17 +82,18 @@ def test_a_program_in_pulses_nobody_knows_is_refused(changes, message, tmp_path)
     if changes["robot"] == "mine":
         import_urdf(load_robot("ur10e").urdf, "mine", tmp_path / "mine")
     with pytest.raises(InputError, match=message):
-        load(write_job(tmp_path, changes))
+        load_job(write_job(tmp_path, changes))
 
 
 def test_a_yaskawa_arm_without_ratios_may_be_told_in_poses_or_given_them(tmp_path):
     home = {"robot": "gp12", "process.home_deg": [15, -45, -50, 0, -50, 0]}
     assert (
-        load(write_job(tmp_path, {**home, **program(positions="base")})).cell.robot.name == "gp12"
+        load_job(write_job(tmp_path, {**home, **program(positions="base")})).cell.robot.name
+        == "gp12"
     )
     ratios = "".join(f"\n  - {{name: {name}, per_degree: 1000}}" for name in "SLURBT")
     (tmp_path / "mine.yaml").write_text(f"robot: gp12\nsource: read at the pendant\naxes:{ratios}")
-    robot = load(write_job(tmp_path, {**home, **program(pulse_ratios="mine.yaml")})).cell.robot
+    robot = load_job(write_job(tmp_path, {**home, **program(pulse_ratios="mine.yaml")})).cell.robot
     assert robot.missing_pulses == robot.unverified_pulses == ()
     np.testing.assert_allclose(np.deg2rad(robot.pulses_per_radian), 1000.0)
 
@@ -104,23 +105,31 @@ def test_unknown_ratios_give_no_pulses():
         scale.to_pulses(HOME)
     assert np.isnan(scale.to_angles(np.ones(6))).all()
     with pytest.raises(InputError, match="no pulses per degree are known of A1, A2"):
-        require_known(load_robot("kr16"), "program.pulse_ratios")
-    require_known(load_robot("mh24"), "program.pulse_ratios")
+        require_known(load_robot("kr16"))
+    require_known(load_robot("mh24"))
 
 
 def test_a_gp12_in_poses_still_keeps_its_limits(tmp_path):
     beyond = {"robot": "gp12", "process.home_deg": [175, -45, -50, 0, -50, 0]}
     with pytest.raises((InputError, UnsafeError), match=r"joint S must be in -170 to 170, got 175"):
-        load(write_job(tmp_path, {**beyond, **program(positions="base")}))
+        load_job(write_job(tmp_path, {**beyond, **program(positions="base")}))
 
 
 @pytest.mark.parametrize(("maker", "height"), [("krl", 640.0), ("rapid", 640.0)])
 def test_straight_moves_are_told_from_where_the_controller_counts(maker, height):
-    post = importlib.import_module(f"opl.program.makers.{maker}").POST
+    post = importlib.import_module(f"opl.program.{maker}").POST
     q = np.array([[0.0, 0, 0, 0, 0, 0], [0.1, 0, 0, 0, 0, 0]])
     moves = tuple(
-        Move(posture, 0.1, exact_stop=True, on_wheel=False, posture=k, duration=d, straight=k > 0)
-        for k, (posture, d) in enumerate(zip(q, (None, 1.0), strict=True))
+        Move(
+            configuration,
+            0.1,
+            exact_stop=True,
+            on_wheel=False,
+            motion_index=k,
+            duration=d,
+            straight=k > 0,
+        )
+        for k, (configuration, d) in enumerate(zip(q, (None, 1.0), strict=True))
     )
     settings = ProgramSettings(controller=maker.upper())
     written = post.write(Program("SAMPLE", moves=moves), load_robot("kr16"), settings, DATE)

@@ -7,9 +7,9 @@ import shutil
 import numpy as np
 import yaml
 
-from opl.job.load import load
-from opl.planning.fixed import keep_contact
-from opl.resources import folder
+from opl.files.resources import folder
+from opl.job.load import load_job
+from opl.planning.fixed_contact import keep_contact
 from tests.support.jobs import opl
 from tests.support.planned import problem_of, with_positions
 
@@ -18,7 +18,7 @@ TABLE_5 = [0.1099, 0.2345, 0.2446, 0.9062, 0.7344, 0.2375]  # of the paper
 
 
 def test_contact_fixed_it_is_refused_at_more_than_half_of_its_points_which_are_named():
-    problem = problem_of(with_positions(load(S_SHAPE / "job.yaml"), 3))
+    problem = problem_of(with_positions(load_job(S_SHAPE / "job.yaml"), 3))
     fixed = keep_contact(problem)
     assert not fixed.feasible
     told = re.fullmatch(
@@ -39,7 +39,7 @@ def test_with_the_contact_free_it_is_ground_verified_and_calmer_than_the_paper(t
     job = tmp_path / "part" / "job.yaml"
     content = yaml.safe_load(job.read_text())
     # five rows with all their points take a minute
-    content["passes"].update(rows=1, bow_height_mm=0.08, largest_step_mm=10)
+    content["passes"].update(rows=1, max_chord_error_mm=0.08, max_step_mm=10)
     content["search"].update(method="recursive", contact_positions=45)
     job.write_text(yaml.safe_dump(content))
     ended = opl("run", job, "--out", tmp_path / "out")

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from opl.job.load import load
-from opl.resources import folder
-from opl.surfacing import cut_surface
+from opl.files.resources import folder
+from opl.job.load import load_job
+from opl.run.surfacing import cut_surface
 from tests.support.jobs import GONE, opl, write_job
 
 PARTS = ("v_shape", "s_shape", "faucet", "turbine_blade", "bent_tube")
@@ -141,7 +141,7 @@ def test_points_are_the_same_to_the_byte_every_time(tmp_path):
 
 @pytest.mark.parametrize("part", PARTS)
 def test_cutter_points_of_every_part_lie_on_its_solid_with_normals_outward(part):
-    job = load(job_of(part))
+    job = load_job(job_of(part))
     Ts = cut_surface(job).points.Ts_workpiece_cutter
     solid = trimesh.Trimesh(job.cell.part.vertices, job.cell.part.faces, process=False)
     centres = solid.triangles.mean(axis=1)
@@ -169,7 +169,7 @@ def test_faces_of_a_mesh_need_its_unit():
     mesh = folder("workpieces") / "v_shape" / "v_shape.stl"
     ended = opl("faces", mesh)
     assert ended.status == 2
-    assert "a mesh does not say its unit" in ended.err
+    assert "a mesh file has no unit" in ended.err
     told = json.loads(opl("faces", mesh, "--unit", "mm", "--json").out)
     assert [one["id"] for one in told] == [1, 2, 3, 4]
     top = told[2]
@@ -190,8 +190,8 @@ def mesh_job(home, **changes):
 
 def test_a_region_of_a_mesh_can_be_ground(tmp_path):
     path = mesh_job(tmp_path)
-    smooth = cut_surface(load(write_job(tmp_path / "smooth"))).points
-    meshed = cut_surface(load(path)).points
+    smooth = cut_surface(load_job(write_job(tmp_path / "smooth"))).points
+    meshed = cut_surface(load_job(path)).points
     assert meshed.n_passes == smooth.n_passes
     for one in (smooth, meshed):
         np.testing.assert_allclose(
@@ -255,7 +255,8 @@ def test_a_solid_that_is_open_flat_or_crosses_itself_is_refused(tmp_path, break_
 
 
 def test_who_lacks_the_extra_is_told_how_to_get_it(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "OCP.TopAbs", None)  # as if it were not installed
+    monkeypatch.setitem(sys.modules, "OCP.TopoDS", None)  # as if it were not installed
+    monkeypatch.delitem(sys.modules, "opl.geometry.cad", raising=False)
     (tmp_path / "part.step").write_text("ISO-10303-21;")
     job = write_job(tmp_path, {"workpiece.surface": "part.step"})
     for ended in (opl("faces", tmp_path / "part.step"), opl("check", job)):
@@ -303,7 +304,7 @@ def test_a_face_without_area_is_refused(tmp_path, changes, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"passes.scallop_mm": 0.01}, "needs either pitch_mm or scallop_mm"),
+        ({"passes.scallop_height_mm": 0.01}, "needs either pitch_mm or scallop_height_mm"),
         ({"passes.kind": "along_u"}, "plane_normal goes with kind: sections"),
         ({"passes.order": "spiral"}, "passes.order: must be"),
         ({"passes.repeats": 0}, "passes.repeats: must be at least 1"),

@@ -14,22 +14,23 @@ import pytest
 import trimesh
 import yaml
 
-from opl import pipeline
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
-from opl.job.load import load
-from opl.program.inform.files import load_jobs
-from opl.program.inform.playback import play
+from opl.job.load import load_job
+from opl.program.inform.parse import decode, read_jobs
+from opl.program.inform.playback import play_jobs
 from opl.program.inform.post import write_jobs
 from opl.program.profiles import DX200
 from opl.program.pulses import PulseScale
 from opl.proof.digest import digests_in
+from opl.run import stages
+from opl.run.stages import run_job
 from tests.support.jobs import V_SHAPE, opl, write_job, write_robot
 
 # two rows of the V, few contact positions, long steps, and a home near the wheel
 FEW = {
     "passes.rows": 2,
-    "passes.largest_step_mm": 12,
+    "passes.max_step_mm": 12,
     "search.contact_positions": 40,
     "search.method": "recursive",
     "process.approach_mm": 20,
@@ -44,7 +45,7 @@ HOMES = []
 def _no_pictures():
     """Leave the pictures out: they take longer than the proof."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "draw", lambda outcome, problem: None)
+        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
         yield
 
 
@@ -68,13 +69,13 @@ def _tidy_up():
 
 @cache
 def columns():
-    """Return the table of the short program: one row a posture."""
+    """Return the table of the short program: one row a configuration."""
     lines = (planned() / "out" / "V_SHAPE.csv").read_text().splitlines()
     return [dict(zip(lines[0].split(","), line.split(","), strict=True)) for line in lines[1:]]
 
 
 def ground(n):
-    """Return the number of the posture that grinds a cutter point."""
+    """Return the number of the configuration that grinds a cutter point."""
     return next(k for k, row in enumerate(columns()) if row["cutter_point"] == f"{n:.4f}")
 
 
@@ -153,9 +154,9 @@ def test_a_run_ends_with_reading_back_what_it_writes():
     assert 0.0 < proof["largest_rounding_mm"] < 0.05
 
 
-def test_proven_and_written_postures_are_one():
-    scale = PulseScale.of(load(planned() / "job.yaml").cell.robot)
-    (job,) = load_jobs(planned() / "out" / "V_SHAPE.JBI")
+def test_proven_and_written_configurations_are_one():
+    scale = PulseScale.of(load_job(planned() / "job.yaml").cell.robot)
+    (job,) = read_jobs(decode((planned() / "out" / "V_SHAPE.JBI").read_bytes())[0])
     written = np.array([position.values for position in job.positions])
     proven = np.array([[float(row[f"{n}_deg"]) for n in "SLURBT"] for row in columns()])
     counted = np.deg2rad(proven) * scale.pulses_per_radian
@@ -204,7 +205,7 @@ def test_one_pulse_count_changed_by_200_is_found(tmp_path, joint):
 def test_a_swapped_branch_in_the_middle_is_found(tmp_path):
     number = ground(20)
     text = Text()
-    robot = load(planned() / "job.yaml").cell.robot
+    robot = load_job(planned() / "job.yaml").cell.robot
     scale = PulseScale.of(robot)
     q = scale.to_angles(np.array(text.pulses(number)))
     slots = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)
@@ -240,19 +241,26 @@ def test_full_speed_on_the_wheel_is_found(tmp_path):
     assert refuses(ended, "speed at pass 1", "times the feed")
 
 
+@pytest.mark.parametrize("line", ["TIMER T=2.00", "WAIT IN#(1)=ON", "PAUSE"])
+def test_standing_still_on_the_wheel_is_found(tmp_path, line):
+    text = Text().replace(rf"(MOVJ C{ground(20):05d} .*\r\n)", rf"\1{line}\r\n")
+    ended = verify(tmp_path, text)
+    assert refuses(ended, "wait at pass 1, cutter point 20", "stands still on the wheel", line)
+
+
 def test_a_fast_first_move_and_rounded_corners_are_found(tmp_path):
     text = Text().replace(r"C00000 VJ=5.00", "C00000 VJ=50.00")
     text.replace(r"(C00001 VJ=\S+) PL=0", r"\1 PL=8")
     ended = verify(tmp_path, text)
     assert refuses(ended, "speed at V_SHAPE line", "VJ=50")
-    assert refuses(ended, "level at way from home", "PL=0 at most", "got PL=8")
+    assert refuses(ended, "level at free move from home", "PL=0 at most", "got PL=8")
 
 
 def test_a_program_that_goes_elsewhere_than_home_is_found(tmp_path):
     text = Text()
     pulses = text.pulses(0)
     pulses[0] += 2000
-    assert refuses(verify(tmp_path, text.put(0, pulses)), "home at way from home", "joint S")
+    assert refuses(verify(tmp_path, text.put(0, pulses)), "home at free move from home", "joint S")
 
 
 @pytest.mark.parametrize(
@@ -298,9 +306,9 @@ def test_a_limit_crossed_between_two_points_is_found(tmp_path):
     text = Text().replace(r"MOVJ (C00001) VJ=\S+", r"MOVL \1 V=50.0")
     program = tmp_path / "V_SHAPE.JBI"
     program.write_bytes(text.text.encode("ascii"))
-    job = load(planned() / "job.yaml")
-    (read,) = load_jobs(program)
-    playback, _ = play({read.name: read}, job.cell.robot, job.program)
+    job = load_job(planned() / "job.yaml")
+    (read,) = read_jobs(decode(program.read_bytes())[0])
+    playback, _ = play_jobs({read.name: read}, job.cell.robot, job.program)
     end = int(playback.stations[1])
     way = playback.q[: end + 1]
     rest = np.concatenate([playback.q[:1], playback.q[end:]])
@@ -312,19 +320,19 @@ def test_a_limit_crossed_between_two_points_is_found(tmp_path):
     lower = float(np.rad2deg(job.cell.robot.lower[joint]))
     write_robot(tmp_path / "job" / "arm", {name: (lower, float(limit))})
     ended = verify(tmp_path, text, {"robot": "arm"})
-    assert refuses(ended, "limit at way from home", f"joint {name}", "beyond its limit")
+    assert refuses(ended, "limit at free move from home", f"joint {name}", "beyond its limit")
 
 
 def test_a_collision_only_between_two_points_is_found(tmp_path):
-    cell = load(planned() / "job.yaml").cell
+    cell = load_job(planned() / "job.yaml").cell
     scale = PulseScale.of(cell.robot)
     q = [scale.to_angles(np.array(Text().pulses(k))) for k in (0, 1)]
     middle = forward_kinematics(cell.robot, (q[0] + q[1]) / 2.0) @ cell.T_flange_workpiece
     at = (middle[:3, :3] @ cell.part.vertices.mean(axis=0) + middle[:3, 3]) * 1e3
     plate = {"name": "plate", "box_mm": [2, 60, 2], "at_mm": at.round(1).tolist()}
     ended = verify(tmp_path, Text(), {"obstacles": [plate]})
-    assert refuses(ended, "collision at way from home", "part and plate")
-    assert "pass 1" not in ended.err and "way home" not in ended.err
+    assert refuses(ended, "collision at free move from home", "part and plate")
+    assert "pass 1" not in ended.err and "free move to home" not in ended.err
 
 
 # programs in parts, and other ways to write
@@ -334,11 +342,11 @@ def test_a_collision_only_between_two_points_is_found(tmp_path):
 def parts():
     """Return the two-row program in parts, as a controller of few steps takes it."""
     home = planned(short=False)
-    job = load(home / "job.yaml")
-    outcome = pipeline.run(job)
-    assert outcome.file.proven
-    few = replace(DX200, step_limit=len(outcome.program.moves) * 2 // 3)
-    written = write_jobs(outcome.program, job.cell.robot, job.program, few, datetime(2024, 1, 1))
+    job = load_job(home / "job.yaml")
+    run = run_job(job)
+    assert run.read_back.proven
+    few = replace(DX200, step_limit=len(run.program.moves) * 2 // 3)
+    written = write_jobs(run.program, job.cell.robot, job.program, few, datetime(2024, 1, 1))
     folder = home / "parts"
     folder.mkdir()
     for name, text in written.files.items():
@@ -412,18 +420,17 @@ def test_a_job_for_another_maker_is_refused(tmp_path):
 
 
 def test_a_run_that_writes_something_else_writes_nothing(tmp_path, monkeypatch):
-    honest = pipeline.write_program
+    honest = stages.render_program
 
-    def dishonest(outcome, verified):
-        program = honest(outcome, verified)
-        lines = outcome.files["V_SHAPE.JBI"].split("\r\n")
+    def dishonest(proven):
+        program, files = honest(proven)
+        lines = files["V_SHAPE.JBI"].split("\r\n")
         k = next(k for k, line in enumerate(lines) if line.startswith("C00010="))
         s, rest = lines[k].removeprefix("C00010=").split(",", 1)
         lines[k] = f"C00010={int(s) + 1},{rest}"
-        outcome.files["V_SHAPE.JBI"] = "\r\n".join(lines)
-        return program
+        return program, {**files, "V_SHAPE.JBI": "\r\n".join(lines)}
 
-    monkeypatch.setattr(pipeline, "write_program", dishonest)
+    monkeypatch.setattr(stages, "render_program", dishonest)
     job = write_job(tmp_path, COARSE)
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 4 and "file at V_SHAPE line" in ended.err

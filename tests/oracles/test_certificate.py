@@ -25,7 +25,7 @@ def cost_of(ladder, rows, cost):
     on_wheel = ~ladder.off_wheel
     sliding = np.abs(np.diff(t)) / cost.contact_speed
     turning = (turned / cost.max_speed).max(axis=1)
-    seconds = np.maximum(np.maximum(cost.step_seconds, turning), sliding)
+    seconds = np.maximum(np.maximum(cost.edge_seconds, turning), sliding)
     return float(
         (turned @ cost.joint_weights).sum()
         + cost.contact_weight * np.abs(np.diff(t))[on_wheel].sum()
@@ -40,7 +40,7 @@ def random_cost(ladder, seed):
         joint_weights=random.uniform(0.0, 2.0, 6),
         contact_weight=float(random.uniform(0.0, 0.3)),
         time_weight=float(random.uniform(0.0, 0.5)),
-        step_seconds=np.where(ladder.off_wheel, 0.0, random.uniform(0.0, 1.0)),
+        edge_seconds=np.where(ladder.off_wheel, 0.0, random.uniform(0.0, 1.0)),
         max_speed=random.uniform(0.5, 2.0, 6),
         contact_speed=float(random.uniform(1.0, 10.0)),
         node_cost=random.uniform(0.0, 0.5, ladder.free.shape),
@@ -197,7 +197,7 @@ def test_the_smoothest_track_of_a_large_field_is_a_shortest_path_of_scipy():
                         cost.joint_weights,
                         cost.contact_weight,
                         cost.time_weight,
-                        cost.step_seconds[column : column + 1],
+                        cost.edge_seconds[column : column + 1],
                         cost.max_speed,
                         cost.contact_speed,
                         np.stack([np.zeros(n_rows), cost.node_cost[column + 1]]),

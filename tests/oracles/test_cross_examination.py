@@ -1,6 +1,7 @@
-"""Cross-examination: coal, PyBullet and fcl asked the same of random postures of the V and S cells.
+"""Cross-examination: coal, PyBullet and fcl asked the same of random configurations of the V and S
+cells.
 
-600 postures each; `python tests/test_cross_examination.py` asks 2000 and prints the counts.
+600 configurations each; `python tests/test_cross_examination.py` asks 2000 and prints the counts.
 """
 
 from dataclasses import dataclass
@@ -13,12 +14,12 @@ from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import part_tree, signed_wheel_distance
-from opl.job.load import load
-from opl.pipeline import cutter_points
-from opl.resources import folder
+from opl.files.resources import folder
+from opl.job.load import load_job
+from opl.run.surfacing import cut_surface
 from opl.verification.replay import GAP_ACCURACY
 from opl.verification.world import World
-from tests.support.bare_cells import random_postures
+from tests.support.bare_cells import random_configurations
 from tests.support.fcl_scene import FclScene
 
 PARTS = ("v_shape", "s_shape")
@@ -33,7 +34,7 @@ TOO_NEAR = 3e-5
 
 @dataclass(frozen=True)
 class Examined:
-    """What was answered of each posture.
+    """What was answered of each configuration.
 
     Attributes:
         collides: By library, shape (n,) of bool.
@@ -49,11 +50,11 @@ class Examined:
     gap: np.ndarray
 
 
-def postures_of_interest(job, points, count):
-    """Return random postures: a quarter anywhere, the others about postures on the wheel."""
+def configurations_of_interest(job, points, count):
+    """Return random configurations: a quarter anywhere, the others near some on the wheel."""
     random = np.random.default_rng(0)
     robot, n = job.cell.robot, count // 4
-    anywhere = random_postures(robot, n)
+    anywhere = random_configurations(robot, n)
     column = random.integers(len(points), size=20 * count)
     t = random.uniform(-1.0, 1.0, len(column)) * job.cell.wheel.last_position
     Ts = job.cell.Ts_base_flange(t, points.Ts_workpiece_cutter[column])
@@ -70,18 +71,18 @@ def postures_of_interest(job, points, count):
 
 @cache
 def examined(part, count=COUNT):
-    """Ask all libraries about the same postures."""
-    job = load(folder("workpieces") / part / "job.yaml")
+    """Ask all libraries about the same configurations."""
+    job = load_job(folder("workpieces") / part / "job.yaml")
     cell = job.cell
-    postures = postures_of_interest(job, cutter_points(job), count)
-    Ts = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, postures))
+    configurations = configurations_of_interest(job, cut_surface(job).points, count)
+    Ts = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, configurations))
     exact = signed_wheel_distance(part_tree(cell.part), cell.wheel, Ts, 0.02)
     fcl_scene = FclScene(cell)
-    by_fcl = [min(fcl_scene.clearances(q).values(), default=np.inf) for q in postures]
+    by_fcl = [min(fcl_scene.clearances(q).values(), default=np.inf) for q in configurations]
     by_bullet, as_held_to, gap = [], [], []
     with World(cell) as world:
         pairs = world.pairs()
-        for q in postures:
+        for q in configurations:
             world.move_to(q)
             beyond = np.array(
                 [
@@ -100,8 +101,8 @@ def examined(part, count=COUNT):
     }
     collides = {name: margin <= 0.0 for name, margin in margins.items()}
     scene = CollisionScene(cell)
-    collides["coal"] = scene.collides(postures)
-    collides["the planner"] = scene.for_second_opinion().collides(postures)
+    collides["coal"] = scene.collides(configurations)
+    collides["the planner"] = scene.for_second_opinion().collides(configurations)
     return Examined(collides, margins, exact, np.array(gap))
 
 
@@ -151,7 +152,7 @@ def main():
     for part in PARTS:
         found = examined(part, 2000)
         counts = {name: int(hits.sum()) for name, hits in found.collides.items()}
-        print(f"{part}: of {len(found.exact)} postures collide {counts}")
+        print(f"{part}: of {len(found.exact)} configurations collide {counts}")
         for second in ("PyBullet", "fcl"):
             differ = disagreements(found, "coal", second)
             most = 1e3 * np.abs(found.margins[second][differ]).max(initial=0.0)

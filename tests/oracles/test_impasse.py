@@ -44,7 +44,7 @@ def test_impasses_are_the_smallest_runs_that_no_track_passes():
     assert told > 20
 
 
-def test_a_jump_of_all_postures_is_the_impasse():
+def test_a_jump_of_all_configurations_is_the_impasse():
     q = np.zeros((6, 3, 6))
     q[4:, :, 2] = 2.0
     ladder = Ladder(

@@ -34,12 +34,12 @@ ODD_ARM = SphericalWristArm(
 )
 
 
-def random_postures(n, seed=0):
+def random_configurations(n, seed=0):
     return np.random.default_rng(seed).uniform(MH24.lower, MH24.upper, (n, 6))
 
 
 def assert_reaches(q, T_base_flange, atol=1e-11):
-    """Assert that every posture there is, and there is one, has the flange at the pose."""
+    """Assert that every configuration there is, and there is one, has the flange at the pose."""
     found = q[~np.isnan(q).any(axis=-1)]
     assert len(found)
     np.testing.assert_allclose(forward_kinematics(MH24, found) - T_base_flange, 0, atol=atol)
@@ -48,16 +48,16 @@ def assert_reaches(q, T_base_flange, atol=1e-11):
 # closing the circle
 
 
-def test_every_posture_found_reaches_the_pose():
-    Ts = forward_kinematics(MH24, random_postures(2000))
+def test_every_configuration_found_reaches_the_pose():
+    Ts = forward_kinematics(MH24, random_configurations(2000))
     q = inverse_kinematics(ARM, Ts)
     found = ~np.isnan(q).any(axis=-1)
     wanted = np.broadcast_to(Ts[:, None], (2000, N_IK_BRANCHES, 4, 4))[found]
     np.testing.assert_allclose(forward_kinematics(MH24, q[found]), wanted, atol=1e-11)
 
 
-def test_the_original_posture_is_among_slots_and_turns():
-    q = random_postures(2000)
+def test_the_original_configuration_is_among_slots_and_turns():
+    q = random_configurations(2000)
     candidates = inverse_kinematics(ARM, forward_kinematics(MH24, q))[:, :, None] + full_turns(
         MH24.lower, MH24.upper
     )
@@ -76,7 +76,7 @@ def test_whole_degrees_come_back_however_singular_they_are(degrees):
 
 
 def test_single_poses_and_stacks_agree():
-    Ts = forward_kinematics(MH24, random_postures(6)).reshape(2, 3, 4, 4)
+    Ts = forward_kinematics(MH24, random_configurations(6)).reshape(2, 3, 4, 4)
     q = inverse_kinematics(ARM, Ts)
     assert q.shape == (2, 3, 8, 6)
     assert inverse_kinematics(ARM, Ts[:0]).shape == (0, 3, 8, 6)
@@ -85,7 +85,7 @@ def test_single_poses_and_stacks_agree():
 
 @pytest.mark.parametrize("wrist", [None, 0.0, np.pi], ids=["random", "zero", "half a turn"])
 def test_angles_are_principal_to_the_last_digit(wrist):
-    q = random_postures(2000)
+    q = random_configurations(2000)
     if wrist is not None:
         q[:, [3, 5]] = wrist  # the flipped slot, or this one, has joints 4 and 6 at the seam
     q = inverse_kinematics(ARM, forward_kinematics(MH24, q))
@@ -105,7 +105,7 @@ def test_a_pose_straight_behind_stays_within_the_limits_of_s():
 
 
 @pytest.mark.parametrize("arm", [ARM, ODD_ARM], ids=["mh24", "odd"])
-def test_an_independent_package_finds_the_same_postures(arm):
+def test_an_independent_package_finds_the_same_configurations(arm):
     random = np.random.default_rng(1)
     p = random.uniform([-1, -1, -0.3], [1, 1, 1.2], (300, 3))
     Ts = pose(Rotation.random(300, random_state=1).as_matrix(), p)
@@ -179,7 +179,7 @@ def test_reach_ends_where_the_arm_is_straight():
 
 
 def test_out_of_reach_is_nan_in_all_joints():
-    Ts = forward_kinematics(MH24, random_postures(500))
+    Ts = forward_kinematics(MH24, random_configurations(500))
     Ts[:, :3, 3] *= 1.3
     missing = np.isnan(inverse_kinematics(ARM, Ts))
     assert missing.any()
@@ -203,7 +203,7 @@ def test_a_wrist_centre_on_axis_1_is_reached():
 # slots, names
 
 
-def test_a_posture_keeps_its_slot_along_a_path():
+def test_a_configuration_keeps_its_slot_along_a_path():
     start = np.array([-0.4, -0.5, 0.3, -1.0, -1.2, 0.0])
     end = np.array([0.6, 0.5, -0.4, 1.0, -0.3, 2.0])
     path = start + np.linspace(0, 1, 200)[:, None] * (end - start)
@@ -217,7 +217,7 @@ def test_names_say_how_the_arm_stands():
     model = pin.buildModelFromUrdf(str(MH24.urdf))
     data = model.createData()
     seen = set()
-    for q in inverse_kinematics(ARM, forward_kinematics(MH24, random_postures(100))):
+    for q in inverse_kinematics(ARM, forward_kinematics(MH24, random_configurations(100))):
         for slot in np.flatnonzero(~np.isnan(q[:, 0])):
             pin.forwardKinematics(model, data, q[slot])
             axis_2, axis_3, wrist = (data.oMi[joint].translation for joint in (2, 3, 5))

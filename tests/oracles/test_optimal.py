@@ -10,15 +10,14 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from opl.cell.robot import forward_kinematics
-from opl.motion.check import RESOLUTION, densify
-from opl.motion.figures import figures_of_path
-from opl.motion.timing import timed
+from opl.motion.collision_check import RESOLUTION, densify
+from opl.motion.path import figures_of_path
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import ObjectiveWeights, track_cost
 from opl.planning.finer_bound import finer_bound
+from opl.planning.multi_start import plan_recursive
 from opl.planning.optimal import plan_optimal
 from opl.planning.refine import RefinedProblem
-from opl.planning.starts import plan_recursive
 from opl.planning.tube import REACH, halved, tube
 from opl.planning.weighted import plan_weighted
 from opl.search.certificate import least_box
@@ -28,7 +27,7 @@ from opl.verification.replay import replay
 from tests.support.bare_cells import Ghosts
 from tests.support.fcl_scene import FclScene
 from tests.support.jobs import opl, write_job
-from tests.support.planned import problem_of, small_job, v_job, with_positions, with_scene
+from tests.support.planned import problem_of, small_job, timed, v_job, with_positions, with_scene
 
 SETTINGS = v_job().search.optimal
 ONLY_TRAVEL = replace(
@@ -74,7 +73,7 @@ def on_wheel(motion):
 
 
 def free_tracks(problem):
-    """Yield (posture at each cutter point, t at each) of every continuous track of a tiny field."""
+    """Yield (q at each cutter point, t at each) of every continuous track of a tiny field."""
     rule = problem.interpolation
     for nodes in problem.field.matrices:
         free = problem.free_nodes(nodes)
@@ -148,9 +147,8 @@ def test_the_motion_is_free_in_two_other_scenes():
     scene = FclScene(problem.cell)
     dense, _ = densify(plan.motion.q, RESOLUTION)
     assert all(min(scene.clearances(q).values(), default=1.0) > 0.0 for q in dense[::4])
-    motion = timed(plan.motion, problem.points, problem.pace, problem.cell.robot)
     allowed = small_job().search.max_contact_error
-    verification = replay(problem.cell, problem.points, motion, allowed)
+    verification = replay(problem.cell, problem.points, timed(problem, plan.motion), allowed)
     assert verification.verified is not None, verification.findings
 
 
@@ -206,7 +204,7 @@ def test_an_interrupted_search_returns_what_there_was_and_a_bound_that_holds():
 
 
 def test_an_interrupted_proof_still_leaves_a_verified_program(tmp_path):
-    job = write_job(tmp_path / "job", {"search.seconds": 1e-9})
+    job = write_job(tmp_path / "job", {"search.time_limit_s": 1e-9})
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 0, ended.err
     assert "0 collisions" in ended.out
@@ -268,11 +266,11 @@ def test_the_least_time_is_a_shortest_path_of_scipy():
     problem = one_row()
     slow = replace(problem.cell.robot, max_speed=problem.cell.robot.max_speed / 40.0)
     problem = with_scene(problem, cell=replace(problem.cell, robot=slow))
-    arc = np.abs(np.diff(problem.points.arc_length)) / problem.pace.feed
+    arc = np.abs(np.diff(problem.points.arc_length)) / problem.process.feed
 
     def seconds(q_a, q_b, t_a, t_b, column):
         turning = (np.abs(q_b - q_a) / slow.max_speed).max(axis=1)
-        sliding = np.abs(t_b - t_a) / problem.pace.contact_speed
+        sliding = np.abs(t_b - t_a) / problem.process.contact_speed
         return np.maximum(np.maximum(turning, sliding), arc[column])
 
     plan = plan_cheapest(problem, ONLY_TIME, SETTINGS.max_contact_change)
@@ -295,7 +293,7 @@ def weighted(problem, weights, fallback):
 
 def sum_of(problem, plan, weights):
     robot = problem.cell.robot
-    figures = figures_of_path(plan.path, plan.motion, problem.points, problem.pace, robot)
+    figures = figures_of_path(plan.path, plan.motion, problem.points, problem.process, robot)
     return (
         weights.joint_range * np.ptp(on_wheel(plan.motion), axis=0).sum()
         + weights.travel * figures.joint_travel
@@ -319,13 +317,13 @@ def test_a_weighted_sum_is_what_the_motion_has_and_no_more_than_other_methods_ha
 def test_no_track_of_a_tiny_field_has_less_than_the_bound_of_the_weighted_sum(first):
     problem = problem_of(with_positions(small_job(), 7), slice(first, first + 4))
     plan = weighted(problem, WEIGHTS, plan_recursive(problem))
-    robot, pace, points = problem.cell.robot, problem.pace, problem.points
-    arc = np.abs(np.diff(points.arc_length)) / pace.feed
+    robot, process, points = problem.cell.robot, problem.process, problem.points
+    arc = np.abs(np.diff(points.arc_length)) / process.feed
     on = np.diff(points.pass_index) == 0
     least = np.inf
     for q, t in free_tracks(problem):
         turned = np.abs(np.diff(q, axis=0))
-        sliding = np.abs(np.diff(t)) / pace.contact_speed
+        sliding = np.abs(np.diff(t)) / process.contact_speed
         seconds = np.maximum(np.maximum(arc, sliding), (turned / robot.max_speed).max(axis=1))
         total = np.ptp(q, axis=0).sum() + 0.5 * turned[on].sum() + 0.05 * seconds[on].sum()
         least = min(least, total)
@@ -348,7 +346,7 @@ def test_one_part_alone_has_the_bound_of_that_part():
 # the tube around a path, and the box of low travel in it
 
 
-def test_a_tube_holds_the_path_and_only_postures_that_grind_near_it():
+def test_a_tube_holds_the_path_and_only_configurations_that_grind_near_it():
     problem, path = one_row(), recursive(one_row).path
     whole = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
     finer = halved(problem.field.contact_positions)

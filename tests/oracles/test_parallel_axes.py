@@ -65,7 +65,7 @@ def assert_reached(arm, found, T, atol=1e-9):
 @every_arm
 @given(q=angles)
 @settings(max_examples=80, deadline=None)
-def test_every_posture_found_reaches_the_pose_and_the_original_is_among_them(arm, q):
+def test_every_configuration_found_reaches_the_pose_and_the_original_is_among_them(arm, q):
     T = drawn(arm, q)
     found = inverse_kinematics(arm, T, q)
     assert_reached(arm, found, T, atol=1e-8)
@@ -80,7 +80,7 @@ def test_the_drawing_is_the_urdf():
     )
 
 
-def test_eaik_finds_the_same_postures():
+def test_eaik_finds_the_same_configurations():
     # from the parameters that the maker publishes, in the frame of its controller
     eaik = DhRobot(
         np.array([np.pi / 2, 0, 0, np.pi / 2, -np.pi / 2, 0]),

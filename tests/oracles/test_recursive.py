@@ -44,7 +44,7 @@ def random_field(seed):
 
 
 def keys_of(ladder, blocked):
-    return np.array(sorted(ladder.step_key(*step) for step in blocked), dtype=np.int64)
+    return np.array(sorted(ladder.edge_key(*step) for step in blocked), dtype=np.int64)
 
 
 def rule_of(ladder, blocked):
@@ -232,7 +232,7 @@ def test_a_step_off_the_wheel_may_be_of_any_size():
 
 def test_a_step_off_the_wheel_may_still_be_blocked():
     ladder = two_nodes(3.0, 60.0, off_wheel=True)
-    blocked = np.array([ladder.step_key(0, 0, 1)], dtype=np.int64)
+    blocked = np.array([ladder.edge_key(0, 0, 1)], dtype=np.int64)
     assert descend(ladder, 0, blocked, no_dead(ladder)).rows is None
 
 

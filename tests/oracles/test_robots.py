@@ -19,8 +19,8 @@ from opl.cell.robot import (
 )
 from opl.cell.robot_file import read_robot_file
 from opl.cell.urdf_import import closure_error
-from opl.documents import read
-from opl.resources import folder
+from opl.files.documents import read
+from opl.files.resources import folder
 from tests.support.closed_forms import opw_solutions
 
 ROBOTS = {name: load_robot(name) for name in known_robots()}
@@ -29,8 +29,8 @@ every_spherical_wrist = pytest.mark.parametrize(
     "robot", [r for name, r in ROBOTS.items() if name != "ur10e"], ids=lambda robot: robot.name
 )
 
-# Where the makers and public descriptions put the flange of the zero posture, in [mm] above the
-# floor, whether its x points up there, and the published reach.
+# Where the makers and public descriptions put the flange of the zero configuration, in [mm] above
+# the floor, whether its x points up there, and the published reach.
 AT_ZERO = {
     "mh24": (1045, 1465, True, 1730),
     "gp25": (1045, 1465, True, 1730),
@@ -99,7 +99,7 @@ def dh_forward(name, q):
     return T
 
 
-def random_postures(robot, n, seed=0):
+def random_configurations(robot, n, seed=0):
     return np.random.default_rng(seed).uniform(robot.lower, robot.upper, (n, 6))
 
 
@@ -112,7 +112,7 @@ def test_there_are_robots_of_five_makers():
     assert {*AT_ZERO, UR} == set(DH) == set(ROBOTS)
 
 
-def test_the_zero_posture_of_the_ur10e_is_the_makers():
+def test_the_zero_configuration_of_the_ur10e_is_the_makers():
     T = controller_poses(ROBOTS[UR], np.zeros(6))
     expected = [[1, 0, 0, -1.18425], [0, 0, -1, -0.2907], [0, 1, 0, 0.06085], [0, 0, 0, 1]]
     np.testing.assert_allclose(T, expected, atol=1e-12)
@@ -120,7 +120,7 @@ def test_the_zero_posture_of_the_ur10e_is_the_makers():
 
 
 @every_spherical_wrist
-def test_the_zero_posture_is_the_makers(robot):
+def test_the_zero_configuration_is_the_makers(robot):
     ahead, high, x_up, reach = AT_ZERO[robot.name]
     T = forward_kinematics(robot, np.zeros(6))
     x = [0.0, 0.0, 1.0 if x_up else -1.0]
@@ -132,15 +132,15 @@ def test_the_zero_posture_is_the_makers(robot):
 
 @every_robot
 def test_forward_agrees_with_denavit_hartenberg(robot):
-    q = random_postures(robot, 100)
+    q = random_configurations(robot, 100)
     expected = [dh_forward(robot.name, row) for row in q]
     np.testing.assert_allclose(forward_kinematics(robot, q), expected, atol=1e-12)
 
 
 @every_robot
-def test_every_posture_found_reaches_the_pose_and_the_original_is_among_them(robot):
+def test_every_configuration_found_reaches_the_pose_and_the_original_is_among_them(robot):
     assert closure_error(robot) < 1e-11
-    q = random_postures(robot, 300, seed=1)
+    q = random_configurations(robot, 300, seed=1)
     found = inverse_kinematics(robot.arm, forward_kinematics(robot, q))[:, :, None] + full_turns(
         robot.lower, robot.upper
     )
@@ -149,8 +149,8 @@ def test_every_posture_found_reaches_the_pose_and_the_original_is_among_them(rob
 
 
 @every_spherical_wrist
-def test_an_independent_package_finds_the_same_postures(robot):
-    Ts = forward_kinematics(robot, random_postures(robot, 60, seed=2))
+def test_an_independent_package_finds_the_same_configurations(robot):
+    Ts = forward_kinematics(robot, random_configurations(robot, 60, seed=2))
     for q, q_opw in zip(
         inverse_kinematics(robot.arm, Ts), opw_solutions(robot.arm, Ts), strict=True
     ):
@@ -258,25 +258,25 @@ def link_collisions(robot):
     return lambda q: pin.computeCollisions(model, data, geometry, geometry_data, q, True)
 
 
-def posture(robot, *degrees):
+def configuration(robot, *degrees):
     """Return joint positions from the angles of the drawing in [deg]."""
     q = (np.radians(degrees) + robot.arm.offsets) * robot.arm.signs
     return np.remainder(q + np.pi, 2 * np.pi) - np.pi
 
 
 @every_spherical_wrist
-def test_ordinary_postures_do_not_collide(robot):
+def test_ordinary_configurations_do_not_collide(robot):
     colliding = link_collisions(robot)
     assert not colliding(np.zeros(6))
     for shoulder in (-20, 0, 30):  # of the upper arm from upright
         for forearm in (-30, 0, 30, 60):  # above level
             for bend in (-90, -45, 0, 45, 90):
-                q = posture(robot, 10, shoulder, 90 - forearm - shoulder, 20, bend, 0)
+                q = configuration(robot, 10, shoulder, 90 - forearm - shoulder, 20, bend, 0)
                 assert (q >= robot.lower).all() and (q <= robot.upper).all()
                 assert not colliding(q), np.degrees(q)
 
 
-def test_ordinary_postures_of_the_ur10e_do_not_collide():
+def test_ordinary_configurations_of_the_ur10e_do_not_collide():
     colliding = link_collisions(ROBOTS[UR])
     assert not colliding(np.zeros(6))
     for elbow in range(-90, 91, 30):
@@ -294,9 +294,9 @@ def test_the_wrist_bends_freely_over_its_travel(robot):
 
 
 @every_robot
-def test_few_random_postures_collide_and_some_do(robot):
+def test_few_random_configurations_collide_and_some_do(robot):
     colliding = link_collisions(robot)
-    rate = np.mean([colliding(q) for q in random_postures(robot, 1000)])
+    rate = np.mean([colliding(q) for q in random_configurations(robot, 1000)])
     # axis 3 of m20ia turns through 458 degrees, and that of ur10e through 360: most of the excess
     # is the arm folded into itself
     assert 0.03 < rate < {"m20ia": 0.45, UR: 0.5}.get(robot.name, 0.17)

@@ -145,10 +145,10 @@ def test_the_part_of_the_job_at_every_cutter_point():
     )
     points, _ = samples_of(problem.cell.part, 12)
     sampled = by_brute_force(points, problem.cell.wheel, Ts.reshape(-1, 4, 4))
-    found = problem.wheel_clearance[::9, ::7].ravel()
-    cuts = found < -problem.cell.contact_allowance
+    found = problem.wheel_distance[::9, ::7].ravel()
+    cuts = found < -problem.cell.max_belt_penetration
     assert (found[cuts] <= sampled[cuts] + TOLERANCE).all()
-    assert (sampled[~cuts] >= -problem.cell.contact_allowance - TOLERANCE).all()
+    assert (sampled[~cuts] >= -problem.cell.max_belt_penetration - TOLERANCE).all()
 
 
 def test_stacks_keep_their_shape():

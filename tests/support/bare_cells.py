@@ -12,7 +12,7 @@ from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Body, Box
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import ContactWheel
-from opl.motion.motion import Motion, Stretch
+from opl.motion.motion import Motion, MoveKind, TimedMotion
 
 NO_POINTS = CutterPoints(np.empty((0, 4, 4)), np.empty(0, dtype=int), np.empty(0))
 
@@ -63,33 +63,25 @@ def bare_cell(part, obstacles=(), clearance=0.005):
         part=part,
         fixture=(),
         T_flange_workpiece=pose(np.eye(3), np.array([0.0, 0.0, 0.1])),
-        contact_allowance=0.0005,
+        max_belt_penetration=0.0005,
         required_clearance=clearance,
     )
 
 
 def free_move(q, seconds=10.0):
-    """Return a motion that visits postures and touches nothing."""
-    n, nothing = len(q), np.full(len(q), np.nan)
-    duration = np.full(n, seconds)
+    """Return a timed motion that visits configurations and touches nothing."""
+    duration = np.full(len(q), seconds)
     duration[0] = 0.0
-    return Motion(
-        np.asarray(q, dtype=float),
-        duration,
-        (Stretch.HOME,) * n,
-        nothing,
-        nothing,
-        np.full(n, -1),
-        nothing,
-    )
+    motion = Motion.off_wheel(np.asarray(q, dtype=float), MoveKind.HOME, -1)
+    return TimedMotion(motion, duration)
 
 
-def random_postures(robot, n, seed=0):
+def random_configurations(robot, n, seed=0):
     return np.random.default_rng(seed).uniform(robot.lower, robot.upper, (n, 6))
 
 
 class Ghosts:
-    """A scene in which postures near some others collide; stands in for a `CollisionScene`."""
+    """A scene in which all near some configurations collide; stands in for a `CollisionScene`."""
 
     def __init__(self, q, radius):
         self._q = np.atleast_2d(q)

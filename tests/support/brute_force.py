@@ -69,7 +69,7 @@ def all_tracks(ladder, blocked):
 
 
 def keys_of(ladder, blocked):
-    return np.array(sorted(ladder.step_key(*step) for step in blocked), dtype=np.int64)
+    return np.array(sorted(ladder.edge_key(*step) for step in blocked), dtype=np.int64)
 
 
 def random_field(seed):

@@ -11,7 +11,7 @@ from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Box
-from opl.motion.check import densify
+from opl.motion.collision_check import densify
 
 
 class FclScene:
@@ -191,9 +191,9 @@ def margin_along(cell, q, step=0.4):
     dense, _ = densify(q, np.deg2rad(step))
     corners = cell.part.vertices
     least = np.inf
-    for posture in dense:
-        least = min(least, *scene.clearances(posture).values(), np.inf)
-        T = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, posture))
+    for configuration in dense:
+        least = min(least, *scene.clearances(configuration).values(), np.inf)
+        T = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, configuration))
         gap = cell.wheel.signed_distance(transform(T, corners)).min()
         least = min(least, gap - cell.part_from_wheel)
     return least

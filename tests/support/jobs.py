@@ -12,7 +12,7 @@ import trimesh
 import yaml
 
 from opl.cli.commands import main
-from opl.resources import folder
+from opl.files.resources import folder
 
 V_SHAPE = folder("workpieces") / "v_shape"
 V_JOB = V_SHAPE / "job.yaml"
@@ -22,16 +22,16 @@ GONE = object()  # as the value of a key: leave it out
 # one row, few contact positions and long steps: planned and proven in a second
 QUICK = {
     "passes.rows": 1,
-    "passes.bow_height_mm": 0.3,
-    "passes.largest_step_mm": 20,
+    "passes.max_chord_error_mm": 0.3,
+    "passes.max_step_mm": 20,
     "search.contact_positions": 40,
     "search.max_contact_step": 5,
     "search.max_contact_error_mm": 0.5,
-    "wheel.contact_allowance_mm": 1.0,
+    "wheel.max_belt_penetration_mm": 1.0,
     "process.approach_mm": 20,
 }
 
-# a post where the part has to be when it is ground: every posture on the wheel hits it
+# a post where the part has to be when it is ground: every configuration on the wheel hits it
 POST = {"name": "post", "box_mm": [60, 60, 400], "at_mm": [800, 235, 320]}
 
 

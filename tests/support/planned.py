@@ -6,14 +6,14 @@ from functools import cache
 import numpy as np
 
 from opl.cell.collision import CollisionScene
+from opl.files.resources import folder
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import load
-from opl.motion.timing import timed
-from opl.pipeline import cutter_points
-from opl.planning.problem import build_problem
+from opl.job.load import load_job
+from opl.motion.timing import time_motion
+from opl.planning.multi_start import plan_recursive
 from opl.planning.scene import planning_scene
-from opl.planning.starts import plan_recursive
-from opl.resources import folder
+from opl.run.preparing import problem_in
+from opl.run.surfacing import cut_surface
 from opl.verification.replay import replay
 
 V_JOB = folder("workpieces") / "v_shape" / "job.yaml"
@@ -21,7 +21,7 @@ V_JOB = folder("workpieces") / "v_shape" / "job.yaml"
 
 @cache
 def v_job():
-    return load(V_JOB)
+    return load_job(V_JOB)
 
 
 def with_positions(job, count):
@@ -38,16 +38,14 @@ def small_job():
 
 def problem_of(job, points_of=None):
     """Return the problem of a job, or of a slice of its cutter points."""
-    points = cutter_points(job)
+    points = cut_surface(job).points
     if points_of is not None:
         points = CutterPoints(
             points.Ts_workpiece_cutter[points_of],
             points.pass_index[points_of],
             points.arc_length[points_of],
         )
-    positions = job.cell.wheel.positions(job.search.n_contact_positions)
-    scene = planning_scene(job.cell)
-    return build_problem(scene, points, positions, job.search.interpolation, job.pace)
+    return problem_in(planning_scene(job.cell), job, points)
 
 
 @cache
@@ -70,17 +68,24 @@ def small_plan():
     return plan_recursive(small_problem())
 
 
-@cache
+def timed(problem, motion):
+    """Return a motion with its times."""
+    return time_motion(motion, problem.points, problem.process, problem.cell.robot).timed
+
+
 def small_motion():
-    """Return a free and timed motion over the two rows."""
-    problem = small_problem()
-    return timed(small_plan().motion, problem.points, problem.pace, problem.cell.robot)
+    """Return a free motion over the two rows."""
+    return small_plan().motion
 
 
 @cache
-def v_motion():
-    problem = v_problem()
-    return timed(v_plan().motion, problem.points, problem.pace, problem.cell.robot)
+def small_timed():
+    return timed(small_problem(), small_motion())
+
+
+@cache
+def v_timed():
+    return timed(v_problem(), v_plan().motion)
 
 
 @cache
@@ -89,20 +94,22 @@ def tiny_problem():
     problem = problem_of(with_positions(small_job(), 30), points_of=slice(50, 70))
     on_the_way = plan_recursive(problem).motion.q[1]  # where the first approach begins
     home = on_the_way + np.array([0.3, -0.2, 0.0, 0.2, 0.1, 0.2])
-    return replace(problem, pace=replace(problem.pace, home=home))
+    return replace(problem, process=replace(problem.process, home=home))
 
 
 @cache
+def tiny_timed():
+    return timed(tiny_problem(), plan_recursive(tiny_problem()).motion)
+
+
 def tiny_motion():
-    problem = tiny_problem()
-    motion = plan_recursive(problem).motion
-    return timed(motion, problem.points, problem.pace, problem.cell.robot)
+    return tiny_timed().motion
 
 
-def replay_tiny(motion=None, cell=None):
+def replay_tiny(timed=None, cell=None):
     """Replay the tiny motion, or another one, or in another cell."""
     problem, allowed = tiny_problem(), small_job().search.max_contact_error
-    return replay(cell or problem.cell, problem.points, motion or tiny_motion(), allowed)
+    return replay(cell or problem.cell, problem.points, timed or tiny_timed(), allowed)
 
 
 def with_problem_cell(problem, cell):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from opl.geometry.machined import load_faces
 from opl.geometry.nurbs import NurbsSurface
-from opl.geometry.surface_file import load_faces
 
 CLAMPED = {degree: np.repeat([0.0, 1.0], degree + 1) for degree in (1, 2, 3)}
 

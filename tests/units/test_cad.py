@@ -99,7 +99,7 @@ def write_stl(shape, path, deflection=0.006, angle=0.5):
 def test_faces_are_exact_and_face_outward(tmp_path, shape, kind, distance, area):
     found = cad.load_cad_faces(write_step(shape.Shape(), tmp_path / "part.step"))
     assert found[0].type == kind
-    samples = found[0].face.area_samples(0.5e-3)
+    samples = found[0].area_samples(0.5e-3)
     assert np.abs(distance(samples.points)).max() < 1e-9
     assert (distance(samples.points + 1e-4 * samples.normals) > 0.9e-4).all()
     assert 1e6 * samples.areas.sum() == pytest.approx(area, rel=2e-3)
@@ -111,13 +111,11 @@ def test_a_hole_breaks_the_passes_and_a_fillet_joins_them(tmp_path):
     top = [
         k
         for k, one in enumerate(faces, 1)
-        if one.face.trim is not None
-        and len(one.face.trim.loops) == 2
-        and one.face.area_samples(2e-3).normals[0, 2] > 0.9
+        if one.trim is not None
+        and len(one.trim.loops) == 2
+        and one.area_samples(2e-3).normals[0, 2] > 0.9
     ]
-    rounded = [
-        k for k, one in enumerate(faces, 1) if one.type == "cylinder" and one.face.outward > 0.0
-    ]
+    rounded = [k for k, one in enumerate(faces, 1) if one.type == "cylinder" and one.outward > 0.0]
     assert len(top) == 1 and len(rounded) == 2
     flat = load_machined(path, top, False, "mm", 0.5)
     laid = lay(flat, Y, rows=1, pitch=1.0)
@@ -144,7 +142,7 @@ def test_a_hole_breaks_the_passes_and_a_fillet_joins_them(tmp_path):
 def test_a_part_and_its_own_fine_mesh_give_the_same_passes_within_two_hundredths(tmp_path, shape):
     step = write_step(shape.Shape(), tmp_path / "part.step")
     stl = write_stl(shape.Shape(), tmp_path / "part.stl")
-    exact = Patchwork((cad.load_cad_faces(step)[0].face,))
+    exact = Patchwork((cad.load_cad_faces(step)[0],))
     meshed = load_machined(stl, [1], False, "mm", np.deg2rad(20.0))
     normal = np.array([0.1, 0.2, 1.0]) / np.sqrt(1.05)
     one, other = (
@@ -169,7 +167,7 @@ def test_a_file_in_metres_or_inches_is_read_in_its_own_unit(tmp_path):
     for unit in ("M", "INCH"):
         path = write_step(BRepPrimAPI_MakeCylinder(20.0, 50.0).Shape(), tmp_path / "p.step", unit)
         (side, *_) = cad.load_cad_faces(path)
-        assert Patchwork((side.face,)).extent_along(Z) == pytest.approx((0.0, 0.05), abs=1e-9)
+        assert Patchwork((side,)).extent_along(Z) == pytest.approx((0.0, 0.05), abs=1e-9)
 
 
 def test_an_iges_file_has_the_same_faces(tmp_path):
@@ -178,7 +176,7 @@ def test_an_iges_file_has_the_same_faces(tmp_path):
     writer.Write(str(tmp_path / "part.igs"))
     found = cad.load_cad_faces(tmp_path / "part.igs")
     assert len(found) == 3
-    lengths = [np.ptp(Patchwork((one.face,)).extent_along(Z)) for one in found]
+    lengths = [np.ptp(Patchwork((one,)).extent_along(Z)) for one in found]
     assert max(lengths) == pytest.approx(0.05, abs=1e-9)
 
 

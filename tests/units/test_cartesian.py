@@ -9,8 +9,8 @@ from opl.cell.robot import forward_kinematics
 from opl.errors import InputError, UnsafeError
 from opl.geometry.frames import from_roll_pitch_yaw, pose
 from opl.program.inform import parse, write_jobs
-from opl.program.inform.cartesian import configuration, pose_of, postures
-from opl.program.inform.times import job_postures
+from opl.program.inform.cartesian import configurations, rconf_of, rectan_pose
+from opl.program.inform.times import job_configurations
 from opl.program.moves import Move, Program, plan_moves
 from opl.program.profiles import DX200, NX100
 from opl.program.settings import PositionForm, ProgramSettings, UserFrame
@@ -21,7 +21,9 @@ T_BASE_USER = pose(np.eye(3)[[1, 2, 0]], np.array([1.0, 0.2, -0.3]))
 
 
 def write(q, profile=DX200, **changes):
-    moves = tuple(Move(posture, 0.1, True, False, k) for k, posture in enumerate(np.atleast_2d(q)))
+    moves = tuple(
+        Move(configuration, 0.1, True, False, k) for k, configuration in enumerate(np.atleast_2d(q))
+    )
     form = ProgramSettings(positions=PositionForm.BASE, T_flange_tool=T_FLANGE_TOOL, tool=5)
     program = Program("ANY", moves=moves)
     (text,) = write_jobs(program, ROBOT, replace(form, **changes), profile, DATE).files.values()
@@ -33,11 +35,11 @@ SHARES = st.lists(st.floats(0.02, 0.98), min_size=6, max_size=6)
 
 @settings(max_examples=100)
 @given(SHARES)
-def test_a_posture_is_among_those_its_pose_and_configuration_name(shares):
+def test_a_configuration_is_among_those_its_pose_and_rconf_name(shares):
     q = ROBOT.lower + np.array(shares) * (ROBOT.upper - ROBOT.lower)
     if abs(q[4]) < 0.05 or min(abs(abs(q[[0, 3, 5]]) - np.pi)) < 0.01:
         return
-    found = postures(ROBOT, forward_kinematics(ROBOT, q), configuration(ROBOT, q))
+    found = configurations(ROBOT, forward_kinematics(ROBOT, q), rconf_of(ROBOT, q))
     assert np.abs(found - q).max(axis=1).min() < 1e-6
 
 
@@ -53,20 +55,20 @@ def test_a_posture_is_among_those_its_pose_and_configuration_name(shares):
         ((0, 90, 150, 0, -60, 0), (1, 1, 0, 0, 0, 0)),
     ],
 )
-def test_configuration_of_known_postures(q_deg, expected):
-    assert configuration(ROBOT, np.deg2rad(q_deg)) == expected
+def test_rconf_of_known_configurations(q_deg, expected):
+    assert rconf_of(ROBOT, np.deg2rad(q_deg)) == expected
 
 
 @pytest.mark.parametrize("form", [PositionForm.BASE, PositionForm.ROBOT, PositionForm.USER])
 @pytest.mark.parametrize("profile", [DX200, NX100])
-def test_cartesian_job_leads_to_the_postures_it_was_made_of(form, profile):
+def test_cartesian_job_leads_to_the_configurations_it_was_made_of(form, profile):
     frame = UserFrame(7, T_BASE_USER) if form is PositionForm.USER else None
     T_base_frame = T_BASE_USER if frame else np.eye(4)
     q = np.array([move.q for move in plan_moves(verified_motion(), "A", ROBOT.max_speed).moves])
     job = parse(write(q, profile, positions=form, user_frame=frame))
-    seen = job_postures(job, ROBOT, T_base_frame, T_FLANGE_TOOL)
+    seen = job_configurations(job, ROBOT, T_base_frame, T_FLANGE_TOOL)
     np.testing.assert_allclose(seen, q, atol=4e-4 if profile is NX100 else 4e-6)
-    written = T_base_frame @ pose_of(job.positions[3].values)
+    written = T_base_frame @ rectan_pose(job.positions[3].values)
     np.testing.assert_allclose(
         written[:3, 3], (forward_kinematics(ROBOT, q[3]) @ T_FLANGE_TOOL)[:3, 3], atol=1e-6
     )
@@ -87,7 +89,7 @@ def test_cartesian_job_says_what_its_positions_are():
     assert "///RCONF 1,0,0,0,0,0\r\n" in write(verified_motion().motion.q[0], NX100)
 
 
-def test_configuration_is_written_where_it_changes_only():
+def test_rconf_is_written_where_it_changes_only():
     q = np.deg2rad([[0, 0, 0, 0, -60, k] for k in (170, 175, 185, 190, 170)])
     lines = [line for line in write(q).split("\r\n") if line.startswith("///RCONF")]
     assert [line[9:20] for line in lines] == ["1,0,0,0,0,0", "1,0,0,0,1,0", "1,0,0,0,0,0"]
@@ -101,7 +103,7 @@ def test_configuration_is_written_where_it_changes_only():
         ((180, 0, 0, 0, -60, 0), "joint S from its other half turn"),
     ],
 )
-def test_posture_that_the_controller_could_mistake_is_refused(q_deg, message):
+def test_configuration_that_the_controller_could_mistake_is_refused(q_deg, message):
     with pytest.raises(UnsafeError, match=message):
         write(np.deg2rad(q_deg))
 
@@ -113,6 +115,6 @@ def test_meaning_of_flip_nobody_has_seen_is_said_in_the_job():
 
 @pytest.mark.parametrize(("number", "profile"), [(64, DX200), (25, NX100)])
 def test_user_frame_the_controller_does_not_have_is_refused(number, profile):
-    with pytest.raises(InputError, match=r"user_frame.number: must be 1 to"):
+    with pytest.raises(InputError, match=r"user_frame: must be 1 to"):
         write(verified_motion().motion.q[0], profile, positions=PositionForm.USER,
               user_frame=UserFrame(number, T_BASE_USER))  # fmt: skip

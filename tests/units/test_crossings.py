@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opl.errors import InputError
+from opl.files.resources import folder
 from opl.geometry.crossings import crossing_triangles
 from opl.geometry.mesh import load_mesh
-from opl.resources import folder
 
 
 def volume(a, b, c, d):

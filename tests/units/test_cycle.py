@@ -8,7 +8,7 @@ import pytest
 from opl.program.actions import Actions, Call, Dwell, WaitInput
 from opl.program.cycle import cycle_time
 from opl.program.inform import write_jobs
-from opl.program.moves import Kind, Move, Program, plan_moves
+from opl.program.moves import Move, Program, Purpose, plan_moves
 from opl.program.profiles import DX200
 from opl.program.settings import ByKind, ProgramSettings
 from tests.support.program_samples import DATE, MAX_SPEED, ROBOT, verified_motion
@@ -67,11 +67,11 @@ def test_the_parts_of_a_grinding_program_add_up_to_its_written_times_and_ramps()
     planned = plan_moves(verified_motion(), "A", MAX_SPEED, actions=settings.actions)
     written = write_jobs(planned, ROBOT, settings, DX200, DATE)
     found = cycle_time(planned, written.times, ROBOT, settings)
-    at_speed = sum(written.times[move.posture] for move in planned.moves[1:])
+    at_speed = sum(written.times[move.motion_index] for move in planned.moves[1:])
     assert found.total == pytest.approx(at_speed + found.ramps + 2 * 0.5)
     assert found.waits == 1.0 and found.ramps > 0.0
-    ground = [m for m in planned.moves if m.kind is Kind.WHEEL]
-    assert found.passes >= sum(written.times[move.posture] for move in ground)
+    ground = [m for m in planned.moves if m.kind is Purpose.WHEEL]
+    assert found.passes >= sum(written.times[move.motion_index] for move in ground)
     # the quicker the joints, the nearer to the written speeds
     quick = replace(ROBOT, max_acceleration=100.0 * ROBOT.max_acceleration)
     assert cycle_time(planned, written.times, quick, settings).ramps < 0.05 * found.ramps

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opl.errors import InputError, OplError, UnsafeError
-from opl.program.inform import TEMPLATE, find_faults, parse, unparse, write_jobs
+from opl.program.inform import TEMPLATE, job_faults, parse, unparse, write_jobs
 from opl.program.inform import render as render_part
 from opl.program.moves import Move, Program, plan_moves
 from opl.program.profiles import DX200
@@ -41,8 +41,8 @@ def sample(**options):
     )
 
 
-def program_of(postures, speed=0.1):
-    return Program("ANY", moves=tuple(Move(q, speed, True, False, 0) for q in postures))
+def program_of(configurations, speed=0.1):
+    return Program("ANY", moves=tuple(Move(q, speed, True, False, 0) for q in configurations))
 
 
 def job_text(**changes):
@@ -103,17 +103,18 @@ def test_stops_and_passes_have_their_levels():
 
 
 def test_programmed_time_of_each_pass_is_the_wanted_one_within_two_percent():
-    motion = verified_motion(n_points=60).motion
+    timed = verified_motion(n_points=60).timed
+    motion = timed.motion
     job = parse(render(sample(n_points=60), ROBOT, DATE))
     pulses = np.array([position.values for position in job.positions])
     q = SCALE.to_angles(pulses)
     speed = np.array([float(move.tag("VJ")) / 100.0 for move in job.moves])
     times = (np.abs(np.diff(q, axis=0)) / MAX_SPEED).max(axis=1) / speed[1:]
-    posture = np.array([move.posture for move in sample(n_points=60).moves])
+    configuration = np.array([move.motion_index for move in sample(n_points=60).moves])
     for pass_index in (0, 1):
         ground = (motion.pass_index == pass_index) & ~np.isnan(motion.contact_position)
-        written = times[ground[posture[1:]] & ground[posture[:-1] + 1]].sum()
-        assert written == pytest.approx(motion.duration[ground].sum(), rel=0.02)
+        written = times[ground[configuration[1:]] & ground[configuration[:-1] + 1]].sum()
+        assert written == pytest.approx(timed.duration[ground].sum(), rel=0.02)
 
 
 def test_unverified_ratios_are_said_at_the_top_of_every_job():
@@ -136,7 +137,7 @@ def test_date_and_tool_are_the_ones_given():
     st.lists(st.lists(st.floats(0.0, 1.0), min_size=6, max_size=6), min_size=1, max_size=5),
     st.floats(0.0, 1.0, exclude_min=True),
 )
-def test_postures_come_back_within_half_a_pulse_and_speeds_in_range(shares, speed):
+def test_configurations_come_back_within_half_a_pulse_and_speeds_in_range(shares, speed):
     q = SCALE.lower + np.array(shares) * (SCALE.upper - SCALE.lower)
     job = parse(render(program_of(q, speed), ROBOT, DATE))
     pulses = np.array([position.values for position in job.positions])
@@ -147,7 +148,7 @@ def test_postures_come_back_within_half_a_pulse_and_speeds_in_range(shares, spee
         assert float(move.tag("VJ")) == pytest.approx(100.0 * speed, abs=0.0100001)
 
 
-def test_posture_beyond_the_soft_limits_gives_no_job():
+def test_configuration_beyond_the_soft_limits_gives_no_job():
     with pytest.raises(UnsafeError, match=r"joint S .* soft limits"):
         render(program_of([SCALE.upper + 0.01]), ROBOT, DATE)
 
@@ -217,7 +218,7 @@ def test_tool_the_controller_does_not_have_is_refused(tool):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("in steps %}\n{% if step.conf", "in steps[1:] %}\n{% if step.conf",
+        ("in steps %}\n{% if step.rconf", "in steps[1:] %}\n{% if step.rconf",
          "NPOS is 20,0,0,0,0,0, there are 19"),
         ("={{ step.values }}", "=0,0,0,0,0,0", r"position 1: must be C00000=0,-38000"),
         ("{{ step.word }}", "MOVL", r"move 1: must be MOVJ C00000 VJ=5.00 PL=0, is MOVL"),
@@ -286,7 +287,7 @@ def test_unreadable_template_is_refused(tmp_path, content):
 
 
 def test_legal_job_has_no_faults():
-    assert find_faults(job_text(), DX200) == ()
+    assert job_faults(job_text(), DX200) == ()
 
 
 @pytest.mark.parametrize(
@@ -319,11 +320,11 @@ def test_legal_job_has_no_faults():
     ],
 )
 def test_fault_is_found(changes, fault):
-    assert fault in "\n".join(find_faults(job_text(**changes), DX200))
+    assert fault in "\n".join(job_faults(job_text(**changes), DX200))
 
 
 def test_bare_line_feeds_are_a_fault():
-    assert "lines must end in CR LF" in find_faults(job_text().replace("\r\n", "\n"), DX200)
+    assert "lines must end in CR LF" in job_faults(job_text().replace("\r\n", "\n"), DX200)
 
 
 # reading
@@ -339,7 +340,7 @@ def test_headers_hold_until_they_change():
         "///TOOL 2\n///POSTYPE PULSE\n///PULSE\nP00092=1,2,3,4,5,6\nP92=7,8,9,0,1,2",
     )
     job = parse(text)
-    seen = [(p.frame, p.coordinates, p.tool, p.user, p.configuration) for p in job.positions]
+    seen = [(p.frame, p.coordinates, p.tool, p.user, p.rconf) for p in job.positions]
     assert seen == [
         ("USER", "RECTAN", 4, 12, (1, 0, 0)),
         ("ROBOT", "RECTAN", 4, 12, (0, 1, 1)),
@@ -443,9 +444,9 @@ def test_any_text_is_read_or_refused_but_never_crashes(text):
     try:
         job = parse(text)
     except InputError:
-        assert find_faults(text, DX200)
+        assert job_faults(text, DX200)
     else:
-        find_faults(text, DX200)
+        job_faults(text, DX200)
         assert unparse(job) == re.sub("\r\n?|\n", "\r\n", text)
 
 
@@ -464,4 +465,4 @@ def test_a_damaged_job_is_read_or_refused_but_never_crashes(data):
     except OplError as error:
         assert re.match("job: line [0-9]+: ", str(error))
     else:
-        find_faults(unparse(job), DX200)
+        job_faults(unparse(job), DX200)

@@ -17,12 +17,12 @@ def wheel(radius=0.15, roll=45.0):
     return ContactWheel(0.05, radius, np.deg2rad(roll), np.eye(4))
 
 
-def found(surface, plane_normal, allowance=0.5e-3, on=None, **changes):
+def found(surface, plane_normal, penetration=0.5e-3, on=None, **changes):
     plan = Passes(
         plane_normal, **{"pitch": 5e-3, "max_bow_height": 0.05e-3, "largest_step": 4e-3, **changes}
     )
     laid = lay_passes(surface, plan)
-    looked_at = inspect(surface, plan, laid, on or wheel(), allowance)
+    looked_at = inspect(surface, plan, laid, on or wheel(), penetration)
     return laid, {f.kind: f for f in looked_at.findings}
 
 
@@ -43,7 +43,7 @@ def test_a_hollow_along_the_path_names_points_radius_and_the_flat():
     assert "flat of 50 mm, which would cut in 5.2 mm (0.5 mm allowed): only an edge" in message
     _, findings = found(hollow(0.06), Z, margin=2.5e-3, on=wheel(roll=0.0))
     assert "it cannot be ground" in str(findings["hollow"])
-    _, findings = found(hollow(0.06), Z, margin=2.5e-3, allowance=6e-3)
+    _, findings = found(hollow(0.06), Z, margin=2.5e-3, penetration=6e-3)
     assert not findings
 
 

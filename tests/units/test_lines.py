@@ -6,9 +6,9 @@ import pytest
 from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import rotation_angle
 from opl.program.inform import parse, write_jobs
-from opl.program.inform.times import job_postures
+from opl.program.inform.times import job_configurations
 from opl.program.lines import stray, with_straight_moves
-from opl.program.moves import Kind, plan_moves
+from opl.program.moves import Purpose, plan_moves
 from opl.program.profiles import DX200
 from opl.program.settings import ProgramSettings
 from tests.support.program_samples import DATE, MAX_SPEED, ROBOT, verified_motion
@@ -24,7 +24,7 @@ def straight(tolerance=1e-3):
 
 def test_moves_on_the_wheel_and_along_its_normal_become_straight_and_no_others():
     for move in straight(tolerance=0.1).moves[1:]:
-        assert move.straight == (move.kind is not Kind.AIR)
+        assert move.straight == (move.kind is not Purpose.AIR)
 
 
 def test_moves_that_stray_too_far_stay_joint_moves():
@@ -49,7 +49,7 @@ def test_speed_of_straight_moves_gives_each_its_wanted_time():
     written = write_jobs(program, ROBOT, ProgramSettings(), DX200, DATE)
     (text,) = written.files.values()
     job = parse(text)
-    q = job_postures(job, ROBOT, np.eye(4), T_FLANGE_TOOL)
+    q = job_configurations(job, ROBOT, np.eye(4), T_FLANGE_TOOL)
     p = forward_kinematics(ROBOT, q)[:, :3, 3] * 1e3
     lines = [k for k, move in enumerate(job.moves) if move.word == "MOVL"]
     assert len(lines) > 70
@@ -66,7 +66,7 @@ def test_tool_point_that_only_turns_gets_its_speed_in_degrees():
     first, second, *_ = straight().moves
     moves = (
         replace(first, q=q[0]),
-        replace(second, q=q[1], duration=2.0, straight=True, kind=Kind.WHEEL),
+        replace(second, q=q[1], duration=2.0, straight=True, kind=Purpose.WHEEL),
     )
     program = replace(straight(), moves=moves)
     (text,) = write_jobs(program, ROBOT, ProgramSettings(), DX200, DATE).files.values()

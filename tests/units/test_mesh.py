@@ -3,8 +3,8 @@ import pytest
 import trimesh
 
 from opl.errors import InputError
+from opl.files.resources import folder
 from opl.geometry.mesh import TriangleMesh, load_mesh
-from opl.resources import folder
 from tests.support.surfaces import load_surface, profile_distance
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [30.0, 0.0, 0.0], [0.0, 20.0, 0.0], [0.0, 0.0, 10.0]])

@@ -23,7 +23,7 @@ def test_points_and_normals_are_as_exact_as_the_mesh_says(solid):
     assert off.max() <= 1.05 * surface.facet_error + 1e-9
     angle = np.arccos(np.clip(np.sum(Ts[:, :3, 2] * solid.normal(Ts[ORIGINS]), axis=1), -1, 1))
     flat, _ = face_normals(surface.mesh)
-    one, other = flat[neighbours(surface.mesh.faces).T]
+    one, other = flat[neighbours(surface.mesh).T]
     largest_turn = 2.0 * np.arcsin(0.5 * np.linalg.norm(one - other, axis=1).max())
     assert angle.max() <= largest_turn
     assert np.median(angle) < 0.2 * largest_turn

@@ -1,14 +1,13 @@
-from dataclasses import fields, replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from opl.errors import OplError, UnsafeError
-from opl.motion.motion import Motion, Stretch, VerifiedMotion
+from opl.motion.motion import MoveKind, TimedMotion, VerifiedMotion
 from opl.program.moves import START_SPEED, Move, Program, plan_moves
 from opl.program.split import split
-from tests.support.program_samples import HOME, JOINT_NAMES, MAX_SPEED, verified_motion
+from tests.support.program_samples import HOME, JOINT_NAMES, MAX_SPEED, verified_motion, with_times
 
 
 def plan(verified, **changes):
@@ -16,17 +15,10 @@ def plan(verified, **changes):
 
 
 def shortened(verified, indices):
-    motion = verified.motion
-    values = {field.name: getattr(motion, field.name) for field in fields(Motion)}
+    timed = verified.timed
     return VerifiedMotion(
-        Motion(
-            **{
-                name: tuple(value[i] for i in indices)
-                if isinstance(value, tuple)
-                else value[list(indices)]
-                for name, value in values.items()
-            }
-        )
+        TimedMotion(timed.motion.take(indices), timed.duration[indices]),
+        verified.clearance[indices],
     )
 
 
@@ -36,48 +28,46 @@ def test_only_a_verified_motion_becomes_a_program(motion):
         plan(motion)
 
 
-def test_every_distinct_posture_is_a_move_and_a_repeated_one_is_none():
+def test_every_distinct_configuration_is_a_move_and_a_repeated_one_is_none():
     verified = verified_motion()
     program = plan(verified)
     q = verified.motion.q
     repeated = [i for i in range(1, len(q)) if np.array_equal(q[i], q[i - 1])]
     assert len(repeated) == 2  # the first cutter point of each pass
-    assert [m.posture for m in program.moves] == [i for i in range(len(q)) if i not in repeated]
+    assert [m.motion_index for m in program.moves] == [
+        i for i in range(len(q)) if i not in repeated
+    ]
     for move in program.moves:
-        np.testing.assert_array_equal(move.q, q[move.posture])
+        np.testing.assert_array_equal(move.q, q[move.motion_index])
 
 
 def test_slow_drift_is_not_lost_by_dropping_small_steps():
     verified = verified_motion()
     drift = np.linspace(0.0, 1e-5, 101)[:, None] * np.ones(6)
     rows = shortened(verified, [0] * 101)
-    moving = VerifiedMotion(
-        replace(rows.motion, q=HOME + drift, duration=np.r_[0.0, np.full(100, 0.1)])
-    )
+    moving = with_times(rows, np.r_[0.0, np.full(100, 0.1)], HOME + drift)
     q = np.array([move.q for move in plan(moving).moves])
     distance = np.abs(moving.motion.q[:, None] - q[None]).max(axis=-1).min(axis=1)
     assert distance.max() <= 1e-6
 
 
 def test_played_at_its_speeds_the_program_takes_the_time_of_the_motion():
-    motion = verified_motion().motion
+    timed = verified_motion().timed
     program = plan(verified_motion())
     q = np.array([move.q for move in program.moves])
     speed = np.array([move.speed for move in program.moves])
     times = (np.abs(np.diff(q, axis=0)) / MAX_SPEED).max(axis=1) / speed[1:]
-    assert times.sum() == pytest.approx(motion.duration.sum())
+    assert times.sum() == pytest.approx(timed.seconds)
 
 
-def test_time_of_a_repeated_posture_goes_to_the_move_that_follows():
+def test_time_of_a_repeated_configuration_goes_to_the_move_that_follows():
     verified = verified_motion()
     motion = verified.motion
-    duration = motion.duration.copy()
+    duration = verified.timed.duration.copy()
     (repeated, *_) = [i for i in range(1, len(motion)) if (motion.q[i] == motion.q[i - 1]).all()]
     duration[repeated] = 0.05
-    before = {m.posture: m.speed for m in plan(verified).moves}
-    after = {
-        m.posture: m.speed for m in plan(VerifiedMotion(replace(motion, duration=duration))).moves
-    }
+    before = {m.motion_index: m.speed for m in plan(verified).moves}
+    after = {m.motion_index: m.speed for m in plan(with_times(verified, duration)).moves}
     assert after[repeated + 1] == pytest.approx(before[repeated + 1] / 2)
 
 
@@ -89,7 +79,7 @@ def test_first_move_is_slow_and_comes_to_rest():
 
 def test_robot_stops_at_home_at_stretch_ends_and_never_within_a_pass():
     verified = verified_motion(n_passes=1)
-    stops = [(m.posture, m.exact_stop, m.on_wheel) for m in plan(verified).moves]
+    stops = [(m.motion_index, m.exact_stop, m.on_wheel) for m in plan(verified).moves]
     assert stops == [
         (0, True, False),  # home
         (1, True, False),  # above the wheel
@@ -108,20 +98,18 @@ def test_robot_stops_at_home_at_stretch_ends_and_never_within_a_pass():
 def test_robot_stops_at_first_contact_even_if_the_approach_ends_short_of_it():
     verified = verified_motion(n_passes=1)
     kept = [i for i in range(len(verified.motion)) if i != 3]
-    motion = shortened(verified, kept).motion
-    duration = motion.duration.copy()
+    short = shortened(verified, kept)
+    duration = short.timed.duration.copy()
     duration[3] = 0.1
-    moves = plan(VerifiedMotion(replace(motion, duration=duration))).moves
-    assert motion.stretch[3] is Stretch.GRIND
+    moves = plan(with_times(short, duration)).moves
+    assert short.motion.kind[3] is MoveKind.GRIND
     assert moves[3].on_wheel and moves[3].exact_stop
 
 
 def test_robot_stops_at_a_sharp_corner_off_the_wheel():
     verified = shortened(verified_motion(), [0] * 4)
     corner = HOME + np.array([[0.0, 0.0], [0.1, 0.0], [0.2, 0.001], [0.2, 0.1]]) @ np.eye(2, 6)
-    moves = plan(
-        VerifiedMotion(replace(verified.motion, q=corner, duration=np.array([0.0, 1.0, 1.0, 1.0])))
-    ).moves
+    moves = plan(with_times(verified, [0.0, 1.0, 1.0, 1.0], corner)).moves
     assert [move.exact_stop for move in moves] == [True, False, True, True]
 
 
@@ -132,21 +120,22 @@ def test_comments_name_the_passes_and_home():
 
 @pytest.mark.parametrize("duration", [0.0, 0.01])
 def test_move_faster_than_a_joint_is_refused_by_name(duration):
-    motion = verified_motion().motion
-    times = motion.duration.copy()
+    times = verified_motion().timed.duration.copy()
     times[1] = duration
-    with pytest.raises(UnsafeError, match=r"posture 1 \(home\): joint S would need (inf|1\d{3})"):
-        plan(VerifiedMotion(replace(motion, duration=times)))
+    with pytest.raises(
+        UnsafeError, match=r"configuration 1 \(home\): joint S would need (inf|1\d{3})"
+    ):
+        plan(with_times(verified_motion(), times))
 
 
 def test_too_fast_joint_is_named_where_others_stand_still():
-    motion = shortened(verified_motion(), [0, 0]).motion
+    still = shortened(verified_motion(), [0, 0])
     q = HOME + np.array([np.zeros(6), [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]])
     with pytest.raises(UnsafeError, match="joint U would need inf"):
-        plan(VerifiedMotion(replace(motion, q=q)))
+        plan(with_times(still, [0.0, 0.0], q))
 
 
-def test_move_keeps_its_own_read_only_posture():
+def test_move_keeps_its_own_read_only_configuration():
     q = HOME.copy()
     move = Move(q, 0.1, True, False, 0)
     q[0] = 9.0
@@ -189,7 +178,7 @@ def test_more_than_99_parts_keep_their_order_when_sorted_by_name():
 
 def test_pass_too_long_for_a_job_is_refused_with_its_size():
     program = plan(verified_motion(n_passes=1, n_points=50))
-    with pytest.raises(OplError, match=r"postures 2 to 56 take \d+ moves .* a job holds 20"):
+    with pytest.raises(OplError, match=r"configurations 2 to 56 take \d+ moves .* a job holds 20"):
         split(program, 20)
 
 

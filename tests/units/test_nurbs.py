@@ -5,9 +5,9 @@ import pytest
 from geomdl.evaluators import SurfaceEvaluatorRational
 
 from opl.errors import InputError
+from opl.files.resources import folder
+from opl.geometry.machined import load_faces
 from opl.geometry.nurbs import DegenerateNormalError, NurbsSurface
-from opl.geometry.surface_file import load_faces
-from opl.resources import folder
 from tests.support.surfaces import (
     cylinder_patch,
     graph,

@@ -4,7 +4,7 @@ from click.testing import CliRunner
 
 from opl.cell.robot import load_robot
 from opl.cli.commands import main
-from opl.errors import InputError
+from opl.errors import InputError, SettingError
 from opl.program.parameters import read_parameters
 from opl.program.pulses import PulseScale, require_accepted
 from opl.program.ratios import ratio_file, with_ratios
@@ -125,9 +125,9 @@ def test_ratio_file_of_another_robot_is_refused(tmp_path):
 
 
 def test_unverified_ratios_must_be_accepted_by_name():
-    require_accepted(("R", "T"), ("T", "R", "B"), "job.yaml: program.accept_unverified_pulses")
-    with pytest.raises(InputError, match=r"accept_unverified_pulses: .* of T are not .*: \[T\]"):
-        require_accepted(("R", "T"), ("R",), "job.yaml: program.accept_unverified_pulses")
+    require_accepted(("R", "T"), ("T", "R", "B"))
+    with pytest.raises(SettingError, match=r"accepted_pulses: .* of T are not .*: \[T\]"):
+        require_accepted(("R", "T"), ("R",))
 
 
 def test_command_writes_the_file_a_job_can_name(tmp_path):

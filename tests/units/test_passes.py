@@ -5,16 +5,16 @@ import pytest
 from scipy.interpolate import BSpline
 from scipy.spatial import cKDTree
 
+from opl.files.resources import folder
 from opl.geometry.coverage import uncovered
 from opl.geometry.frames import rotation_angle
+from opl.geometry.machined import load_faces
 from opl.geometry.nurbs import NurbsSurface
-from opl.geometry.order import air_way, shortest_air
-from opl.geometry.passes import Kind, Order, Passes, lay_passes
+from opl.geometry.order import shortest_links
+from opl.geometry.passes import Order, Passes, PassKind, lay_passes
 from opl.geometry.patchwork import Face, Patchwork
 from opl.geometry.scallop import row_pitch, scallop_pitch
-from opl.geometry.surface_file import load_faces
 from opl.geometry.trim import Trim
-from opl.resources import folder
 from tests.support.solids import ORIGINS, cylinder, lay, sphere, torus
 from tests.support.surfaces import cylinder_patch, graph, plane_patch
 
@@ -221,7 +221,7 @@ def test_the_shortest_order_is_shorter_where_a_hole_splits_the_rows():
     ways = {}
     for order in (Order.ONE_WAY, Order.ZIGZAG, Order.SHORTEST):
         points = lay(holed, Y, order=order, **changes).points
-        ways[order] = air_way(points.Ts_workpiece_cutter, points.pass_index)
+        ways[order] = points.link_length
         assert len(np.unique(points.Ts_workpiece_cutter[ORIGINS].round(9), axis=0)) == len(points)
     assert ways[Order.SHORTEST] < 0.7 * ways[Order.ZIGZAG] < ways[Order.ONE_WAY]
 
@@ -244,7 +244,7 @@ def test_the_shortest_order_of_scattered_passes_is_near_the_best_of_all():
         for order in permutations(range(5))
         for signs in product((1, -1), repeat=5)
     )
-    found = shortest_air(Ts)
+    found = shortest_links(Ts)
     assert sorted(index for index, _ in found) == list(range(5))
     assert way(found) <= 1.1 * best
 
@@ -255,7 +255,7 @@ def test_the_shortest_order_of_scattered_passes_is_near_the_best_of_all():
 def test_lines_of_constant_parameter_follow_the_net():
     surface = torus().surface
     whole = Patchwork((Face(surface),))
-    for kind, axis in ((Kind.ALONG_U, 0), (Kind.ALONG_V, 1)):
+    for kind, axis in ((PassKind.ALONG_U, 0), (PassKind.ALONG_V, 1)):
         plan = Passes(np.zeros(3), 4e-3, 0.02e-3, 5e-3, margin=1e-3, kind=kind)
         laid = lay_passes(whole, plan)
         Ts = laid.points.Ts_workpiece_cutter
@@ -272,7 +272,7 @@ def test_lines_of_constant_parameter_follow_the_net():
 
 def test_lines_of_constant_parameter_need_a_single_face():
     faces = load_faces(folder("workpieces") / "faucet" / "surface.json")
-    plan = Passes(np.zeros(3), 4e-3, 0.02e-3, 5e-3, kind=Kind.ALONG_U)
+    plan = Passes(np.zeros(3), 4e-3, 0.02e-3, 5e-3, kind=PassKind.ALONG_U)
     with pytest.raises(ValueError, match="kind: along_u needs a single NURBS face"):
         lay_passes(Patchwork(faces), plan)
 
@@ -344,7 +344,7 @@ def test_coverage_counts_what_no_pass_comes_by():
     points = lay_passes(whole, plan).points
     samples = whole.area_samples(0.4e-3)
     assert samples.areas.sum() == pytest.approx(0.04**2)
-    missed = uncovered(samples, points.Ts_workpiece_cutter[ORIGINS], points.pass_index, 5e-3)
+    missed = uncovered(samples, points, 5e-3)
     y = samples.points[:, 1]
     np.testing.assert_array_equal(missed, (y < 10e-3) | (y > 30e-3))
 

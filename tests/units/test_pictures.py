@@ -1,6 +1,7 @@
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from functools import cache
 from xml.etree import ElementTree
 
@@ -8,6 +9,8 @@ import matplotlib
 import numpy as np
 import pytest
 
+from opl.cell.robot import load_robot
+from opl.motion.path import GrindingPath
 from opl.report.pictures import contact_chart, joint_chart
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -29,9 +32,13 @@ def contact_arguments(n_passes=5, n_points=60, n_positions=140, state=3):
         "state_names": NAMES,
         "pass_index": pass_index,
         "flat_end": 25.0,
-        "path_cutter_point": place,
-        "path_contact_position": 40.0 + 5.0 * np.sin(place),
-        "path_pass": pass_index[place.astype(int)],
+        "path": GrindingPath(
+            0,
+            np.zeros((len(place), 6)),
+            40.0 + 5.0 * np.sin(place),
+            place,
+            pass_index[place.astype(int)],
+        ),
     }
 
 
@@ -41,12 +48,14 @@ def joint_arguments(n_passes=5, n_points=60, fixed=True):
     swing = np.deg2rad([10.0, 20.0, 5.0, 60.0, 30.0, 0.0])
     return {
         "title": "v_shape: joint angles along the path",
-        "joint_names": tuple("SLURBT"),
-        "lower": LOWER,
-        "upper": UPPER,
-        "found_cutter_point": place,
-        "found_q": np.sin(place)[:, None] * swing,
-        "found_pass": pass_index[place.astype(int)],
+        "robot": replace(load_robot("mh24"), lower=LOWER, upper=UPPER),
+        "path": GrindingPath(
+            0,
+            np.sin(place)[:, None] * swing,
+            np.zeros(len(place)),
+            place,
+            pass_index[place.astype(int)],
+        ),
         "fixed_q": 2.0 * np.cos(np.arange(len(pass_index)))[:, None] * swing if fixed else None,
         "pass_index": pass_index,
     }
@@ -145,12 +154,6 @@ def test_few_contact_positions_are_drawn(size):
     assert "free" in " ".join(texts(contact_svg(*size)))
 
 
-def test_states_are_drawn_without_a_path():
-    none = np.empty(0)
-    lost = {"path_cutter_point": none, "path_contact_position": none, "path_pass": none}
-    assert "found path" not in texts(contact_chart(**{**contact_arguments(), **lost}))
-
-
 def test_ranges_are_in_degrees():
     shown = texts(joint_svg())
     assert {"S", "L", "U", "R", "B", "T"} <= set(shown)
@@ -171,7 +174,8 @@ def test_limit_is_drawn_only_in_or_near_the_angles(limit, drawn):
     """R reaches 120 deg and moves by 240 deg with the contact fixed."""
     upper = UPPER.copy()
     upper[3] = np.deg2rad(limit)
-    svg = joint_chart(**{**joint_arguments(n_passes=1), "upper": upper})
+    arguments = joint_arguments(n_passes=1)
+    svg = joint_chart(**{**arguments, "robot": replace(arguments["robot"], upper=upper)})
     assert ("joint limit" in texts(svg)) == drawn
 
 

@@ -9,16 +9,23 @@ from click.testing import CliRunner
 from opl.cell.robot import forward_kinematics
 from opl.cli.commands import main
 from opl.errors import InputError, OplError
-from opl.motion.motion import VerifiedMotion
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
-from opl.program.inform import find_faults, parse
-from opl.program.inform.layout import VARIABLES, JobLayout, Step
+from opl.program.export import StraightLimit, export_program
+from opl.program.inform import job_faults, parse
+from opl.program.inform.job_layout import VARIABLES, JobLayout, JobStep
 from opl.program.moves import Program, plan_moves
-from opl.program.posts import GROUP, find_post, known_posts
+from opl.program.posts import find_post, known_posts, reader_for
 from opl.program.profiles import PROFILES
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
-from opl.program.write import StraightLimit, write_program
-from tests.support.program_samples import DATE, MAX_SPEED, ROBOT, UNVERIFIED, verified_motion
+from tests.support.example_post import install, install_example_post
+from tests.support.program_samples import (
+    DATE,
+    MAX_SPEED,
+    ROBOT,
+    UNVERIFIED,
+    slowed,
+    verified_motion,
+)
 
 YASKAWA = ("NX100", "DX100", "DX200", "YRC1000")
 OTHERS = ("RAPID", "KRL", "FANUC", "URSCRIPT")
@@ -37,16 +44,8 @@ def write(controller, *, robot=ROBOT, name="SAMPLE", n_passes=2, **changes):
     motion = verified_motion(n_passes=n_passes, n_points=6)
     settings = replace(settings, **changes)
     if (controller, settings.motion) == ("KRL", MotionForm.JOINT):
-        motion = at_feed(motion, 0.2)  # else too slow for whole percents
-    return write_program(motion, name, robot, settings, limit, DATE, ["CELL 7"])
-
-
-def at_feed(verified, factor):
-    """The motion with its passes ground in a part of their time, or in more."""
-    motion = verified.motion
-    on_wheel = ~np.isnan(motion.contact_position)
-    duration = np.where(on_wheel, motion.duration * factor, motion.duration)
-    return VerifiedMotion(replace(motion, duration=duration))
+        motion = slowed(motion, 0.2)  # else too slow for whole percents
+    return export_program(motion, name, robot, settings, limit, DATE, ["CELL 7"])
 
 
 def programs(controller, **changes):
@@ -80,7 +79,7 @@ def test_jobs_keep_every_limit_of_their_controller(controller):
     long = {"name": "LONGER_THAN_NX100_TAKES", "n_passes": 85}
     for changes in ({"motion": MotionForm.STRAIGHT}, long):
         for name, text in programs(controller, **changes).items():
-            assert find_faults(text, profile) == ()
+            assert job_faults(text, profile) == ()
             job = parse(text)
             assert name == f"{job.name}.JBI" and len(job.name) <= profile.name_length
             assert text.isascii() and "\n" not in text.replace("\r\n", "")
@@ -93,7 +92,7 @@ def test_jobs_keep_every_limit_of_their_controller(controller):
 def test_five_thousand_points_split_off_the_belt_and_the_master_calls_every_part(controller):
     motion = verified_motion(n_passes=50, n_points=100)
     settings = ProgramSettings(controller=controller, actions=ACTIONS)
-    program, files = write_program(
+    program, files = export_program(
         motion, "GRIND_LONG", ROBOT, settings, StraightLimit(CORNERS, 0.0), DATE
     )
     jobs = {name: parse(text) for name, text in files.items() if name.endswith(".JBI")}
@@ -185,7 +184,7 @@ def moves_read(controller, text):
 
 
 @pytest.mark.parametrize("controller", ["RAPID", "FANUC", "URSCRIPT"])
-def test_other_makers_go_to_the_same_postures_in_the_same_time(controller):
+def test_other_makers_go_to_the_same_configurations_in_the_same_time(controller):
     program, files = write(controller)
     (text,) = [text for name, text in files.items() if not name.endswith(".csv")]
     for move, (angles, time) in zip(program.moves, moves_read(controller, text), strict=True):
@@ -194,7 +193,7 @@ def test_other_makers_go_to_the_same_postures_in_the_same_time(controller):
             assert time == pytest.approx(move.duration, abs=6e-4)
 
 
-def test_krl_goes_to_the_same_postures_in_whole_percents():
+def test_krl_goes_to_the_same_configurations_in_whole_percents():
     program, files = write("KRL")
     text = files["SAMPLE.src"]
     rows = re.findall(r"BAS\(#VEL_PTP, (\d+)\)\r\nPTP \{(.*?)\}( C_PTP)?\r\n", text)
@@ -267,7 +266,7 @@ def test_other_makers_read_back_what_a_template_gives(tmp_path, controller, old,
 
 
 def test_pass_too_slow_for_whole_percents_is_refused():
-    program = plan_moves(at_feed(verified_motion(), 2.0), "SAMPLE", MAX_SPEED)
+    program = plan_moves(slowed(verified_motion(), 2.0), "SAMPLE", MAX_SPEED)
     with pytest.raises(OplError, match="pass 1 would take"):
         find_post("KRL").write(program, ROBOT, ProgramSettings(), DATE)
 
@@ -292,7 +291,7 @@ def test_documented_variables_of_jobs_are_the_ones_given():
     own = {name for name in VARIABLES if "." not in name}
     steps = {name.partition(".")[2] for name in VARIABLES if "." in name}
     assert own == set(layout.values())
-    assert steps == set(Step.__dataclass_fields__)
+    assert steps == set(JobStep.__dataclass_fields__)
 
 
 def test_unknown_controller_is_refused_with_the_known_ones():
@@ -302,23 +301,8 @@ def test_unknown_controller_is_refused_with_the_known_ones():
     assert shown.exit_code == 2 and "unknown controller" in shown.output
 
 
-def install(folder, entries):
-    """Make what a package manager would: the entry points of an installed package."""
-    info = folder / "our_cell_post-1.0.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: our-cell-post\nVersion: 1.0\n")
-    rows = [f"{name} = {value}" for name, value in entries.items()]
-    (info / "entry_points.txt").write_text("\n".join([f"[{GROUP}]", *rows, ""]))
-
-
 def test_a_site_adds_its_own_post_without_touching_opl(tmp_path, monkeypatch):
-    package = Path(__file__).parents[1] / "example_post"
-    declared = (package / "pyproject.toml").read_text()
-    ((name, value),) = re.findall(r'^(OUR_CELL) = "(.*)"$', declared, re.MULTILINE)
-    assert f'[project.entry-points."{GROUP}"]' in declared
-    install(tmp_path, {name: value})
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.syspath_prepend(package)
+    install_example_post(tmp_path, monkeypatch)
     text = programs("OUR_CELL")["SAMPLE.txt"]
     assert text.startswith("PROGRAM SAMPLE 2024-03-05\nGO 0.000 -20.000 10.000 0.000 -60.000")
     assert "OUR_CELL: our own cell" in CliRunner().invoke(main, ["templates", "vars"]).output
@@ -332,6 +316,8 @@ def test_broken_post_of_a_site_is_told(tmp_path, monkeypatch, value, message):
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(InputError, match=message):
         find_post("BROKEN")
+    # programs of other controllers are read all the same
+    assert reader_for(Path("A.mod")) is find_post("RAPID").reader
 
 
 def test_program_without_moves_is_written_too():

@@ -37,15 +37,15 @@ def test_the_limits_themselves_are_allowed_and_a_pulse_beyond_is_not(joint):
             SCALE.to_pulses(q)
 
 
-def test_error_names_posture_angle_and_limits():
+def test_error_names_configuration_angle_and_limits():
     q = np.array([HOME, HOME])
     q[1, 1] = np.deg2rad(160.0)
-    message = "posture 1: joint L at 160.000 deg is 304000 pulses, .* -199500 and 294500"
+    message = "configuration 1: joint L at 160.000 deg is 304000 pulses, .* -199500 and 294500"
     with pytest.raises(UnsafeError, match=message):
         SCALE.to_pulses(q)
 
 
-def test_a_posture_that_is_no_number_is_refused():
+def test_a_configuration_that_is_no_number_is_refused():
     with pytest.raises(UnsafeError, match="not a number"):
         SCALE.to_pulses(np.full(6, np.nan))
 

@@ -1,29 +1,18 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from opl.errors import OplError
-from opl.motion.motion import VerifiedMotion
 from opl.program.inform import parse, write_jobs
 from opl.program.moves import plan_moves
 from opl.program.profiles import DX200, NX100
 from opl.program.pulses import PulseScale
 from opl.program.settings import ProgramSettings
 from opl.program.speeds import SpeedRange, speeds_keeping_time
-from tests.support.program_samples import DATE, MAX_SPEED, ROBOT, verified_motion
+from tests.support.program_samples import DATE, MAX_SPEED, ROBOT, slowed, verified_motion
 
 VJ = SpeedRange(0.01, 100.0, 2)
-
-
-def slowed(factor, **options):
-    """The sample motion with its passes ground slower by a factor."""
-    motion = verified_motion(**options).motion
-    on_wheel = ~np.isnan(motion.contact_position)
-    duration = np.where(on_wheel, motion.duration * factor, motion.duration)
-    return VerifiedMotion(replace(motion, duration=duration))
 
 
 def pass_times_of(text, program):
@@ -48,7 +37,7 @@ def test_speed_is_written_with_its_decimals_and_in_its_range(value, text):
 
 def test_nearest_in_time_is_chosen_not_nearest_in_speed():
     # 0.0146 would round to 0.01, which is 46 % too slow; 0.02 is 27 % too fast
-    assert VJ.keeping_time(way=0.0146, time=1.0) == 0.02
+    assert VJ.keeping_time(distance=0.0146, time=1.0) == 0.02
 
 
 @given(st.lists(st.tuples(st.floats(0.02, 100.0), st.floats(0.01, 5.0)), min_size=1, max_size=60))
@@ -68,7 +57,7 @@ def test_chains_do_not_make_up_for_each_other():
 @pytest.mark.parametrize("factor", [1.0, 5.0, 20.0, 50.0])
 @pytest.mark.parametrize("profile", [DX200, NX100])
 def test_each_pass_keeps_its_time_within_two_percent_read_from_the_file(factor, profile):
-    program = plan_moves(slowed(factor, n_points=60), "SAMPLE", MAX_SPEED)
+    program = plan_moves(slowed(verified_motion(n_points=60), factor), "SAMPLE", MAX_SPEED)
     written = write_jobs(program, ROBOT, ProgramSettings(), profile, DATE)
     seen = pass_times_of(written.files["SAMPLE.JBI"], program)
     for one, recomputed in zip(written.pass_times, seen, strict=True):
@@ -78,6 +67,6 @@ def test_each_pass_keeps_its_time_within_two_percent_read_from_the_file(factor, 
 
 
 def test_pass_that_cannot_be_slow_enough_is_refused_with_both_times():
-    program = plan_moves(slowed(300.0), "SAMPLE", MAX_SPEED)
+    program = plan_moves(slowed(verified_motion(), 300.0), "SAMPLE", MAX_SPEED)
     with pytest.raises(OplError, match=r"pass 1 would take .* s instead of .* s: DX200"):
         write_jobs(program, ROBOT, ProgramSettings(), DX200, DATE)

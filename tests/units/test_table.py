@@ -48,7 +48,7 @@ def test_table_is_the_golden_one(assert_golden):
     assert_golden("SAMPLE.csv", table())
 
 
-def test_every_posture_has_a_row_and_every_row_every_column():
+def test_every_configuration_has_a_row_and_every_row_every_column():
     assert len(rows()) == len(verified_motion().motion)
     assert all(None not in row and None not in row.values() for row in rows())
     assert {row["kind"] for row in rows()} == {
@@ -66,20 +66,20 @@ def test_pulses_and_speeds_are_those_of_the_job():
 
 
 def test_angles_lengths_and_times_are_in_the_units_of_their_columns():
-    motion, poses = verified_motion().motion, flange_poses(len(rows()))
+    timed, poses = verified_motion().timed, flange_poses(len(rows()))
     for i, row in enumerate(rows()):
         angles = [float(row[f"{name}_deg"]) for name in JOINT_NAMES]
-        np.testing.assert_allclose(angles, np.rad2deg(motion.q[i]), atol=5.1e-5)
+        np.testing.assert_allclose(angles, np.rad2deg(timed.motion.q[i]), atol=5.1e-5)
         origin = [float(row[f"{axis}_mm"]) for axis in "xyz"]
         np.testing.assert_allclose(origin, 1e3 * poses[i, :3, 3], atol=5.1e-4)
-        assert float(row["time_s"]) == pytest.approx(motion.duration[i], abs=5.1e-5)
+        assert float(row["time_s"]) == pytest.approx(timed.duration[i], abs=5.1e-5)
     assert rows()[0]["rx_deg"] == "180.0000"
 
 
 def test_undefined_cells_are_empty_and_zeros_have_no_sign():
     first = rows()[0]
     assert first["pass"] == first["t"] == first["cutter_point"] == ""
-    assert any(row["clearance_mm"] == "" for row in rows())
+    assert first["programmed_s"] == "" and all(row["clearance_mm"] for row in rows())
     assert first["y_mm"] == "0.000"
     assert "-0.000," not in table() and "-0.0000," not in table() and "nan" not in table()
 

@@ -1,4 +1,4 @@
-"""The time law against closed forms, a linear program, and differences of its own postures."""
+"""The time law against closed forms, a linear program, and differences of its own samples."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ LIMITS = JointLimits(np.array([3.0, 3.0, 3.5, 7.0, 7.0, 10.0]), np.full(6, 8.0))
 
 
 def joints(*columns):
-    """Return postures whose first joints go through columns, the others standing still."""
+    """Return configurations whose first joints go through columns, the others standing still."""
     q = np.zeros((len(columns[0]), 6))
     for k, column in enumerate(columns):
         q[:, k] = column
@@ -24,7 +24,7 @@ def joints(*columns):
 
 def sampled_loads(law, limits, step=1e-3):
     """Return the largest joint speed and acceleration, by limit, seen in samples of positions."""
-    q = law.postures(np.arange(0.0, law.time[-1], step))
+    q = law.configurations(np.arange(0.0, law.time[-1], step))
     speed = np.abs(np.diff(q, axis=0)) / step / limits.speed
     acceleration = np.abs(q[2:] - 2.0 * q[1:-1] + q[:-2]) / step**2 / limits.acceleration
     return speed.max(), acceleration.max()
@@ -74,16 +74,16 @@ def circle(speed, radius=0.2, n=2000):
 def test_a_circle_at_constant_speed_is_kept_as_long_as_its_acceleration_is_allowed():
     # v^2 / r = 5 of 8 allowed
     law = fastest_law(circle(1.0), LIMITS, at_rest=False)
-    assert law.pace == pytest.approx(1.0)
+    assert law.path_speed == pytest.approx(1.0)
     assert law.acceleration_load.max() == pytest.approx(5.0 / 8.0, rel=1e-3)
 
 
 def test_on_a_circle_too_fast_by_half_the_pace_falls_to_what_the_acceleration_allows():
     # v^2 / r = 32, four times what is allowed: half the speed where one joint bears all of it
     law = fastest_law(circle(np.sqrt(32.0 * 0.2)), LIMITS, at_rest=False)
-    at_top = np.interp(np.arange(1, 4) / 4.0 * law.place[-1], law.place, law.pace)
+    at_top = np.interp(np.arange(1, 4) / 4.0 * law.place[-1], law.place, law.path_speed)
     assert at_top == pytest.approx(0.5, rel=0.01)
-    assert law.pace.max() < np.sqrt(0.5) + 0.01
+    assert law.path_speed.max() < np.sqrt(0.5) + 0.01
     assert max(sampled_loads(law, LIMITS)) <= 1.001
 
 
@@ -93,8 +93,8 @@ def test_a_corner_is_passed_as_fast_as_its_rounding_allows():
     law = fastest_law(rounded_line(q, np.ones(2)), LIMITS, at_rest=False)
     half = 4.0 * CORNER_CUT
     allowed = np.sqrt(8.0 * 2.0 * half)
-    assert law.pace.min() == pytest.approx(allowed, rel=1e-3)
-    assert law.pace[[0, -1]] == pytest.approx(1.0)
+    assert law.path_speed.min() == pytest.approx(allowed, rel=1e-3)
+    assert law.path_speed[[0, -1]] == pytest.approx(1.0)
 
 
 def test_top_speed_of_a_joint_is_kept_where_the_wanted_times_ask_for_more():
@@ -115,23 +115,23 @@ def test_samples_keep_the_limits_and_the_law_is_no_faster_than_wanted(seed, at_r
     assert max(sampled_loads(law, limits)) <= 1.001
     assert (np.diff(law.node_times) >= times * (1.0 - 1e-9)).all()
     assert max(law.speed_load.max(), law.acceleration_load.max()) <= 1.0 + 1e-4
-    ends = law.postures(np.array([0.0, law.time[-1]]))
+    ends = law.configurations(np.array([0.0, law.time[-1]]))
     np.testing.assert_allclose(ends, q[[0, -1]], atol=1e-9)
     if at_rest:
-        assert law.pace[[0, -1]] == pytest.approx(0.0, abs=1e-6)
+        assert law.path_speed[[0, -1]] == pytest.approx(0.0, abs=1e-6)
 
 
 @given(seed=st.integers(0, 10**6))
 @settings(max_examples=30, deadline=None)
-def test_the_line_leaves_postures_and_straight_moves_by_no_more_than_the_cut(seed):
+def test_the_line_leaves_configurations_and_straight_moves_by_no_more_than_the_cut(seed):
     q, times = random_line(seed)
     line = rounded_line(q, times)
-    assert np.abs(line.postures(line.nodes) - q).max() <= CORNER_CUT + 1e-12
+    assert np.abs(line.configurations(line.nodes) - q).max() <= CORNER_CUT + 1e-12
     places = np.linspace(0.0, line.nodes[-1], 2000)
     straight = np.stack([np.interp(places, line.nodes, joint) for joint in q.T], axis=-1)
-    assert np.abs(line.postures(places) - straight).max() <= CORNER_CUT + 1e-12
+    assert np.abs(line.configurations(places) - straight).max() <= CORNER_CUT + 1e-12
     middles = (line.nodes[:-1] + line.nodes[1:]) / 2.0
-    np.testing.assert_allclose(line.postures(middles), (q[:-1] + q[1:]) / 2.0, atol=1e-9)
+    np.testing.assert_allclose(line.configurations(middles), (q[:-1] + q[1:]) / 2.0, atol=1e-9)
 
 
 def test_an_even_motion_is_a_straight_line_however_its_moves_are_cut():
@@ -175,8 +175,8 @@ def fastest_by_linear_program(place, slope, limits):
     matrix = coo_matrix((values, (rows, columns))).tocsr()
     bounds = np.column_stack([np.zeros(len(place)), most])
     found = linprog(-weight, A_ub=matrix, b_ub=np.ones(row), bounds=bounds, method="highs")
-    pace = np.sqrt(np.maximum(found.x, 0.0))
-    return float((2.0 * length / (pace[:-1] + pace[1:])).sum())
+    path_speed = np.sqrt(np.maximum(found.x, 0.0))
+    return float((2.0 * length / (path_speed[:-1] + path_speed[1:])).sum())
 
 
 def test_the_same_line_has_the_same_law_to_the_bit():
@@ -187,6 +187,8 @@ def test_the_same_line_has_the_same_law_to_the_bit():
 
 def test_a_law_beyond_a_limit_is_refused_with_the_joint():
     law = fastest_law(rounded_line(*random_line(5)), LIMITS, at_rest=True)
-    hurried = TimeLaw(law.line, law.place, 1.1 * law.pace, law.speed_load, law.acceleration_load)
-    with pytest.raises(UnsafeError, match=r"asks for 1\d\d\.\d\d % of the acceleration of joint"):
+    hurried = TimeLaw(
+        law.line, law.place, 1.1 * law.path_speed, law.speed_load, law.acceleration_load
+    )
+    with pytest.raises(UnsafeError, match=r"uses 1\d\d\.\d\d % of the acceleration of joint"):
         require_limits(hurried, LIMITS)

@@ -1,13 +1,19 @@
 import numpy as np
 import pytest
 
+from opl.files.resources import folder
 from opl.geometry.frames import inverse, rotation_angle
 from opl.geometry.nurbs import DegenerateNormalError, NurbsSurface
 from opl.geometry.passes import Order, Passes, lay_passes
 from opl.geometry.patchwork import Face, Patchwork
 from opl.geometry.toolpath import CutterPoints
-from opl.resources import folder
-from tests.support.surfaces import cylinder_patch, graph, load_surface, plane_patch, sphere_patch
+from tests.support.surfaces import (
+    cylinder_patch,
+    graph,
+    load_surface,
+    plane_patch,
+    sphere_patch,
+)
 
 X, Y, Z = np.eye(3)
 ORIGINS = np.s_[:, :3, 3]

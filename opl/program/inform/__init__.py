@@ -4,23 +4,9 @@ INFORM calls the frame at the end of the arm TOOL; here that is the workpiece, w
 while the wheel stands still. Joint moves between pulse positions do not depend on it.
 """
 
-from opl.program.inform.check import find_faults
-from opl.program.inform.job import Header, InformJob, Instruction, Position
+from opl.program.inform.faults import job_faults
 from opl.program.inform.parse import parse, read_jobs, unparse
 from opl.program.inform.post import write_jobs
-from opl.program.inform.render import FILE_SUFFIX, TEMPLATE, render
+from opl.program.inform.render import TEMPLATE, render
 
-__all__ = [
-    "FILE_SUFFIX",
-    "TEMPLATE",
-    "Header",
-    "InformJob",
-    "Instruction",
-    "Position",
-    "find_faults",
-    "parse",
-    "read_jobs",
-    "render",
-    "unparse",
-    "write_jobs",
-]
+__all__ = ["TEMPLATE", "job_faults", "parse", "read_jobs", "render", "unparse", "write_jobs"]

@@ -1,30 +1,29 @@
-"""Cartesian positions of INFORM jobs: RECTAN values and the arm configuration RCONF, both ways.
+"""Cartesian positions of INFORM jobs: RECTAN values and RCONF, written and read.
 
-RCONF names one of the eight postures of a pose: flip or not, upper or lower arm, front or rear, and
-whether R, T and S stand beyond half a turn. That flip is the posture with B not negative is
-inferred: jobs saved by controllers show no-flip for B < 0, and none was found with B > 0.
+RCONF names one of the eight configurations of a pose: flip or not, upper or lower arm, front or
+rear, and whether R, T and S stand beyond half a turn. That flip is the configuration with B not
+negative is inferred: jobs saved by controllers show no-flip for B < 0, and none was found with
+B > 0.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opl.cell.full_turns import FULL_TURN, angular_distance
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
 from opl.errors import UnsafeError
-from opl.geometry.frames import from_roll_pitch_yaw, inverse, roll_pitch_yaw
+from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, roll_pitch_yaw
 from opl.program.controller import ControllerProfile
+from opl.program.digits import fixed
 from opl.program.settings import PositionForm, ProgramSettings
-
-Array = NDArray[np.float64]
 
 # In the order of RCONF, the joints whose half turn it names.
 _HALF_TURN_JOINTS = (3, 5, 0)  # R, T, S
-# Farthest from the planned posture [rad] that one read back may be. Rounding a pose moves the
-# postures by far less, except next to a singularity, where the controller would be as lost.
-_SAME_POSTURE = np.deg2rad(1.0)
+# Farthest from the planned configuration [rad] that one read back may be. Rounding a pose moves the
+# configurations by far less, except next to a singularity, where the controller would be as lost.
+_SAME_CONFIGURATION = np.deg2rad(1.0)
 # At half a turn exactly, controllers differ on which side they see a joint.
 _HALF_TURN_WIDTH = np.deg2rad(0.01)
 
@@ -42,20 +41,20 @@ def rectan(Ts_frame_tool: Array, profile: ControllerProfile) -> list[str]:
     angles = np.rad2deg(roll_pitch_yaw(Ts_frame_tool))
     return [
         ",".join(
-            [_fixed(value, profile.length_decimals) for value in length]
-            + [_fixed(value, profile.angle_decimals) for value in angle]
+            [fixed(float(value), profile.length_decimals) for value in length]
+            + [fixed(float(value), profile.angle_decimals) for value in angle]
         )
         for length, angle in zip(lengths, angles, strict=True)
     ]
 
 
-def pose_of(values: tuple[float, ...]) -> Array:
+def rectan_pose(values: tuple[float, ...]) -> Array:
     """Return the pose of RECTAN values, T_frame_tool, shape (4, 4)."""
     return from_roll_pitch_yaw(np.deg2rad(values[3:6]), np.array(values[:3]) * 1e-3)
 
 
-def configuration(robot: Robot, q: Array) -> tuple[int, ...]:
-    """Return the six meaningful numbers of RCONF for a posture, shape (6,)."""
+def rconf_of(robot: Robot, q: Array) -> tuple[int, ...]:
+    """Return the six meaningful numbers of RCONF for a configuration, shape (6,)."""
     slots = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)
     apart = angular_distance(slots, q).max(axis=-1)
     slot = int(np.nanargmin(apart))
@@ -64,13 +63,13 @@ def configuration(robot: Robot, q: Array) -> tuple[int, ...]:
     return (1 - flip, int(elbow != back), back, *beyond)
 
 
-def postures(
+def configurations(
     robot: Robot, T_base_flange: Array, numbers: tuple[int, ...], near: Array | None = None
 ) -> Array:
-    """Return the postures within the limits that a pose and RCONF name.
+    """Return the configurations within the limits that a pose and RCONF name.
 
     Args:
-        robot: Whose postures.
+        robot: Whose configurations.
         T_base_flange: The pose, shape (4, 4).
         numbers: Of RCONF, six or more.
         near: Joint positions in [rad] that fix axis 4 where the wrist is straight.
@@ -91,42 +90,38 @@ def postures(
         turns = FULL_TURN * np.array([-1.0, 1.0]) if is_beyond else np.zeros(1)
         found = [p + turn * np.eye(6)[joint] for p in found for turn in turns]
     stack = np.array(found)
-    slack = 1e-6  # a posture at its limit, rounded
+    slack = 1e-6  # a configuration at its limit, rounded
     inside = ((stack >= robot.lower - slack) & (stack <= robot.upper + slack)).all(axis=1)
     return stack[inside]
 
 
 def require_read_back(robot: Robot, q: Array, values: str, numbers: tuple[int, ...],
                       T_base_frame: Array, T_flange_tool: Array) -> Array:  # fmt: skip
-    """Return the posture that a written position names; it must be the planned one.
+    """Return the configuration that a written position names; it must be the planned one.
 
     Raises:
-        UnsafeError: If the controller would take another posture, or could.
+        UnsafeError: If the controller would take another configuration, or could.
     """
     for joint in _HALF_TURN_JOINTS:
         if abs(abs(q[joint]) - np.pi) < _HALF_TURN_WIDTH:
-            raise _untold(robot, q, joint, "its other half turn")
-    T_frame_tool = pose_of(tuple(float(value) for value in values.split(",")))
+            raise _ambiguous(robot, q, joint, "its other half turn")
+    T_frame_tool = rectan_pose(tuple(float(value) for value in values.split(",")))
     T_base_flange = T_base_frame @ T_frame_tool @ inverse(T_flange_tool)
-    found = postures(robot, T_base_flange, numbers, q)
+    found = configurations(robot, T_base_flange, numbers, q)
     for other in found:
         apart = np.abs(other - q)
-        if apart.max() > _SAME_POSTURE:
+        if apart.max() > _SAME_CONFIGURATION:
             joint = int(apart.argmax())
-            raise _untold(robot, q, joint, f"{np.rad2deg(other[joint]):.1f} deg")
+            raise _ambiguous(robot, q, joint, f"{np.rad2deg(other[joint]):.1f} deg")
     if not len(found):
-        raise _untold(robot, q, 4, "a posture out of reach")
-    return found[0]
+        raise _ambiguous(robot, q, 4, "a configuration out of reach")
+    configuration: Array = found[0]
+    return configuration
 
 
-def _untold(robot: Robot, q: Array, joint: int, other: str) -> UnsafeError:
+def _ambiguous(robot: Robot, q: Array, joint: int, other: str) -> UnsafeError:
     shown = " ".join(f"{angle:.2f}" for angle in np.rad2deg(q))
     return UnsafeError(
-        f"posture {shown} deg: a Cartesian job cannot tell joint {robot.joint_names[joint]} from "
-        f"{other}; move it away from there or write pulses"
+        f"configuration {shown} deg: a Cartesian job cannot tell joint {robot.joint_names[joint]} "
+        f"from {other}; move it away from there or write pulses"
     )
-
-
-def _fixed(value: float, decimals: int) -> str:
-    """Return a number with fixed decimals, never -0."""
-    return f"{round(float(value), decimals) + 0.0:.{decimals}f}"

@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterator
 
 from opl.program.inform.job import InformJob, Instruction
+from opl.program.listing import changed_lines
+from opl.program.statements import same_number
 
-_NUMBER = re.compile(r"(?<![A-Z0-9.])([+-]?[0-9]+)\.([0-9]+)")
 _TAUGHT = ("C", "BC", "EC")  # their numbers only tie a move to its position
 
 
 def differences_in_meaning(first: InformJob, second: InformJob) -> list[str]:
     """Return what differs, one line each: ``-`` stands in the first only, ``+`` in the second."""
-    before, after = list(_meaning(first)), list(_meaning(second))
-    texts = [text for _, text in before], [text for _, text in after]
-    lines = []
-    # no line is too common to matter: autojunk would skip them
-    matcher = difflib.SequenceMatcher(None, *texts, autojunk=False)
-    for tag, a, b, c, d in matcher.get_opcodes():
-        if tag != "equal":
-            lines += [f"- {place}: {text}" for place, text in before[a:b]]
-            lines += [f"+ {place}: {text}" for place, text in after[c:d]]
-    return lines
+    return changed_lines(list(_meaning(first)), list(_meaning(second)))
 
 
 def _meaning(job: InformJob) -> Iterator[tuple[str, str]]:
@@ -47,8 +38,8 @@ def _instruction(step: Instruction, positions: dict[tuple[str, int], str]) -> st
     for operand in step.operands:
         label = re.fullmatch(r"(BC|EC|C)([0-9]+)", operand)
         key = (label[1], int(label[2])) if label else ("", 0)
-        operands.append(f"to {positions[key]}" if key in positions else _same_number(operand))
-    tags = sorted(f"{name}={_same_number(value)}" for name, value in step.tags)
+        operands.append(f"to {positions[key]}" if key in positions else same_number(operand))
+    tags = sorted(f"{name}={same_number(value)}" for name, value in step.tags)
     coupled = [f"+{_instruction(move, positions)}" for move in step.coupled]
     return " ".join([step.word, *operands, *tags, *coupled])
 
@@ -61,10 +52,5 @@ def _position(job: InformJob, index: int) -> str:
         of.append(f"user frame {position.user}")
     if position.coordinates == "RECTAN":
         # numbers of RCONF after the sixth have no meaning
-        of.append(f"RCONF {','.join(map(str, position.configuration[:6]))}")
+        of.append(f"RCONF {','.join(map(str, position.rconf[:6]))}")
     return f"{values} ({', '.join(of)})"
-
-
-def _same_number(text: str) -> str:
-    """Return a text with its decimal numbers as short as they can be."""
-    return _NUMBER.sub(lambda m: f"{m[1]}.{m[2]}".rstrip("0").rstrip("."), text)

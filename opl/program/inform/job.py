@@ -53,7 +53,7 @@ class Position:
         frame: ``PULSE``, ``ANGLE``, ``BASE``, ``ROBOT``, ``USER``, ``TOOL``, ``MTOOL``, or "".
         tool: Tool number, None where the file does not say.
         user: User frame number, None where the file does not say.
-        configuration: The numbers of ///RCONF, empty where the file does not say.
+        rconf: The numbers of ///RCONF, empty where the file does not say.
     """
 
     line: int
@@ -65,7 +65,7 @@ class Position:
     frame: str
     tool: int | None
     user: int | None
-    configuration: tuple[int, ...]
+    rconf: tuple[int, ...]
 
 
 @dataclass(frozen=True)

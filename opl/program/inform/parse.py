@@ -1,4 +1,4 @@
-"""Reading an INFORM job as controllers write it, without losing a byte.
+"""Reading an INFORM job as controllers write it, in any encoding, without losing a byte.
 
 Headers of the position list hold until they are changed (///TOOL, ///USER, ///POSTYPE, ///RECTAN,
 ///RCONF ...), so each position gets those in force. Headers nobody knows stay where they are.
@@ -13,6 +13,8 @@ from opl.program.inform.job import Header, InformJob, Instruction, Position, rea
 
 BYTE_ORDER_MARK = "\ufeff"
 
+# Controllers save ASCII and Shift-JIS; copies in repositories are UTF-8. The last takes any byte.
+_ENCODINGS = ("ascii", "utf-8", "cp932", "latin-1")
 _LINE_END = re.compile(r"\r\n?|\n")
 _HEADER = re.compile(r"(/{1,4}[A-Z]+[0-9]*)(?:[ \t]+(.*))?")
 _POSITION = re.compile(r"([A-Z]+[0-9]+)=(.*)")
@@ -22,6 +24,18 @@ _INTEGER = re.compile(r"[+-]?[0-9]{1,12}")
 _TRAILING_COMMENT = re.compile(r'((?:[^"/]|"[^"]*"|/(?!/))*)//(.*)')
 # + opens a coupled move only before a move word: it may also be part of an expression
 _COUPLED = re.compile(r"[ \t]+\+(?=S?MOV)")
+
+
+def decode(data: bytes) -> tuple[str, str]:
+    """Return the text of a job file and its encoding, which gives the same bytes again."""
+    for encoding in _ENCODINGS:
+        try:
+            text = data.decode(encoding)
+            if text.encode(encoding) == data:
+                return text, encoding
+        except UnicodeError:
+            continue
+    raise AssertionError("latin-1 takes any byte")
 
 
 def parse(text: str, source: str = "job") -> InformJob:
@@ -137,7 +151,7 @@ def _position(number: int, line: str, in_force: dict[str, Header], source: str) 
     if not all(shape.fullmatch(value) for value in values):
         kind = "pulses are whole numbers" if coordinates == "PULSE" else "positions are numbers"
         raise _error(source, number, f"{kind} with commas between, got {_shown(match[2])}")
-    tool, user, configuration = (
+    tool, user, rconf = (
         _integers(in_force[key], source) if key in in_force else ()
         for key in ("TOOL", "USER", "RCONF")
     )
@@ -151,7 +165,7 @@ def _position(number: int, line: str, in_force: dict[str, Header], source: str) 
         frame=in_force["frame"].value if "frame" in in_force else "",
         tool=tool[0] if tool else None,
         user=user[0] if user else None,
-        configuration=configuration,
+        rconf=rconf,
     )
 
 

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
 
 import numpy as np
 
 from opl.cell.robot import Robot
 from opl.errors import InputError
+from opl.findings import Finding, Level
 from opl.program.controller import ControllerProfile
 from opl.program.inform.cartesian import frame_pose
-from opl.program.inform.layout import VARIABLES
-from opl.program.inform.parse import parse
+from opl.program.inform.compare import differences_in_meaning
+from opl.program.inform.faults import job_faults
+from opl.program.inform.job import InformJob
+from opl.program.inform.job_layout import VARIABLES
+from opl.program.inform.parse import decode, parse, read_jobs, unparse
+from opl.program.inform.playback import START, corners, play_jobs
+from opl.program.inform.positions import rounded_to_job
 from opl.program.inform.render import FILE_SUFFIX, TEMPLATE, render, split_for
-from opl.program.inform.times import move_times
+from opl.program.inform.summary import describe
+from opl.program.inform.times import move_times, written_speed
 from opl.program.moves import Program
-from opl.program.posts import Post, Written, pass_times
+from opl.program.played import Reading
+from opl.program.posts import Post, Reader, Written, pass_times
 from opl.program.profiles import PROFILES
 from opl.program.pulses import require_accepted, require_known
 from opl.program.settings import PositionForm, ProgramSettings
@@ -30,23 +39,15 @@ def write_jobs(
 ) -> Written:
     """Return the job files of a program: one, or a master and the parts it calls.
 
-    Args:
-        program: What the robot shall do.
-        robot: Who shall do it.
-        settings: How it is written.
-        profile: The controller.
-        date: Date of the jobs.
-
     Raises:
-        InputError: If something the job asks for is not legal on the controller, the template is
+        InputError: If a setting of the job is not legal on the controller, the template is
             unusable, or a pulse ratio is neither verified nor accepted.
-        UnsafeError: If a posture is beyond the soft limits.
+        UnsafeError: If a configuration is beyond the soft limits.
         OplError: If a pass has more moves than a job can hold, or cannot keep its time.
     """
     if settings.positions is PositionForm.PULSES:
-        require_known(robot, "program.pulse_ratios")
-        where = "program.accept_unverified_pulses"
-        require_accepted(robot.unverified_pulses, settings.accepted_pulses, where)
+        require_known(robot)
+        require_accepted(robot.unverified_pulses, settings.accepted_pulses)
     parts = split_for(program, profile)
     clash = settings.actions.calls & {part.name for part in parts}
     if clash:
@@ -59,24 +60,82 @@ def write_jobs(
         job = parse(text)
         written_times = move_times(job, robot, T_base_frame, settings.T_flange_tool)
         for move, line, time in zip(part.moves, job.moves, written_times, strict=True):
-            if move.duration is None and move.posture in speeds:
+            if move.duration is None and move.motion_index in speeds:
                 continue  # a part begins where the one before it ended
-            speeds[move.posture] = next(
-                f"{tag}={value}" for tag, value in line.tags if tag in ("VJ", "V", "VR")
-            )
+            speeds[move.motion_index] = written_speed(line).text
             if np.isfinite(time):
-                times[move.posture] = float(time)
+                times[move.motion_index] = float(time)
     return Written(files, speeds, times, pass_times(program, times, profile.name))
+
+
+def _read(
+    files: Mapping[str, bytes], robot: Robot, settings: ProgramSettings, profile: ControllerProfile
+) -> Reading:
+    """Read the job files of a program: the master and all parts it calls.
+
+    Raises:
+        InputError: If the files are no jobs, not those of one program, or of another robot.
+    """
+    jobs: dict[str, InformJob] = {}
+    refused: list[Finding] = []
+    for source, data in files.items():
+        text, _ = decode(data)
+        several = read_jobs(text, source)
+        for job in several:
+            if job.name in jobs:
+                raise InputError(source, f"a job {job.name} was given before")
+            jobs[job.name] = job
+            faults = job_faults(text if len(several) == 1 else unparse(job), profile)
+            refused += [Finding(Level.ERROR, "file", source, fault) for fault in faults]
+    playback, doubtful = play_jobs(jobs, robot, settings)
+    foreign = sorted({name for job in jobs.values() for name in job.calls} - jobs.keys())
+    return Reading(playback, tuple(foreign), (*refused, *doubtful))
+
+
+def describe_file(name: str, content: bytes, robot: Robot) -> list[str]:
+    """Say what each job of a file does.
+
+    Raises:
+        InputError: If the file holds what is no job.
+    """
+    jobs = read_jobs(decode(content)[0], name)
+    unsure = ", ".join(robot.unverified_pulses)
+    about = f"read as a program of {robot.title}"
+    about += f", whose pulse ratios of {unsure} are not verified" if unsure else ""
+    return [about, *(line for job in jobs for line in describe(job, robot))]
+
+
+def file_differences(first: tuple[str, bytes], second: tuple[str, bytes]) -> list[str]:
+    """Say what differs in meaning between two files of jobs.
+
+    Raises:
+        InputError: If a file holds what is no job.
+    """
+    one, other = (read_jobs(decode(content)[0], name) for name, content in (first, second))
+    pairs = zip(one, other, strict=False)
+    lines = [line for pair in pairs for line in differences_in_meaning(*pair)]
+    return lines if len(one) == len(other) else [*lines, f"{len(one)} jobs against {len(other)}"]
 
 
 def post_of(profile: ControllerProfile) -> Post:
     """Return the post of a controller."""
-
-    def write(program: Program, robot: Robot, settings: ProgramSettings, date: datetime) -> Written:
-        return write_jobs(program, robot, settings, profile, date)
-
-    title = f"Yaskawa {profile.name} (INFORM)"
-    return Post(title, write, TEMPLATE, VARIABLES, counts_pulses=True, profile=profile)
+    reader = Reader(
+        FILE_SUFFIX,
+        lambda files, robot, settings: _read(files, robot, settings, profile),
+        lambda q, robot, settings: rounded_to_job(q, robot, settings, profile),
+        lambda robot: START,
+        corners,
+        describe_file,
+        file_differences,
+    )
+    return Post(
+        f"Yaskawa {profile.name} (INFORM)",
+        lambda program, robot, settings, date: write_jobs(program, robot, settings, profile, date),
+        TEMPLATE,
+        VARIABLES,
+        counts_pulses=True,
+        reader=reader,
+    )
 
 
 NX100, DX100, DX200, YRC1000 = (

@@ -1,7 +1,7 @@
 """Writing INFORM jobs. Every job is read back before it is returned.
 
-Pulse jobs need no option, no user frame and no arm configuration, and leave the controller no
-choice between postures. Cartesian ones need the controller's function for relative jobs.
+Pulse jobs need no option, no user frame and no RCONF, and leave the controller no
+choice between configurations. Cartesian ones need the controller's function for relative jobs.
 """
 
 from __future__ import annotations
@@ -11,26 +11,24 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-from opl import resources
 from opl.cell.robot import Robot
-from opl.errors import InputError
+from opl.errors import InputError, SettingError
+from opl.files import resources
 from opl.program.controller import ControllerProfile
-from opl.program.inform.check import find_faults
-from opl.program.inform.layout import JobLayout, Step, differences
-from opl.program.inform.motion import write_positions, write_speeds
+from opl.program.inform.faults import job_faults
+from opl.program.inform.job_layout import JobLayout, JobStep, differences
 from opl.program.inform.parse import parse
-from opl.program.inform.words import ActionWriter
+from opl.program.inform.positions import write_positions, write_speeds
+from opl.program.inform.words import ACTIONS, require_accepted_action
 from opl.program.layout import fill
 from opl.program.moves import Move, Program
-from opl.program.names import short_name
-from opl.program.settings import ByKind, PositionForm, ProgramSettings
-from opl.program.split import split
+from opl.program.settings import PositionForm, ProgramSettings
+from opl.program.split import short_name, split
 
 FILE_SUFFIX = ".JBI"
 TEMPLATE = resources.folder("templates") / "inform" / "job.jbi.j2"
 
-STOP_LEVEL = 0
-
+_STOP_LEVEL = 0
 # Of a template that goes wrong on every line, a few faults tell as much as all.
 _FAULTS_SHOWN = 10
 
@@ -55,26 +53,21 @@ def render(
 ) -> str:
     """Return one job, line ends CR LF, all ASCII; the same arguments give the same bytes.
 
-    Args:
-        part: What the robot shall do, no longer than a job can be.
-        robot: Who shall do it.
-        settings: How the job is written.
-        profile: The controller.
-        date: Date of the job.
+    The part is no longer than a job can be.
 
     Raises:
         InputError: If the name, a number or a comment is not legal on the controller, or the
             template does not give a job that says what the program says.
-        UnsafeError: If a posture is beyond the soft limits.
+        UnsafeError: If a configuration is beyond the soft limits.
     """
     layout = _layout(part, robot, settings, profile, date)
     _require_legal(layout, settings, profile)
     template: Path = settings.template or TEMPLATE
     text = fill(template, layout.values()).replace("\n", "\r\n")
-    faults = find_faults(text, profile) or tuple(differences(parse(text), layout))
+    faults = job_faults(text, profile) or tuple(differences(parse(text), layout))
     if faults:
         shown = [*faults[:_FAULTS_SHOWN], *(["..."] if len(faults) > _FAULTS_SHOWN else [])]
-        raise InputError(str(template), "\n".join(["does not give the job asked for:", *shown]))
+        raise InputError(str(template), "\n".join(["does not give the job it should:", *shown]))
     return text
 
 
@@ -108,40 +101,33 @@ def _layout(
 
 def _steps(
     part: Program, robot: Robot, settings: ProgramSettings, profile: ControllerProfile
-) -> tuple[Step, ...]:
+) -> tuple[JobStep, ...]:
     positions = write_positions(part, robot, settings, profile)
     speeds = write_speeds(part, positions.q, robot, settings.T_flange_tool, profile)
-    actions = ActionWriter(profile)
-    steps = []
-    configuration_before = None
-    for number, move in enumerate(part.moves):
-        configuration = positions.configurations[number]
-        word, speed = speeds[number]
-        steps.append(
-            Step(
-                label=f"C{number:0{profile.label_digits}d}",
-                values=positions.values[number],
-                configuration=configuration if configuration != configuration_before else None,
-                word=word,
-                speed=speed,
-                level=str(STOP_LEVEL if move.exact_stop else _of_kind(settings.levels, move)),
-                ramps=_ramps(move, settings),
-                comment=move.comment,
-                actions=actions.lines(move.actions),
-            )
+    for move in part.moves:
+        for action in move.actions:
+            require_accepted_action(action, profile)
+    actions = ACTIONS.lines(move.actions for move in part.moves)
+    rconfs = [None, *positions.rconfs]
+    return tuple(
+        JobStep(
+            label=f"C{number:0{profile.label_digits}d}",
+            values=positions.values[number],
+            rconf=rconfs[number + 1] if rconfs[number + 1] != rconfs[number] else None,
+            word=speeds[number][0],
+            speed=speeds[number][1],
+            level=str(_STOP_LEVEL if move.exact_stop else settings.levels.of(move.kind)),
+            ramps=_ramps(move, settings),
+            comment=move.comment,
+            actions=actions[number],
         )
-        configuration_before = configuration
-    return tuple(steps)
-
-
-def _of_kind(numbers: ByKind, move: Move) -> int | None:
-    number: int | None = getattr(numbers, move.kind.value)
-    return number
+        for number, move in enumerate(part.moves)
+    )
 
 
 def _ramps(move: Move, settings: ProgramSettings) -> str:
     pairs = (("ACC", settings.acceleration), ("DEC", settings.deceleration))
-    found = ((word, _of_kind(numbers, move)) for word, numbers in pairs)
+    found = ((word, numbers.of(move.kind)) for word, numbers in pairs)
     return "".join(f" {word}={percent}" for word, percent in found if percent is not None)
 
 
@@ -163,15 +149,11 @@ def _require_legal(
 ) -> None:
     """Refuse what no template can make legal, before one gets the blame."""
     if not 0 <= settings.tool <= profile.highest_tool:
-        raise InputError(
-            "program.tool", f"must be 0 to {profile.highest_tool}, got {settings.tool}"
-        )
+        raise SettingError("tool", f"must be 0 to {profile.highest_tool}, got {settings.tool}")
     frame = settings.user_frame
     if frame is not None and not 1 <= frame.number <= profile.highest_user_frame:
-        raise InputError(
-            "program.user_frame.number",
-            f"must be 1 to {profile.highest_user_frame}, got {frame.number}",
-        )
+        allowed = f"1 to {profile.highest_user_frame}"
+        raise SettingError("user_frame", f"must be {allowed}, got {frame.number}")
     for name in (layout.name, *layout.calls):
         if fault := profile.name_fault(name):
             raise InputError("program name", fault)

@@ -50,20 +50,15 @@ def first_job(jobs: Mapping[str, InformJob]) -> str:
     called = {name for job in jobs.values() for name in job.calls}
     starts = [name for name in jobs if name not in called]
     if len(starts) != 1:
-        told = f"start with one job and give those it calls; no job calls {' or '.join(starts)}"
-        raise InputError("program", told if starts else "the jobs call each other in a circle")
+        message = f"start with one job and give those it calls; no job calls {' or '.join(starts)}"
+        raise InputError("program", message if starts else "the jobs call each other in a circle")
     return starts[0]
 
 
 def visits(
     jobs: Mapping[str, InformJob], start: str, foreign: Collection[str]
 ) -> tuple[list[Visit], list[Finding]]:
-    """Return the moves in order, and what cannot be followed.
-
-    Args:
-        jobs: The jobs by name.
-        start: The one that is started.
-        foreign: Names of jobs that may be called without being given: the user's own.
+    """Return the moves in order, and what cannot be followed; foreign jobs are the user's own.
 
     Raises:
         InputError: If a job is called that is not there.

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from opl.cell.robot import Robot, forward_kinematics
-from opl.geometry.frames import roll_pitch_yaw
 from opl.program.inform.job import POSITION_KINDS, InformJob, Instruction, Position
-from opl.program.inform.times import job_postures
+from opl.program.inform.times import job_configurations
+from opl.program.listing import angles_text, pose_text, pose_values
 
 _SIGNAL = re.compile(r"\b(?:IN|OT|IG|OG|AO|AI)#\([^)]*\)")
 _SPEEDS = ("VJ", "V", "VR", "VE")
@@ -23,10 +23,6 @@ def describe(job: InformJob, robot: Robot) -> list[str]:
     Positions in pulses are shown as joint angles and as the pose of the flange in the base frame,
     Cartesian ones as the pose that the file gives. Those of tool 0 in the base frame are shown as
     joint angles too; what other tools and user frames are, only the controller knows.
-
-    Args:
-        job: The job.
-        robot: Whose job it is taken for.
     """
     return [*_summary(job), "", *_steps(job, robot)]
 
@@ -58,18 +54,18 @@ def _summary(job: InformJob) -> Iterator[str]:
 def _moves(job: InformJob) -> Iterator[str]:
     for word in dict.fromkeys(move.word for move in job.moves):
         moves = [move for move in job.moves if move.word == word]
-        told = []
+        spans = []
         for name in _SPEEDS:
             values = [_number(move.tag(name)) for move in moves]
             known = [value for value in values if value is not None]
             if known:
-                told.append(f"{name} {min(known):g} to {max(known):g}")
-        yield ", ".join([f"{len(moves)} {word}", *told])
+                spans.append(f"{name} {min(known):g} to {max(known):g}")
+        yield ", ".join([f"{len(moves)} {word}", *spans])
 
 
 def _steps(job: InformJob, robot: Robot) -> Iterator[str]:
     places = {(p.kind, p.number): k for k, p in enumerate(job.positions)}
-    q = job_postures(job, robot, np.eye(4), np.eye(4))
+    q = job_configurations(job, robot, np.eye(4), np.eye(4))
     for step in job.instructions:
         yield f"{step.line:5d}  {job.lines[step.line - 1].expandtabs(2).rstrip()}"
         for label in step.positions:
@@ -82,24 +78,14 @@ def _where(position: Position, q: np.ndarray, robot: Robot) -> Iterator[str]:
     pulses = position.coordinates == "PULSE"
     frame_known = position.frame in ("BASE", "ROBOT") and position.tool == 0
     if not np.isnan(q).any() and (pulses or frame_known):
-        names = zip(robot.joint_names, np.rad2deg(q), strict=True)
-        yield f"{label} angles " + " ".join(f"{name} {angle:.3f}" for name, angle in names)
+        yield f"{label} {angles_text(q, robot)}"
         if pulses:
-            T_base_flange = forward_kinematics(robot, q)
-            yield f"{label} flange " + _pose(
-                (*T_base_flange[:3, 3] * 1e3, *np.rad2deg(roll_pitch_yaw(T_base_flange)))
-            )
+            yield f"{label} flange {pose_text(pose_values(forward_kinematics(robot, q)))}"
     if not pulses:
-        frame = position.frame or "?"
-        if frame == "USER":
-            frame += f" {position.user}"
-        shown = _pose(position.values) if len(position.values) >= 6 else _listed(position.values)
+        frame = f"USER {position.user}" if position.frame == "USER" else position.frame or "?"
+        known = len(position.values) >= 6
+        shown = pose_text(position.values[:6]) if known else _listed(position.values)
         yield f"{label} in {frame}: {shown}"
-
-
-def _pose(values: tuple[float, ...]) -> str:
-    x, y, z, rx, ry, rz = values[:6]
-    return f"x {x:.3f} y {y:.3f} z {z:.3f} rx {rx:.4f} ry {ry:.4f} rz {rz:.4f}"
 
 
 def _signals(job: InformJob, step: Instruction) -> list[str]:

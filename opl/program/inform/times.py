@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from itertools import pairwise
 
-from opl.cell.robot import Robot, forward_kinematics
-from opl.geometry.frames import inverse, rotation_angle
-from opl.program.inform.cartesian import pose_of, postures
-from opl.program.inform.job import InformJob
+import numpy as np
+
+from opl.cell.robot import Robot
+from opl.geometry.frames import Array, inverse
+from opl.program.inform.cartesian import configurations, rectan_pose
+from opl.program.inform.job import InformJob, Instruction
+from opl.program.played import SpeedUnit, WrittenSpeed, move_time
 from opl.program.pulses import PulseScale
 
-Array = NDArray[np.float64]
+# What the number of each speed is multiplied by to be in SI.
+_UNITS = {
+    "VJ": (SpeedUnit.TOP_SPEED, 1e-2),
+    "V": (SpeedUnit.TOOL_POINT, 1e-3),
+    "VR": (SpeedUnit.HAND, float(np.deg2rad(1.0))),
+}
 
 
-def job_postures(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool: Array) -> Array:
+def job_configurations(
+    job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool: Array
+) -> Array:
     """Return the joint positions of the taught positions of a job in [rad], shape (n, 6).
 
-    NaN stands for a position that no posture within the limits, or more than one, belongs to.
-
-    Args:
-        job: The job.
-        robot: Whose job.
-        T_base_frame: The frame of its Cartesian positions.
-        T_flange_tool: Its tool.
+    NaN stands for a position that no configuration within the limits, or more than one, belongs to.
     """
     scale = PulseScale.of(robot)
     q = np.full((len(job.positions), 6), np.nan)
@@ -32,12 +35,19 @@ def job_postures(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_too
             continue
         if position.coordinates == "PULSE":
             q[k] = scale.to_angles(np.array(position.values[:6]))
-        elif position.coordinates == "RECTAN" and len(position.configuration) >= 6:
-            T_base_flange = T_base_frame @ pose_of(position.values) @ inverse(T_flange_tool)
-            found = postures(robot, T_base_flange, position.configuration)
+        elif position.coordinates == "RECTAN" and len(position.rconf) >= 6:
+            T_base_flange = T_base_frame @ rectan_pose(position.values) @ inverse(T_flange_tool)
+            found = configurations(robot, T_base_flange, position.rconf)
             if len(found) == 1:
                 q[k] = found[0]
     return q
+
+
+def written_speed(move: Instruction) -> WrittenSpeed:
+    """Return the one speed of a move, VJ, V or VR."""
+    tag, value = next((name, value) for name, value in move.tags if name in _UNITS)
+    unit, factor = _UNITS[tag]
+    return WrittenSpeed(unit, factor * float(value), f"{tag}={value}")
 
 
 def move_times(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool: Array) -> Array:
@@ -49,17 +59,9 @@ def move_times(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool:
         T_base_frame: The frame of its Cartesian positions.
         T_flange_tool: Its tool.
     """
-    q = job_postures(job, robot, T_base_frame, T_flange_tool)
-    Ts_base_tool = forward_kinematics(robot, q) @ T_flange_tool
-    times = np.full(len(q), np.nan)
-    for k, move in enumerate(job.moves[1:], start=1):
-        if percent := move.tag("VJ"):
-            at_top_speed = (np.abs(q[k] - q[k - 1]) / robot.max_speed).max()
-            times[k] = at_top_speed * 100.0 / float(percent)
-        elif mm_per_second := move.tag("V"):
-            way = np.linalg.norm(Ts_base_tool[k, :3, 3] - Ts_base_tool[k - 1, :3, 3])
-            times[k] = way * 1e3 / float(mm_per_second)
-        elif degrees_per_second := move.tag("VR"):
-            turn = rotation_angle(Ts_base_tool[k - 1], Ts_base_tool[k])
-            times[k] = np.rad2deg(turn) / float(degrees_per_second)
-    return times
+    q = job_configurations(job, robot, T_base_frame, T_flange_tool)
+    times = [
+        move_time(written_speed(move), start, end, robot, T_flange_tool)
+        for move, (start, end) in zip(job.moves[1:], pairwise(q), strict=True)
+    ]
+    return np.array([np.nan, *times][: len(q)])

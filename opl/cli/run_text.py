@@ -1,0 +1,237 @@
+"""What the command line prints of runs, of proofs and of batches, all from their reports."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+import opl
+from opl.cli.progress import STAGES
+
+FILE_WIDTH = 120  # columns
+
+HEADINGS = {
+    "fixed": "contact fixed\nat t = 0",
+    "paper_start": "recursive,\npaper's start",
+    "recursive": "recursive,\nbest start",
+    "optimal": "optimal",
+}
+
+_REPLAYED = (
+    "{engine}: {poses} poses, {collisions} collisions, clearance {min_clearance_mm:.1f} mm or "
+    "more, contact error {max_contact_error_mm:.3f} mm at most, {limit_violations} limit violations"
+)
+
+
+def show_run(report: opl.Report, job: opl.Job, written: Sequence[Path], verbose: bool) -> None:
+    """Print what became of a job."""
+    console = _console()
+    if report.compared:
+        console.print(_comparison(report, job.cell.robot.joint_names))
+    lines = [f"warning: {warning}" for warning in report.warnings]
+    if report.path is not None:
+        lines += _facts(report, job)
+    if verbose:
+        for stage, label in STAGES.items():
+            if stage in report.seconds:
+                lines.append(f"  {label}: {report.seconds[stage]:.3f} s")
+    lines += [f"wrote {path}" for path in written]
+    _print(console, lines)
+
+
+def _comparison(report: opl.Report, joint_names: Sequence[str]) -> Table:
+    """Return what every path costs, contact fixed beside found, as in table 2 of the paper."""
+    table = Table(title="joint ranges along the path, in rad", title_justify="left")
+    table.add_column("joint")
+    for name in report.compared:
+        failed = ", not feasible" if name == "fixed" and not report.fixed.feasible else ""
+        table.add_column(HEADINGS[name] + failed, justify="right", min_width=10)
+    figures = list(report.compared.values())
+    for k, joint in enumerate(joint_names):
+        ranges = (f"{one.joint_ranges_rad[k]:.4f}" for one in figures)
+        table.add_row(joint, *ranges, end_section=joint == joint_names[-1])
+    sums = (f"{one.joint_range_sum_rad:.4f}" for one in figures)
+    table.add_row("sum", *sums, end_section=True)
+    table.add_row("joint travel", *(f"{one.joint_travel_rad:.2f}" for one in figures))
+    table.add_row("travel of t", *(f"{one.contact_travel:.0f}" for one in figures))
+    table.add_row("time on wheel, s", *(f"{one.seconds_on_wheel:.1f}" for one in figures))
+    weighted = [one.weighted_sum for one in figures if one.weighted_sum is not None]
+    if weighted:
+        table.add_row("weighted sum", *(f"{value:.4f}" for value in weighted))
+    return table
+
+
+def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
+    fixed, found, program = report.fixed, report.verification, report.program
+    path = report.path
+    assert path is not None
+    if not fixed.feasible:
+        yield f"contact fixed at t = 0 is not feasible: {fixed.reason}"
+    yield (
+        f"path: {report.cutter_points} cutter points in {report.passes} passes, "
+        f"{path.intermediate_nodes} intermediate nodes, branch {path.branch}"
+    )
+    yield from _certified(report, job.search.n_contact_positions)
+    # the clearance layer is part of the collision checks
+    spent = report.seconds["clearance"] + report.seconds["search"]
+    yield f"search with its collision checks: {spent:.2f} s"
+    if found is not None:
+        yield f"verified in {_REPLAYED.format(**vars(found))}"
+        if found.file is not None and found.file.proven:
+            yield (
+                f"read back from {', '.join(found.file.files)}: {found.file.postures} "
+                "configurations, moves and speeds as proven"
+            )
+    if program is not None:
+        if not program.read_back:
+            yield (
+                f"written, not read back: opl has no reader for {job.program.controller}, so "
+                "nothing is proven of the file itself"
+            )
+        worst = max((abs(one.error_percent) for one in program.passes), default=0.0)
+        yield f"program: {program.moves} moves, passes within {worst:.2f} % of their time"
+        yield from _times(report, job.cell.robot.title)
+        yield from _caution(
+            report.robot.unverified_pulse_ratios,
+            job.cell.robot.title,
+            "compare a configuration at the pendant before playing",
+        )
+
+
+# what the searches, and so their bounds, are limited to
+ONE_BRANCH = ", all passes on one IK branch and count of full turns,"
+
+
+def _certified(report: opl.Report, n_positions: int) -> Iterator[str]:
+    """Yield what the lower bounds say of the path; ``n_positions`` are those of the job."""
+    path = report.path
+    if path is None:
+        return
+    weighted = path.weighted
+    if weighted is not None:
+        yield (
+            f"no path through these points at {n_positions} contact positions{ONE_BRANCH} has a "
+            f"weighted sum below {weighted.lower_bound:.4f}: the one found has "
+            f"{weighted.value:.4f}, {100.0 * weighted.gap:.1f} % of which may be too much"
+        )
+    bound, gap = path.lower_bound_rad, path.gap
+    if bound is None or gap is None:
+        return
+    yield (
+        f"no motion along these passes has a joint range sum below {bound:.4f} rad, at any contact "
+        "positions, each pass on one IK branch and count of full turns (approach, links and "
+        f"retract not counted): the one found is within {100.0 * gap:.3f} % of the least there is"
+    )
+
+
+def _times(report: opl.Report, robot: str) -> Iterator[str]:
+    """Yield where the feed is not kept, and how long the program takes."""
+    feed, cycle = report.feed, report.cycle
+    if feed is not None and feed.lowered:
+        worst = min(feed.lowered, key=lambda one: one.lowest_mm_s)
+        why = ", ".join(
+            limit.kind if limit.joint is None else f"{limit.kind} of joint {limit.joint}"
+            for limit in worst.limits
+        )
+        yield (
+            f"feed: {feed.set_mm_s:g} mm/s, less on {len(feed.lowered)} stretches, which take "
+            f"{sum(one.longer_s for one in feed.lowered):.1f} s longer; {worst.lowest_mm_s:.1f} "
+            f"mm/s at the least, pass {worst.pass_} cutter points {worst.from_cutter_point:.1f} to "
+            f"{worst.to_cutter_point:.1f} ({why})"
+        )
+        if feed.longest_dwell_at is not None:
+            yield (
+                f"longest dwell on one spot: {feed.longest_dwell_s:.2f} s at cutter point "
+                f"{feed.longest_dwell_at:.1f}, {feed.max_dwell_s:g} s allowed"
+            )
+    elif feed is not None:
+        yield f"feed: {feed.set_mm_s:g} mm/s all over"
+    if cycle is None:
+        return
+    waits = f", {cycle.waits_s:.1f} s waiting" if cycle.waits_s else ""
+    open_end = "; and as long as inputs and other programs take" if cycle.open_ended else ""
+    yield (
+        f"cycle time: {cycle.total_s:.1f} s, of it {cycle.passes_s:.1f} s on the wheel, "
+        f"{cycle.approach_and_retract_s:.1f} s to it and away, {cycle.air_s:.1f} s in the air"
+        f"{waits}{open_end}"
+    )
+    if cycle.accelerations_assumed:
+        yield (
+            f"joint accelerations of {robot} are assumed, and these times with them; "
+            f"{opl.keys.PROCESS_MAX_ACCELERATION} knows better"
+        )
+
+
+def show_proof(report: Mapping[str, Any], robot: str) -> None:
+    """Print what was proven of a program, or how far the proof came.
+
+    Args:
+        report: What was found out.
+        robot: The robot, for people.
+    """
+    lines = [f"read {path}" for path in report["files"]]
+    lines += [f"calls {name}, which was not looked at" for name in report["calls_not_looked_at"]]
+    if report["engine"] is not None:
+        lines += [
+            f"{report['positions']} positions, {report['duration_s']:.1f} s, for {robot}",
+            f"{report['cutter_points_ground']} of {report['cutter_points']} cutter points "
+            f"recognised in order, {report['passes']} passes",
+            f"replayed in {_REPLAYED.format(**report)}",
+        ]
+    lines += _caution(report["unverified_pulse_ratios"], robot, "the proof rests on them")
+    if report["as_written"] is None:
+        lines.append("no result.json beside it tells whether opl run wrote these very bytes")
+    elif report["as_written"]:
+        lines.append("to the last byte what opl run proved and wrote")
+    found = len(report["findings"])
+    lines.append("proven" if report["proven"] else f"not proven: {found} findings")
+    _print(_console(), lines)
+
+
+def _caution(unverified: Sequence[str], robot: str, what: str) -> Iterator[str]:
+    if unverified:
+        joints = ", ".join(unverified)
+        yield f"caution: the pulse ratios of {joints} of {robot} are not verified; {what}"
+
+
+def show_batch(rows: Sequence[opl.BatchRow]) -> None:
+    """Print what became of the jobs of a batch."""
+    console = _console()
+    table = Table()
+    for heading in ("job", "status", "cutter points", "range sum [rad]", "time [s]", "files in"):
+        # as Text: rich would take a unit in brackets for markup and leave it out
+        table.add_column(Text(heading), overflow="fold")
+    lines = []
+    for row in rows:
+        points = total = spent = ""
+        if row.result is not None:
+            points, spent = str(row.result.cutter_points), f"{row.result.seconds['total']:.1f}"
+            if row.result.path is not None:
+                total = f"{row.result.path.joint_range_sum_rad:.4f}"
+        folder = "" if row.folder is None else str(row.folder)
+        cells = (str(row.job), row.status, points, total, spent, folder)
+        table.add_row(*(Text(cell) for cell in cells))
+        if row.message:
+            named = row.message.startswith(str(row.job))
+            message = row.message if named else f"{row.job}: {row.message}"
+            lines.append(message.replace("\n", "\n  "))
+    console.print(table)
+    good = sum(row.exit_status == 0 for row in rows)
+    _print(console, [*lines, f"{good} of {len(rows)} jobs have a program"])
+
+
+def _console() -> Console:
+    """Return standard output; in a file or a pipe wide enough for the tables."""
+    width = None if sys.stdout.isatty() else FILE_WIDTH
+    return Console(highlight=False, soft_wrap=True, width=width)
+
+
+def _print(console: Console, lines: Sequence[str]) -> None:
+    for line in lines:
+        console.print(line, markup=False)

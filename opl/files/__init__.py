@@ -1,0 +1,1 @@
+"""Files that people write, and where the data that comes with opl lies."""

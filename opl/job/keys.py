@@ -1,0 +1,53 @@
+"""Key paths of a job file that messages of the rooms above name."""
+
+from __future__ import annotations
+
+NAME = "name"
+CLEARANCE = "clearance_mm"
+
+# a YAML file that has one of these keys is a job
+OF_A_JOB = frozenset({"workpiece", "wheel", "passes"})
+
+WHEEL_POSE = "wheel.T_base_contact0_mm"
+WHEEL_WIDTH = "wheel.width_mm"
+WHEEL_MAX_ROLL = "wheel.max_roll_deg"
+WHEEL_MAX_BELT_PENETRATION = "wheel.max_belt_penetration_mm"
+
+FIXTURE_POSE = "fixture.T_flange_workpiece_mm"
+
+SURFACE = "workpiece.surface"
+PART = "workpiece.mesh"
+FACES = "workpiece.faces"
+
+PASSES = "passes"
+# by the attribute of `opl.geometry.passes.Passes` that an error names
+OF_PASSES = {
+    "plane_normal": "passes.plane_normal",
+    "pitch": "passes.pitch_mm",
+    "max_bow_height": "passes.max_chord_error_mm",
+    "largest_step": "passes.max_step_mm",
+    "rows": "passes.rows",
+    "kind": "passes.kind",
+    "repeats": "passes.repeats",
+}
+
+SEARCH_CONTACT_WEIGHT = "search.weights.contact"
+
+PROCESS_HOME = "process.home_deg"
+PROCESS_FEED = "process.feed_mm_s"
+PROCESS_CONTACT_SPEED = "process.max_contact_speed"
+PROCESS_MAX_DWELL = "process.max_dwell_s"
+PROCESS_MAX_ACCELERATION = "process.max_acceleration_deg_s2"
+
+# by the setting that a `SettingError` names
+OF_PROGRAM = {
+    "controller": "program.controller",
+    "tool": "program.tool",
+    "user_frame": "program.user_frame.number",
+    "accepted_pulses": "program.accept_unverified_pulses",
+    "pulses_per_radian": "program.pulse_ratios",
+}
+PROGRAM_CONTROLLER = "program.controller"
+PROGRAM_MOTION = "program.motion"
+PROGRAM_PULSE_RATIOS = "program.pulse_ratios"
+PROGRAM_ACCEPT_UNVERIFIED_PULSES = "program.accept_unverified_pulses"

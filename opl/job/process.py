@@ -1,0 +1,84 @@
+"""The section ``process`` of a job file: how fast the robot moves, where it starts and ends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import ConfigDict, Field
+
+from opl.cell.robot import Robot
+from opl.files.documents import Document
+from opl.geometry.frames import Array
+from opl.job.bodies import MM, Positive, Six
+from opl.motion.process_settings import ProcessSettings
+
+SixPositive = Annotated[list[Positive], Field(min_length=6, max_length=6)]
+
+
+class ProcessSection(Document):
+    """How fast the robot moves, and where it starts and ends."""
+
+    model_config = ConfigDict(title="Process")
+    renamed: ClassVar[Mapping[str, str]] = {
+        "air_speed_percent": "free_move_speed_percent",
+        "contact_speed": "max_contact_speed",
+    }
+
+    feed_mm_s: Positive = Field(
+        description="Speed of the ground point along the surface of the part."
+    )
+    home_deg: Six | None = Field(
+        default=None,
+        description="Joint positions at the start and the end of the program; given here or in the "
+        "cell file.",
+    )
+    approach_mm: Positive = Field(
+        default=50.0, description="Length of approach and retract off the wheel."
+    )
+    approach_turn_deg: Annotated[float, Field(ge=0.0, le=90.0)] = Field(
+        default=0.0,
+        description="0 for an approach straight along the contact normal; else the angle of an arc "
+        "along the belt, from -y to +y of the contact frame.",
+    )
+    approach_mm_s: Positive = Field(default=50.0, description="Speed of approach and retract.")
+    free_move_speed_percent: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
+        default=10.0,
+        description="Speed of free moves, from and to home and between passes: part of each "
+        "joint's largest speed.",
+    )
+    max_contact_speed: Positive = Field(
+        default=40.0,
+        description="Largest speed of the contact position on the wheel.",
+        json_schema_extra={"unit": "mm/s or deg/s"},
+    )
+    max_dwell_s: Positive = Field(
+        default=3.0,
+        description="Longest time that the belt may stay on one spot beyond the time at the feed.",
+    )
+    max_acceleration_deg_s2: SixPositive | None = Field(
+        default=None,
+        description="Largest acceleration of each joint; else the robot's own, which is assumed.",
+    )
+
+    def robot_as_limited(self, robot: Robot) -> Robot:
+        """Return the robot with the joint accelerations that the job names, if it does."""
+        if self.max_acceleration_deg_s2 is None:
+            return robot
+        limits = np.deg2rad(self.max_acceleration_deg_s2)
+        return replace(robot, max_acceleration=limits, acceleration_assumed=False)
+
+    def in_si(self, home: Array) -> ProcessSettings:
+        """Return the section's values; home in [rad], shape (6,)."""
+        return ProcessSettings(
+            feed=self.feed_mm_s * MM,
+            approach_length=self.approach_mm * MM,
+            approach_turn=float(np.deg2rad(self.approach_turn_deg)),
+            approach_speed=self.approach_mm_s * MM,
+            air_speed=self.free_move_speed_percent / 100.0,
+            contact_speed=self.max_contact_speed,
+            max_dwell=self.max_dwell_s,
+            home=home,
+        )

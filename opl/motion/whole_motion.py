@@ -1,0 +1,137 @@
+"""From the path on the wheel to a whole motion: home, approach, passes, retract, links, home.
+
+The part comes to the wheel and leaves it as `opl.motion.leads` says; between passes, and from and
+to home, all joints move together on a straight line in joint space, or on several around obstacles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from opl.cell.full_turns import principal
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.workcell import WorkCell
+from opl.geometry.frames import Array
+from opl.geometry.toolpath import CutterPoints
+from opl.motion.free_move_search import BlockedMoveError, FreeMoveSearch
+from opl.motion.leads import lead_offsets
+from opl.motion.motion import Motion, MoveKind
+from opl.motion.path import GrindingPath
+from opl.motion.process_settings import ProcessSettings
+
+
+class UnreachableApproachError(Exception):
+    """The configurations that lead to or from the wheel do not exist.
+
+    Args:
+        column: The cutter point.
+        cause: ``reach``, or ``limits of`` those by name.
+    """
+
+    def __init__(self, column: int, cause: str) -> None:
+        super().__init__(f"approach to cutter point {column}: {cause}")
+        self.column = column
+        self.cause = cause
+
+
+class BlockedMotionError(Exception):
+    """A free move of a motion is blocked.
+
+    Args:
+        move: Index in the motion of the configuration that the move should end at.
+        error: Why.
+    """
+
+    def __init__(self, move: int, error: BlockedMoveError) -> None:
+        super().__init__(f"free move to configuration {move}: {error}")
+        self.move = move
+        self.error = error
+
+
+def whole_motion(
+    cell: WorkCell, points: CutterPoints, path: GrindingPath, process: ProcessSettings
+) -> Motion:
+    """Join the passes of a path into one motion from home to home, its free moves straight.
+
+    Raises:
+        UnreachableApproachError: If an approach or retract leaves reach or limits.
+    """
+
+    def lead_at(k: int, kind: MoveKind) -> Array:
+        column, t = int(path.cutter_point[k]), path.contact_position[k]
+        return lead(cell, points, process, kind, path.ik_branch, column, t, path.q[k])
+
+    home = Motion.off_wheel(process.home[None], MoveKind.HOME, -1)
+    parts = [home]
+    for index in range(points.n_passes):
+        on_pass = np.flatnonzero(path.pass_index == index)
+        lead_in = lead_at(on_pass[0], MoveKind.APPROACH)
+        lead_out = lead_at(on_pass[-1], MoveKind.RETRACT)
+        free = MoveKind.HOME if index == 0 else MoveKind.LINK
+        place = path.cutter_point[on_pass]
+        parts += [
+            Motion.off_wheel(lead_in[-1:], free, index),
+            # the last move of the approach ends at the first cutter point
+            Motion.off_wheel(lead_in[-2::-1], MoveKind.APPROACH, index),
+            Motion(
+                path.q[on_pass],
+                tuple(map(MoveKind.at_cutter_point, place)),
+                path.contact_position[on_pass],
+                place,
+                path.pass_index[on_pass],
+            ),
+            Motion.off_wheel(lead_out, MoveKind.RETRACT, index),
+        ]
+    return Motion.joined([*parts, home])
+
+
+def linked(motion: Motion, search: FreeMoveSearch) -> Motion:
+    """Lead the free moves of a motion around obstacles.
+
+    Raises:
+        BlockedMotionError: If one of them cannot be found.
+    """
+    moves = np.flatnonzero(motion.free[1:]) + 1
+    inserted = []
+    for move in moves.tolist():
+        try:
+            inserted.append(search.find(motion.q[move - 1], motion.q[move]))
+        except BlockedMoveError as error:
+            raise BlockedMotionError(move, error) from error
+    before = np.repeat(moves, [len(q) for q in inserted])
+    return motion.with_inserted(before, np.concatenate(inserted)) if len(before) else motion
+
+
+def lead(
+    cell: WorkCell,
+    points: CutterPoints,
+    process: ProcessSettings,
+    kind: MoveKind,
+    ik_branch: int,
+    column: int,
+    contact_position: float,
+    q_contact: Array,
+) -> Array:
+    """Return configurations from just off the wheel to the far end of a lead, shape (k, 6).
+
+    `q_contact` in [rad], shape (6,), grinds the cutter point of the column at the contact position.
+
+    Raises:
+        UnreachableApproachError: If it leaves reach or limits.
+    """
+    offsets = lead_offsets(process.approach_length, process.approach_turn, kind)
+    T_contact_away = np.tile(np.eye(4), (len(offsets), 1, 1))
+    T_contact_away[:, :3, 3] = offsets
+    T_base_contact = cell.wheel.T_base_contact(contact_position)
+    T_base_flange = cell.Ts_base_flange(contact_position, points.Ts_workpiece_cutter[column])
+    T_contact_flange = np.linalg.solve(T_base_contact, T_base_flange)
+    Ts_base_flange = T_base_contact @ T_contact_away @ T_contact_flange
+    solutions = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_contact)[:, ik_branch]
+    if np.isnan(solutions).any():
+        raise UnreachableApproachError(column, "reach")
+    steps = principal(np.diff(solutions, axis=0, prepend=q_contact[None]))
+    q = q_contact + np.cumsum(steps, axis=0)
+    if not cell.within_limits(q).all():
+        names = " ".join(cell.broken_limits(q))
+        raise UnreachableApproachError(column, f"limits of {names}")
+    return q

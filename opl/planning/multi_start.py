@@ -1,0 +1,114 @@
+"""The recursive search of the paper from many start nodes, its tracks checked best first."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator
+from enum import Enum
+
+import numpy as np
+
+from opl.geometry.frames import Array
+from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
+from opl.planning.plan import Plan, SearchOutcome, first_free, propose_and_check
+from opl.planning.problem import GrindingProblem
+from opl.planning.symmetry import twins
+from opl.search.recursive import Descent, add_dead_ends, descend
+
+
+class Start(str, Enum):
+    """Where the search starts in the first column."""
+
+    BEST = "best"  # every start node is tried, the one with the least joint range sum is kept
+    NEAREST = "nearest"  # Node_1 of the paper: nearest to home
+
+
+def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
+    """Find a collision-free motion by the recursive search of the paper.
+
+    Raises:
+        NoPathError: If there is none, as in `first_free`.
+    """
+    matrices = open_matrices(problem)
+    return first_free(problem, matrices, _tracks(problem, matrices, start))
+
+
+def try_recursive(problem: GrindingProblem, start: Start, most_checks: int) -> SearchOutcome:
+    """Return what the recursive search finds within a number of checked motions."""
+    matrices = open_matrices(problem)
+    tracks = _tracks(problem, matrices, start)
+    return propose_and_check(problem, matrices, tracks, most_checks=most_checks)
+
+
+def _tracks(problem: GrindingProblem, matrices: list[OpenMatrix], start: Start) -> Iterator[Track]:
+    """Yield tracks in the order in which the search wants them checked."""
+    if start is Start.NEAREST:
+        yield from tracks_from_nearest_start(matrices, problem.process.home)
+        return
+    for track in tracks_from_best_start(matrices):
+        yield from twins(matrices, track, problem.cell.robot)
+
+
+def tracks_from_best_start(matrices: list[OpenMatrix]) -> Iterator[Track]:
+    """Yield tracks by increasing joint range sum over all start nodes of all matrices.
+
+    A start node is given up as soon as its sum reaches the best known. What a check of a track
+    blocks is noted in its matrix before the next is taken: only then a start node can yield again.
+    """
+    searches = [_Search(matrix) for matrix in matrices]
+    # (joint range sum, matrix, start row, rows); where a start was given up, its sum then and None
+    queue: list[tuple[float, int, int, np.ndarray | None]] = []
+    bound = np.inf
+    for index, search in enumerate(searches):
+        for row in np.flatnonzero(search.matrix.free[0]).tolist():
+            descent = search.descend(row, bound)
+            queue.append((descent.joint_range_sum, index, row, descent.rows))
+            if descent.rows is not None:
+                bound = min(bound, descent.joint_range_sum)
+    queue = [entry for entry in queue if np.isfinite(entry[0])]
+    heapq.heapify(queue)
+    while queue:
+        _, index, row, rows = heapq.heappop(queue)
+        if rows is not None and matrices[index].allows(rows):
+            yield Track(index, rows)
+            if matrices[index].allows(rows):
+                continue  # nothing was blocked: the same search would find the same track
+        descent = searches[index].descend(row, np.inf)
+        if descent.rows is not None:
+            heapq.heappush(queue, (descent.joint_range_sum, index, row, descent.rows))
+
+
+def tracks_from_nearest_start(matrices: list[OpenMatrix], home: Array) -> Iterator[Track]:
+    """Yield tracks from the start node nearest to home in [rad], then from the next nearest."""
+    starts = [
+        (float(np.linalg.norm(matrix.nodes.q[0, row] - home)), index, row)
+        for index, matrix in enumerate(matrices)
+        for row in np.flatnonzero(matrix.free[0]).tolist()
+    ]
+    searches = [_Search(matrix) for matrix in matrices]
+    for _, index, row in sorted(starts):
+        while (rows := searches[index].descend(row, np.inf).rows) is not None:
+            yield Track(index, rows)
+            if matrices[index].allows(rows):
+                break
+
+
+class _Search:
+    """The recursive search in one matrix; remembers its dead ends."""
+
+    def __init__(self, matrix: OpenMatrix) -> None:
+        self.matrix = matrix
+        self._dead = np.zeros_like(matrix.free)
+        # of the ladder as it was; a search that finds them itself also finds how far it can come
+        self._dead_ends = np.zeros_like(matrix.free)
+        add_dead_ends(matrix.ladder, matrix.blocked_edges, self._dead_ends)
+
+    def descend(self, start: int, bound: float) -> Descent:
+        matrix = self.matrix
+        if not matrix.free[0, start]:
+            return Descent(None, np.inf, 0)
+        # to stop at a bound is right only where the search would not have turned back
+        dead = self._dead_ends if np.isfinite(bound) else self._dead
+        descent = descend(matrix.ladder, start, matrix.blocked_edges, dead, bound)
+        matrix.reached = max(matrix.reached, descent.reached)
+        return descent

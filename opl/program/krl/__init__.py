@@ -1,0 +1,22 @@
+"""KUKA KRL programs (KRC2 and later): written, read back.
+
+Positions stand in the moves, so that no .dat file is needed. What is proven goes through the
+written points; the corners that C_PTP and C_DIS cut off are not. A single joint move may be one
+percent of top speed faster than planned; passes keep their time.
+"""
+
+from opl.program.digits import rounded_degrees
+from opl.program.krl.read import CORNERS, DECIMALS, START, parse
+from opl.program.krl.write import DIALECT, VARIABLES, tool_name, write
+from opl.program.listing import listing_reader
+from opl.program.posts import Post
+
+POST = Post(
+    "KUKA KRL",
+    write,
+    DIALECT.template,
+    VARIABLES,
+    reader=listing_reader(
+        DIALECT.suffix, parse, tool_name, rounded_degrees(DECIMALS), lambda robot: START, CORNERS
+    ),
+)

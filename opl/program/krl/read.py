@@ -1,0 +1,136 @@
+"""Reading KRL programs: PTP to axis angles and LIN to frames, speeds set before each move.
+
+KRL ignores case. A speed, a base, a tool and an approximation hold until they are set again; none
+of them may be missing at the first move, so that nothing of an earlier program counts. C_PTP and
+C_DIS are read, not played: the corners they cut off are not replayed. A speed of PTP is a whole
+percent, so a single move may be one percent faster than it should; passes keep their time.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from opl.geometry.frames import pose
+from opl.program.moves import START_SPEED
+from opl.program.played import Corner, Corners, ReadMove, SpeedUnit, WrittenSpeed
+from opl.program.statements import NUMBER, Listing, Notes, Words, read_enclosed
+
+DECIMALS = 4
+START = WrittenSpeed(SpeedUnit.TOP_SPEED, START_SPEED, f"BAS(#VEL_PTP, {100.0 * START_SPEED:.0f})")
+# Approximation as opl sets it: percent of C_PTP, and distance of C_DIS in [mm].
+_PTP_CORNER, _LIN_CORNER = 1.0, 0.5
+_STOP = Corner(0.0, "exact stop")
+_ROUNDED = Corner(
+    1.0, f"C_PTP with $APO.CPTP = {_PTP_CORNER:g} or C_DIS with $APO.CDIS = {_LIN_CORNER:g}"
+)
+CORNERS = Corners(_STOP, _ROUNDED, _ROUNDED, _ROUNDED)
+
+_BOOL = "(?:TRUE|FALSE)"
+_INPUT = rf"\$IN\[[0-9]+\] ?(?:==|<>) ?{_BOOL}"
+_WORDS = Words(
+    passing=re.compile(
+        rf"\$OUT\[[0-9]+\] ?= ?{_BOOL}|\$TIMER\[[0-9]+\] ?= ?-?[0-9]+"
+        rf"|\$TIMER_STOP\[[0-9]+\] ?= ?{_BOOL}",
+        re.I,
+    ),
+    waits=re.compile(
+        rf"WAIT SEC {NUMBER}|WAIT FOR {_INPUT}|WAIT FOR \({_INPUT}\) OR \$TIMER_FLAG\[[0-9]+\]"
+        "|HALT",
+        re.I,
+    ),
+    opens=re.compile(rf"REPEAT|IF {_INPUT} THEN", re.I),
+    closes=re.compile(rf"ENDIF|UNTIL {_INPUT}", re.I),
+    call=re.compile(r"(?!BAS\b)([A-Za-z]\w*) ?\( ?\)", re.I),
+)
+_BEGIN, _END = re.compile(r"DEF (\w+) ?\( ?\)", re.I), re.compile("END", re.I)
+_ABOUT_FILE = re.compile(r"^[ \t]*&.*$", re.M)
+_PTP = re.compile(
+    "PTP{" + ",".join(rf"A{axis}({NUMBER})" for axis in range(1, 7)) + "}(C_PTP)?", re.I
+)
+_LIN = re.compile("LIN{" + ",".join(rf"{axis}({NUMBER})" for axis in "XYZABC") + "}(C_DIS)?", re.I)
+_HALF_DIGIT = np.full(6, 0.5 * np.deg2rad(10.0**-DECIMALS))
+# What the digits of a frame may do to a joint in [rad], in no singularity.
+_POSE_DIGITS = np.full(6, 1e-4)
+
+
+# Statements that set something: what messages call it, and its value as the first group.
+_BEGUN, _BASE, _TOOL = "BAS(#INITMOV, 0)", "$BASE", "$TOOL"
+_PERCENT, _METRES, _CPTP, _CDIS = "BAS(#VEL_PTP, n)", "$VEL.CP", "$APO.CPTP", "$APO.CDIS"
+_ALWAYS = (_BEGUN, _BASE, _TOOL)
+_SETTINGS = {
+    _BEGUN: re.compile(r"BAS ?\( ?#(INITMOV) ?, ?0 ?\)", re.I),
+    _PERCENT: re.compile(r"BAS ?\( ?#VEL_PTP ?, ?([0-9]+) ?\)", re.I),
+    _BASE: re.compile(r"\$BASE ?= ?(\$NULLFRAME)", re.I),
+    _TOOL: re.compile(r"\$TOOL ?= ?(\$NULLFRAME|TOOL_DATA\[[0-9]+\])", re.I),
+    _METRES: re.compile(rf"\$VEL\.CP ?= ?({NUMBER})", re.I),
+    _CPTP: re.compile(rf"\$APO\.CPTP ?= ?({NUMBER})", re.I),
+    _CDIS: re.compile(rf"\$APO\.CDIS ?= ?({NUMBER})", re.I),
+}
+
+
+def parse(text: str, source: str) -> Listing:
+    """Return the program of a file; see `listing_reader`."""
+    notes = Notes(source, _WORDS)
+    state: dict[str, str] = {}  # what holds until it is set again
+
+    def statement(line: int, code: str) -> None:
+        for name, pattern in _SETTINGS.items():
+            if found := pattern.fullmatch(code):
+                state[name] = found[1].upper()
+                notes.setting(line, code)
+                return
+        tight = code.replace(" ", "")
+        if found := _PTP.fullmatch(tight):
+            needed, build = (*_ALWAYS, _PERCENT, _CPTP), _ptp
+        elif found := _LIN.fullmatch(tight):
+            needed, build = (*_ALWAYS, _METRES, _CDIS), _lin
+        else:
+            notes.other(line, code)
+            return
+        if missing := [name for name in needed if name not in state]:
+            notes.doubt(line, f"moves before this is set: {', '.join(missing)}")
+            return
+        *texts, rounds = found.groups()
+        values = [float(text) for text in texts]
+        notes.move(line, code, build(state, values, rounds is not None, notes.place(line)), tight)
+
+    return read_enclosed(notes, _ABOUT_FILE.sub("", text), ";", _BEGIN, _END, statement)
+
+
+def _ptp(state: Mapping[str, str], values: list[float], rounds: bool, place: str) -> ReadMove:
+    percent = int(state[_PERCENT])
+    return ReadMove(
+        target=np.deg2rad(values),
+        straight=False,
+        speed=WrittenSpeed(SpeedUnit.TOP_SPEED, percent / 100.0, f"BAS(#VEL_PTP, {percent})"),
+        corner=_corner(rounds, f"C_PTP with {_CPTP} = {state[_CPTP]}", state[_CPTP], _PTP_CORNER),
+        tool=state[_TOOL],
+        place=place,
+        resolution=_HALF_DIGIT,
+        last_digit=1.0 / max(percent, 1),
+    )
+
+
+def _lin(state: Mapping[str, str], values: list[float], rounds: bool, place: str) -> ReadMove:
+    turned = Rotation.from_euler("ZYX", values[3:], degrees=True).as_matrix()
+    return ReadMove(
+        target=pose(turned, np.array(values[:3]) * 1e-3),
+        straight=True,
+        speed=WrittenSpeed(
+            SpeedUnit.TOOL_POINT, float(state[_METRES]), f"{_METRES} = {state[_METRES]}"
+        ),
+        corner=_corner(rounds, f"C_DIS with {_CDIS} = {state[_CDIS]}", state[_CDIS], _LIN_CORNER),
+        tool=state[_TOOL],
+        place=place,
+        resolution=_POSE_DIGITS,
+    )
+
+
+def _corner(rounds: bool, text: str, written: str, usual: float) -> Corner:
+    """Return a corner; its size counts in those that opl writes."""
+    size = float(written) / usual
+    return Corner(size, text) if rounds and size else _STOP

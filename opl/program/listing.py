@@ -1,0 +1,149 @@
+"""A program of statements as a reader gives it: played, described, compared with another."""
+
+from __future__ import annotations
+
+import difflib
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+
+from opl.cell.robot import Robot, controller_poses
+from opl.errors import InputError
+from opl.findings import Finding, Level
+from opl.geometry.frames import Array, roll_pitch_yaw
+from opl.program.digits import Rounding
+from opl.program.played import Corners, Reading, ReadMove, WrittenSpeed, play
+from opl.program.posts import Reader
+from opl.program.settings import ProgramSettings
+from opl.program.statements import Listing
+
+
+def listing_reader(
+    suffix: str,
+    parse: Callable[[str, str], Listing],
+    tool_name: Callable[[ProgramSettings], str],
+    rounded: Rounding,
+    start: Callable[[Robot], WrittenSpeed],
+    corners: Corners,
+) -> Reader:
+    """Return the reader of a language whose programs are listings of one file.
+
+    Args:
+        suffix: How the names of its files end.
+        parse: Returns the program of a text, given the name of its file too; raises an `InputError`
+            if it holds none.
+        tool_name: Returns the tool of a job as the language names it.
+        rounded: See `Reader`.
+        start: The fastest first move.
+        corners: The largest corners, whatever the job.
+    """
+
+    def parsed(name: str, content: bytes) -> Listing:
+        try:
+            text = content.decode("ascii")
+        except UnicodeDecodeError as error:
+            raise InputError(name, f"is not ASCII at byte {error.start}") from error
+        return parse(text, name)
+
+    def read(files: Mapping[str, bytes], robot: Robot, settings: ProgramSettings) -> Reading:
+        if len(files) != 1:
+            raise InputError("program", f"is one file in this language, got {len(files)}")
+        listing = parsed(*next(iter(files.items())))
+        doubts = [*listing.doubts, *_other_tools(listing.moves, tool_name(settings))]
+        for called, place in listing.calls:
+            if called not in settings.actions.calls:
+                message = f"calls {called}, which the job does not call"
+                doubts.append(Finding(Level.ERROR, "program", place, message))
+        playback, faults = play(listing.moves, robot, settings.T_flange_tool)
+        doubts += faults
+        foreign = tuple(dict.fromkeys(called for called, _ in listing.calls))
+        return Reading(None if doubts else playback, foreign, tuple(doubts))
+
+    def describe(name: str, content: bytes, robot: Robot) -> list[str]:
+        return _described(parsed(name, content), robot)
+
+    def differences(first: tuple[str, bytes], second: tuple[str, bytes]) -> list[str]:
+        return changed_lines(_meaning(parsed(*first)), _meaning(parsed(*second)))
+
+    return Reader(suffix, read, rounded, start, lambda settings: corners, describe, differences)
+
+
+def changed_lines(before: list[tuple[str, str]], after: list[tuple[str, str]]) -> list[str]:
+    """Return what differs, one line each: ``-`` stands in the first only, ``+`` in the second.
+
+    Args:
+        before: Place and meaning of what the first program says, in order: dates, comments, spaces
+            and zeros at the end of a number do not count.
+        after: The same of the second.
+    """
+    lines = []
+    # no line is too common to matter: autojunk would skip them
+    texts = [text for _, text in before], [text for _, text in after]
+    for tag, a, b, c, d in difflib.SequenceMatcher(None, *texts, autojunk=False).get_opcodes():
+        if tag != "equal":
+            lines += [f"- {place}: {text}" for place, text in before[a:b]]
+            lines += [f"+ {place}: {text}" for place, text in after[c:d]]
+    return lines
+
+
+def _described(listing: Listing, robot: Robot) -> list[str]:
+    """Return the summary of a program and its statements in order, one line each."""
+    moves = listing.moves
+    words = Counter(one.text.split("(")[0].split()[0] for one in listing.statements if one.move)
+    corners = Counter(move.corner.text for move in moves)
+    lines = [
+        f"read as a program of {robot.title}",
+        f"program {listing.name}, tool {', '.join(dict.fromkeys(m.tool for m in moves)) or 'none'}",
+        *(f"{count} {word}" for word, count in words.items()),
+        *(f"{count} ends of moves: {text}" for text, count in corners.items()),
+    ]
+    if listing.calls:
+        lines.append(f"calls: {', '.join(dict.fromkeys(name for name, _ in listing.calls))}")
+    lines += [f"caution: {doubt.where}: {doubt.message}" for doubt in listing.doubts]
+    lines.append("")
+    for one in listing.statements:
+        lines.append(f"{one.line:5d}  {one.text}")
+        if one.move is not None:
+            lines += [f"       {text}" for text in _where(one.move, robot)]
+    return lines
+
+
+def _meaning(listing: Listing) -> list[tuple[str, str]]:
+    stated = [(f"line {one.line}", one.meaning) for one in listing.statements]
+    return [("name", listing.name), *stated]
+
+
+def _where(move: ReadMove, robot: Robot) -> Iterator[str]:
+    if move.target.shape == (4, 4):
+        yield "in the base frame: " + pose_text(pose_values(move.target))
+        return
+    yield angles_text(move.target, robot)
+    yield "flange " + pose_text(pose_values(controller_poses(robot, move.target)))
+
+
+def angles_text(q: Array, robot: Robot) -> str:
+    """Return a configuration in [deg] for people."""
+    named = zip(robot.joint_names, np.rad2deg(q), strict=True)
+    return "angles " + " ".join(f"{name} {angle:.3f}" for name, angle in named)
+
+
+def pose_values(T: Array) -> tuple[float, ...]:
+    """Return x, y, z in [mm] and rx, ry, rz in [deg] of a pose."""
+    return (*T[:3, 3] * 1e3, *np.rad2deg(roll_pitch_yaw(T)))
+
+
+def pose_text(values: tuple[float, ...]) -> str:
+    """Return x, y, z in [mm] and rx, ry, rz in [deg] for people."""
+    x, y, z, rx, ry, rz = values
+    return f"x {x:.3f} y {y:.3f} z {z:.3f} rx {rx:.4f} ry {ry:.4f} rz {rz:.4f}"
+
+
+def _other_tools(moves: tuple[ReadMove, ...], tool: str) -> Iterator[Finding]:
+    """Look for moves with another tool than the job's; of several in a row the first is named."""
+    before = tool
+    for move in moves:
+        if move.tool not in (tool, before):
+            message = f"moves with tool {move.tool}; the job's is {tool}"
+            yield Finding(Level.ERROR, "program", move.place, message)
+        before = move.tool

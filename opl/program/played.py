@@ -1,0 +1,242 @@
+"""What a controller does with a program as it stands in its files, whatever the language.
+
+A joint move turns all joints in step. A straight move leads the tool point along a line and turns
+the hand about one axis; here it becomes configurations so near to each other that turning the
+joints in step between them is the same. Corners are taken as written, not as the controller rounds
+them: the playback goes through every written point, and each move says how far its end may be
+rounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opl.cell.full_turns import nearest_turn
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import Robot, forward_kinematics
+from opl.findings import Finding, Level
+from opl.geometry.frames import Array, inverse, rotation_angle
+from opl.program.lines import straight_configurations
+from opl.program.moves import Purpose
+
+# How far beyond a quarter turn an axis may be where the file names its neighbour [rad]: digits.
+_QUARTER_SLACK = np.deg2rad(0.01)
+
+
+class SpeedUnit(Enum):
+    """What the number of a speed counts."""
+
+    SECONDS = "time of the move in [s]"
+    TOP_SPEED = "fraction of the top speed of the joint that takes longest"
+    LEADING_JOINT = "speed of the joint that turns farthest in [rad/s]"
+    TOOL_POINT = "speed of the tool point in [m/s]"
+    HAND = "speed at which the hand turns in [rad/s]"
+
+
+@dataclass(frozen=True)
+class WrittenSpeed:
+    """The speed of a move as written.
+
+    Attributes:
+        unit: What the value counts.
+        value: In SI.
+        text: As in the file.
+    """
+
+    unit: SpeedUnit
+    value: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Corner:
+    """How far a controller may round the corner at the end of a move.
+
+    Attributes:
+        size: In the language's own measure, 0 for an exact stop, infinite where nothing says.
+        text: As in the file.
+    """
+
+    size: float
+    text: str
+
+    @property
+    def exact_stop(self) -> bool:
+        """Whether the robot comes to rest there."""
+        return self.size == 0.0
+
+
+@dataclass(frozen=True)
+class Corners:
+    """The largest corners a job allows; for each kind of move, and where the robot has to stop."""
+
+    stop: Corner
+    on_wheel: Corner
+    lead: Corner
+    air: Corner
+
+    def of(self, kind: Purpose) -> Corner:
+        """Return the largest corner after a move of a kind."""
+        corner: Corner = getattr(self, kind.value)
+        return corner
+
+
+@dataclass(frozen=True, eq=False)
+class ReadMove:
+    """A move as a file gives it.
+
+    Attributes:
+        target: Where it ends: a configuration in [rad], shape (6,), or the pose of the tool in the
+            base frame that the controller counts from, shape (4, 4).
+        straight: Whether the tool point runs on a straight line instead of the joints.
+        speed: How fast.
+        corner: How its end may be rounded.
+        tool: The tool it is written with, as the language names it.
+        place: File and line, for people.
+        resolution: Half of the last digit of the target in [rad], shape (6,).
+        last_digit: The last digit of the speed as a fraction of it, where the language is so coarse
+            that a single move may be faster by that much; 0 elsewhere.
+        quarters: Quarter turns of axes 1, 4 and 6 that the file states beside a pose; none where
+            it states none.
+        starts: Whether a program begins with it, so that nobody knows from where it comes.
+        waits: What the robot stands still for at its end, as written.
+    """
+
+    target: Array
+    straight: bool
+    speed: WrittenSpeed
+    corner: Corner
+    tool: str
+    place: str
+    resolution: Array
+    last_digit: float = 0.0
+    quarters: tuple[int, ...] = ()
+    starts: bool = False
+    waits: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Playback:
+    """Configurations in the order they are visited, joined by linear joint interpolation.
+
+    Attributes:
+        q: Joint positions in [rad], shape (n, 6).
+        duration: Time of the move that ends at each configuration at the written speed, ramps left
+            out, in [s], shape (n,); 0 for the first, which is reached from wherever the robot is.
+        stations: Indices of the configurations that are written, in order; the others lie on lines
+            between them, shape (m,).
+        moves: The move to each of these, m items.
+    """
+
+    q: Array
+    duration: Array
+    stations: NDArray[np.intp]
+    moves: tuple[ReadMove, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What was read from the files of a program.
+
+    Attributes:
+        playback: What the controller does, None where that is in doubt.
+        foreign: Names of the user's own programs that are called and were not looked at.
+        findings: What a controller would refuse, and what cannot be followed without doubt.
+    """
+
+    playback: Playback | None
+    foreign: tuple[str, ...]
+    findings: tuple[Finding, ...]
+
+
+def play(
+    moves: Sequence[ReadMove], robot: Robot, T_flange_tool: Array
+) -> tuple[Playback | None, list[Finding]]:
+    """Return what a controller does with moves, and what is in doubt; None if something is.
+
+    Args:
+        moves: In the order the controller makes them.
+        robot: Whose moves.
+        T_flange_tool: The tool whose point runs straight, shape (4, 4).
+    """
+    if not moves:
+        return None, [Finding(Level.ERROR, "program", "program", "moves nothing")]
+    legs: list[Array] = []
+    times: list[Array] = []
+    found: list[Finding] = []
+    q: Array | None = None
+    for move in moves:
+        end = _end(move, q, robot, T_flange_tool)
+        found += _faults(move, end)
+        if end is None:
+            continue
+        leg: Array | None = end[None]
+        if move.straight and q is not None:
+            leg = straight_configurations(robot, q, end, T_flange_tool)
+            if leg is None:
+                message = "the straight move does not lead to the configuration that is written"
+                found.append(_fault(move, message))
+                leg = end[None]
+        assert leg is not None
+        time = 0.0 if q is None else move_time(move.speed, q, end, robot, T_flange_tool)
+        legs.append(leg)
+        times.append(np.full(len(leg), time / len(leg)))
+        q = end
+    if found:
+        return None, found
+    stations = np.cumsum([len(leg) for leg in legs]) - 1
+    return Playback(np.concatenate(legs), np.concatenate(times), stations, tuple(moves)), []
+
+
+def _end(move: ReadMove, q: Array | None, robot: Robot, T_flange_tool: Array) -> Array | None:
+    """Return the configuration a move ends in: of a pose the one next to where it starts."""
+    if move.target.shape != (4, 4):
+        return None if np.isnan(move.target).any() else move.target
+    if q is None:
+        return None
+    T_base_flange = inverse(robot.T_controller_base) @ move.target @ inverse(T_flange_tool)
+    (candidates,) = inverse_kinematics(robot.arm, T_base_flange[None], q[None])
+    turned = nearest_turn(candidates, q)
+    away = np.abs(turned - q).max(axis=1)
+    return None if np.isnan(away).all() else np.asarray(turned[int(np.nanargmin(away))])
+
+
+def _faults(move: ReadMove, end: Array | None) -> Iterator[Finding]:
+    if not move.speed.value > 0.0:
+        yield _fault(move, f"{move.speed.text}: must be above 0")
+    if end is None:
+        yield _fault(move, "no single configuration within the limits belongs to it")
+    elif move.quarters:
+        turns = end[[0, 3, 5]] / (np.pi / 2.0) - np.array(move.quarters)
+        slack = _QUARTER_SLACK / (np.pi / 2.0)
+        if (turns < -slack).any() or (turns > 1.0 + slack).any():
+            yield _fault(move, "the quarter turns of its axes are not those of its pose")
+
+
+def move_time(
+    speed: WrittenSpeed, start: Array, end: Array, robot: Robot, T_flange_tool: Array
+) -> float:
+    """Return the time of a move in [s], ramps left out."""
+    if speed.unit is SpeedUnit.SECONDS:
+        return speed.value
+    turned = np.abs(end - start)
+    if speed.unit is SpeedUnit.TOP_SPEED:
+        distance = float((turned / robot.max_speed).max())
+    elif speed.unit is SpeedUnit.LEADING_JOINT:
+        distance = float(turned.max())
+    else:
+        T_start, T_end = forward_kinematics(robot, np.stack([start, end])) @ T_flange_tool
+        if speed.unit is SpeedUnit.TOOL_POINT:
+            distance = float(np.linalg.norm(T_end[:3, 3] - T_start[:3, 3]))
+        else:
+            distance = float(rotation_angle(T_start, T_end))
+    return distance / speed.value if speed.value > 0.0 else 0.0
+
+
+def _fault(move: ReadMove, message: str) -> Finding:
+    return Finding(Level.ERROR, "program", move.place, message)

@@ -1,0 +1,122 @@
+"""Reading RAPID modules: MoveAbsJ to joint targets and MoveL to poses, each with its time.
+
+RAPID ignores case. The zones of the moves are read, not played: z0 lets the controller leave the
+written points by up to 0.3 mm of the tool point, which is not replayed.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from opl.geometry.frames import pose
+from opl.program.played import Corner, Corners, ReadMove, SpeedUnit, WrittenSpeed
+from opl.program.statements import NUMBER, Listing, Notes, Words, code_lines
+
+DECIMALS = 4
+# Of the move to the first configuration, which has no time.
+START = WrittenSpeed(SpeedUnit.TOOL_POINT, 0.05, "v50")
+_FINEST_ZONE = 0.3  # z0 in [mm] of the tool point; the others are named after theirs
+_ZONE = Corner(_FINEST_ZONE, "z0")
+CORNERS = Corners(Corner(0.0, "fine"), _ZONE, _ZONE, _ZONE)
+
+_WORDS = Words(
+    passing=re.compile(r'(?:SetDO do[0-9]+, ?[01]|TPWrite "[^"]*"|TPErase) ?;', re.I),
+    waits=re.compile(
+        rf"(?:WaitTime {NUMBER}|Stop"
+        rf"|WaitDI di[0-9]+, ?[01](?: ?\\MaxTime ?:= ?{NUMBER} ?\\TimeFlag ?:= ?late)?) ?;",
+        re.I,
+    ),
+    opens=re.compile(r"WHILE late DO", re.I),
+    closes=re.compile(r"ENDWHILE", re.I),
+    call=re.compile(r"([A-Za-z]\w*) ?;"),
+)
+_ROW = rf"\[((?:{NUMBER},)*{NUMBER})\]"
+_NO_AXES = r"\[9E9(?:,9E9){5}\]"
+_REST = rf",v([0-9]+)(?:\\T:=({NUMBER}))?,(fine|z[0-9]+),(\w+);"
+_ABSOLUTE = re.compile(rf"MoveAbsJ\[{_ROW},{_NO_AXES}\](?:\\NoEOffs)?{_REST}", re.I)
+_LINE = re.compile(rf"MoveL\[{_ROW},{_ROW},{_ROW},{_NO_AXES}\]{_REST}", re.I)
+_HALF_DIGIT = np.full(6, 0.5 * np.deg2rad(10.0**-DECIMALS))
+# What the digits of a pose may do to a joint in [rad], in no singularity.
+_POSE_DIGITS = np.full(6, 1e-4)
+
+
+# The lines that enclose the procedure, and how many of them stand before its statements.
+_FRAME = (
+    re.compile(r"MODULE \w+", re.I),
+    re.compile(r"PROC (?P<name>\w+) ?\( ?\)", re.I),
+    re.compile(r"ENDPROC", re.I),
+    re.compile(r"ENDMODULE", re.I),
+)
+_INSIDE = 2
+_VARIABLE = re.compile(r"VAR bool late ?:= ?FALSE ?;", re.I)
+_CONF = re.compile(r"ConfL ?\\(On|Off) ?;", re.I)
+
+
+def parse(text: str, source: str) -> Listing:
+    """Return the program of a module; see `listing_reader`."""
+    notes = Notes(source, _WORDS)
+    passed = 0  # of the lines that enclose the procedure
+    free = False  # whether ConfL is off
+    line = 0
+    for line, code in code_lines(text, "!"):
+        if passed < len(_FRAME) and (found := _FRAME[passed].fullmatch(code)):
+            passed += 1
+            if passed == _INSIDE:
+                notes.name = found["name"]
+        elif passed == _INSIDE - 1 and _VARIABLE.fullmatch(code):
+            continue
+        elif passed != _INSIDE:
+            notes.doubt(line, f"{code} stands outside of the procedure")
+        elif switch := _CONF.fullmatch(code):
+            free = switch[1].lower() == "off"
+            notes.setting(line, code)
+        else:
+            _statement(notes, line, code, free)
+    if passed < len(_FRAME):
+        notes.doubt(line, "the module does not end")
+    return notes.listing(line)
+
+
+def _statement(notes: Notes, line: int, code: str, free: bool) -> None:
+    tight = code.replace(" ", "")
+    found = _ABSOLUTE.fullmatch(tight) or _LINE.fullmatch(tight)
+    groups = found.groups() if found else ()
+    *rows, v, time, zone, tool = groups or ("", "", "", "")
+    numbers = [np.array([float(number) for number in row.split(",")]) for row in rows]
+    sizes = [len(row) for row in numbers]
+    quarters: tuple[int, ...] = ()
+    if sizes == [6]:
+        (target,) = np.deg2rad(numbers)
+    elif sizes == [3, 4, 4]:
+        p, (w, *xyz), turns = numbers
+        if not free:
+            notes.doubt(line, "MoveL stands where ConfL is not off")
+        if abs(np.linalg.norm([w, *xyz]) - 1.0) > 1e-4:
+            notes.doubt(line, "the quaternion is not of length 1")
+            return
+        target = pose(Rotation.from_quat([*xyz, w]).as_matrix(), p * 1e-3)
+        quarters = tuple(int(turn) for turn in turns[:3])
+    else:
+        notes.other(line, code)
+        return
+    if time is None:
+        if notes.begun:
+            notes.doubt(line, "a move after the first one needs its time (argument T)")
+        speed = WrittenSpeed(SpeedUnit.TOOL_POINT, float(v) * 1e-3, f"v{v}")
+    else:
+        speed = WrittenSpeed(SpeedUnit.SECONDS, float(time), f"\\T:={time}")
+    zone = zone.lower()
+    move = ReadMove(
+        target=target,
+        straight=len(rows) > 1,
+        speed=speed,
+        corner=Corner(0.0 if zone == "fine" else float(zone[1:]) or _FINEST_ZONE, zone),
+        tool=tool.lower(),
+        place=notes.place(line),
+        resolution=_POSE_DIGITS if len(rows) > 1 else _HALF_DIGIT,
+        quarters=quarters,
+    )
+    notes.move(line, code, move, tight)

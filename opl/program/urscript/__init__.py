@@ -1,0 +1,22 @@
+"""Universal Robots scripts (URScript): written, read back.
+
+Positions are joint positions in radians, of straight moves too; every move carries its time. What
+is proven goes through the written points; the corners that the blends cut off, up to 1 mm, are not.
+"""
+
+from opl.program.dialect import VARIABLES
+from opl.program.digits import rounded_radians
+from opl.program.listing import listing_reader
+from opl.program.posts import Post
+from opl.program.urscript.read import CORNERS, DECIMALS, parse, start_speed
+from opl.program.urscript.write import DIALECT, tool_name, write
+
+POST = Post(
+    "Universal Robots URScript",
+    write,
+    DIALECT.template,
+    VARIABLES,
+    reader=listing_reader(
+        DIALECT.suffix, parse, tool_name, rounded_radians(DECIMALS), start_speed, CORNERS
+    ),
+)

@@ -1,0 +1,67 @@
+"""From a verified motion to the texts of its files: program, table, pictures."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from datetime import datetime, timezone
+
+from opl.errors import InputError
+from opl.geometry.frames import transform
+from opl.geometry.mesh import box_corners
+from opl.planning.reasons import NodeState, node_states
+from opl.program.export import StraightLimit, export_program
+from opl.program.moves import Program
+from opl.report.pictures import contact_chart, joint_chart
+from opl.run.values import Planned, Proven
+
+
+def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
+    """Return the program of a verified motion, and its files and table by file name."""
+    job = proven.surfaced.job
+    vertices = transform(job.cell.T_flange_workpiece, job.cell.part.vertices)
+    # what the proven path leaves of the allowed contact error
+    left = job.search.max_contact_error - proven.verification.max_contact_error
+    limit = StraightLimit(box_corners(vertices), left)
+    return export_program(
+        proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), ["OPL"]
+    )
+
+
+def draw_charts(planned: Planned) -> Mapping[str, str]:
+    """Return the contact chart and the joint angles, by file name."""
+    surfaced, prepared, path = planned.surfaced, planned.prepared, planned.plan.path
+    job, pass_index = surfaced.job, surfaced.points.pass_index
+    contact = contact_chart(
+        title=f"{job.name}: where the part touches the wheel",
+        contact_positions=prepared.problem.field.contact_positions,
+        states=node_states(prepared.problem, path.ik_branch),
+        state_names=[state.value for state in NodeState],
+        pass_index=pass_index,
+        flat_end=job.cell.wheel.flat_end,
+        path=path,
+    )
+    joints = joint_chart(
+        title=f"{job.name}: joint angles along the path",
+        robot=job.cell.robot,
+        path=path,
+        fixed_q=prepared.fixed.q,
+        pass_index=pass_index,
+    )
+    return {f"{job.name}_contact.svg": contact, f"{job.name}_joints.svg": joints}
+
+
+def job_date() -> datetime:
+    """Return SOURCE_DATE_EPOCH, which makes runs repeatable to the byte, or the time now.
+
+    Raises:
+        InputError: If that variable holds no time.
+    """
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    if epoch is None:
+        return datetime.now()
+    try:
+        return datetime.fromtimestamp(int(epoch), tz=timezone.utc)
+    except (ValueError, OverflowError, OSError) as error:
+        message = f"must be seconds since 1970, got {epoch!r}"
+        raise InputError("SOURCE_DATE_EPOCH", message) from error

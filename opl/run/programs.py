@@ -1,0 +1,151 @@
+"""Programs as they stand in their files: proven, described, compared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from opl.cell.robot import Robot
+from opl.errors import InputError
+from opl.findings import Finding
+from opl.geometry.toolpath import CutterPoints
+from opl.job.load import Job
+from opl.job.refusals import keys_named
+from opl.program.posts import reader_for
+from opl.proof.digest import changed_since, digests_in
+from opl.proof.prove import Proof, prove
+from opl.run.delivery import RESULT
+from opl.run.reporting import replay_report
+from opl.run.result import VerificationReport
+from opl.run.surfacing import cut_surface
+from opl.run.watch import Stage, Watch
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramProof:
+    """What was found out about the files of a program.
+
+    Attributes:
+        proof: What the files say, and what the replay of it found.
+        as_written: Whether the files are to the byte what a run proved; None if no ``result.json``
+            beside them tells.
+        report: The same in plain numbers, in mm; None stands for what could not be found out.
+    """
+
+    proof: Proof
+    as_written: bool | None
+    report: dict[str, Any]
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is wrong."""
+        return self.proof.findings
+
+    @property
+    def proven(self) -> bool:
+        """Whether the program is safe and complete."""
+        return self.proof.proven
+
+
+def prove_program(job: Job, files: Sequence[Path], watch: Watch | None = None) -> ProgramProof:
+    """Prove program files against the cell of a job, knowing nothing of how they were planned.
+
+    Args:
+        job: Cell, surface, feed and tolerances.
+        files: The files: the master and all parts of a program that is split.
+        watch: Follows the work.
+
+    Raises:
+        InputError: If a file cannot be read, or the files are not those of one program for the
+            controller and the robot of the job.
+        Cancelled: If the work was cancelled.
+    """
+    watch = watch or Watch()
+    content = {path: _content(path) for path in files}
+    points = cut_surface(job, watch).points
+    with watch.stage(Stage.VERIFICATION) as progress, keys_named(job.source):
+        found = prove(job, points, {str(path): data for path, data in content.items()}, progress)
+    changed, as_written = _compared_with_results(content)
+    proof = replace(found, findings=(*found.findings, *changed))
+    return ProgramProof(proof, as_written, _report(job, points, proof, as_written))
+
+
+def _report(
+    job: Job, points: CutterPoints, proof: Proof, as_written: bool | None
+) -> dict[str, Any]:
+    found, timed = proof.verification, proof.timed
+    replayed = dict.fromkeys(field.name for field in fields(VerificationReport))
+    if found is not None:
+        replayed = vars(replay_report(found, None)).copy()
+    del replayed["file"]
+    return {
+        "proven": proof.proven,
+        "job": job.name,
+        "robot": job.cell.robot.name,
+        "unverified_pulse_ratios": job.cell.robot.unverified_pulses,
+        "files": proof.files,
+        "calls_not_looked_at": proof.foreign,
+        "positions": proof.moves,
+        "cutter_points": len(points),
+        "passes": points.n_passes,
+        "cutter_points_ground": proof.ground,
+        "duration_s": None if timed is None else round(timed.seconds, 3),
+        **replayed,
+        "findings": [
+            {"kind": one.kind, "where": one.where, "message": one.message} for one in proof.findings
+        ],
+        "as_written": as_written,
+    }
+
+
+def _compared_with_results(files: Mapping[Path, bytes]) -> tuple[list[Finding], bool | None]:
+    """Return what differs from what a run wrote, and whether all is as written; None if unknown."""
+    findings, known = [], True
+    for path, content in files.items():
+        try:
+            digests = digests_in((path.parent / RESULT).read_bytes())
+        except OSError:
+            digests = {}
+        if path.name in digests:
+            findings += changed_since(str(path), content, digests[path.name])
+        else:
+            known = False
+    return findings, False if findings else True if known else None
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror}") from error
+
+
+def describe_program(file: Path, robot: Robot) -> list[str]:
+    """Return a program in words, one line each: positions, moves, speeds, signals.
+
+    Args:
+        file: The program; its suffix names the language.
+        robot: Whose program it is taken for.
+
+    Raises:
+        InputError: If the file cannot be read or is no program.
+    """
+    return [*reader_for(file).describe(str(file), _content(file), robot)]
+
+
+def compare_programs(file: Path, other: Path) -> list[str]:
+    """Return how two programs differ in what they do, one line each; empty if they do not.
+
+    Args:
+        file: The one; its suffix names the language.
+        other: The other, of the same language.
+
+    Raises:
+        InputError: If a file cannot be read, is no program, or they are of two languages.
+    """
+    reader = reader_for(file)
+    if reader_for(other) is not reader:
+        raise InputError(str(other), f"is not of the language of {file}")
+    return [*reader.differences((str(file), _content(file)), (str(other), _content(other)))]

@@ -1,0 +1,155 @@
+"""What would make an impossible job possible: single changes, each tried by planning again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from opl.cell.workcell import WorkCell
+from opl.geometry.frames import from_roll_pitch_yaw
+from opl.geometry.toolpath import CutterPoints
+from opl.job import keys
+from opl.job.load import Job
+from opl.planning.multi_start import Start, try_recursive
+from opl.planning.plan import Found
+from opl.planning.problem import GrindingProblem
+from opl.planning.reasons import free_at
+from opl.planning.scene import planning_scene
+from opl.run.preparing import problem_in
+
+MM = 1e3
+# the work is bounded by counts, so that the same job always gets the same answer
+MOST_CHECKS = 10  # of motions for each change: more would be no easy remedy
+MOST_IN_ALL = 60  # of motions for all changes together
+PROBED_COLUMNS = 8  # cutter points that must have a free node before a change is planned again
+
+# smallest first: of each kind the first that opens the job is reported
+MORE_ROLL_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)
+OTHER_WIDTH_MM = (-5.0, 10.0, -10.0, -20.0, 25.0, -30.0)
+MORE_PENETRATION_MM = (0.25, 0.5, 1.0, 2.0)
+ROUND_THE_RIM_DEG = (15.0, -15.0, 30.0, -30.0, 60.0, -60.0, 90.0, -90.0, 180.0)
+TURNED_FIXTURE_DEG = (10.0, -10.0, 20.0, -20.0, 45.0, -45.0, 90.0, -90.0, 180.0)
+
+Change = tuple[str, WorkCell]
+
+
+def find_remedies(
+    job: Job,
+    points: CutterPoints,
+    progress: Callable[[float], None] = lambda fraction: None,
+) -> list[str]:
+    """Return the smallest single changes that open a job, one line each, each planned again.
+
+    Args:
+        job: A job for which no path was found.
+        points: Its cutter points.
+        progress: Called before each change with the part of the checks that is used up, 0 to 1.
+
+    Returns:
+        A line for each kind of change that helps; where the tries ended early, one that says so.
+    """
+    columns = np.unique(np.linspace(0, len(points) - 1, PROBED_COLUMNS).astype(int))
+    some = CutterPoints(
+        points.Ts_workpiece_cutter[columns],
+        np.zeros(len(columns), dtype=np.int64),
+        points.arc_length[columns],
+    )
+    found = []
+    left = MOST_IN_ALL
+    for kind in KINDS:
+        for change, cell in kind(job.cell):
+            progress(1.0 - left / MOST_IN_ALL)
+            scene = planning_scene(cell)
+            if not _open_at(problem_in(scene, job, some)):
+                continue
+            if left <= 0:
+                found.append(f"not all changes were tried: {MOST_IN_ALL} motions were checked")
+                return found
+            most_checks = min(MOST_CHECKS, left)
+            outcome = try_recursive(problem_in(scene, job, points), Start.BEST, most_checks)
+            if isinstance(outcome, Found):
+                left -= outcome.plan.checks
+                found.append(
+                    f"would be possible with {change} (planned again: joint range sum "
+                    f"{outcome.plan.path.joint_range_sum:.3f} rad, not verified)"
+                )
+                break
+            left -= most_checks
+    return found
+
+
+def _more_roll(cell: WorkCell) -> Iterator[Change]:
+    now = float(np.rad2deg(cell.wheel.max_roll))
+    for more in MORE_ROLL_DEG:
+        if now + more <= 90.0:
+            wheel = replace(cell.wheel, max_roll=float(np.deg2rad(now + more)))
+            change = f"{keys.WHEEL_MAX_ROLL} {now + more:g} instead of {now:g}"
+            yield change, replace(cell, wheel=wheel)
+
+
+def _other_width(cell: WorkCell) -> Iterator[Change]:
+    now = cell.wheel.width * MM
+    for more in OTHER_WIDTH_MM:
+        if now + more > 0.0:
+            wheel = replace(cell.wheel, width=(now + more) / MM)
+            change = f"{keys.WHEEL_WIDTH} {now + more:g} instead of {now:g}"
+            yield change, replace(cell, wheel=wheel)
+
+
+def _more_penetration(cell: WorkCell) -> Iterator[Change]:
+    now = cell.max_belt_penetration * MM
+    for more in MORE_PENETRATION_MM:
+        change = f"{keys.WHEEL_MAX_BELT_PENETRATION} {now + more:g} instead of {now:g}"
+        yield change, replace(cell, max_belt_penetration=(now + more) / MM)
+
+
+def _other_side(cell: WorkCell) -> Iterator[Change]:
+    """Grind elsewhere on the rim: contact frame 0 turned about the axle of the wheel."""
+    axle = np.array([0.0, 0.0, cell.wheel.radius])  # a point of it in contact frame 0
+    for turn in ROUND_THE_RIM_DEG:
+        T_contact0_turned = from_roll_pitch_yaw(np.deg2rad([turn, 0.0, 0.0]), axle)
+        T_contact0_turned[:3, 3] -= T_contact0_turned[:3, :3] @ axle
+        T_base_contact0 = cell.wheel.T_base_contact0 @ T_contact0_turned
+        change = (
+            f"the contact on another side of the wheel, {turn:g} degrees round its rim "
+            f"({keys.WHEEL_POSE} turned about the axle)"
+        )
+        yield change, replace(cell, wheel=replace(cell.wheel, T_base_contact0=T_base_contact0))
+
+
+def _fed_in_reverse(cell: WorkCell) -> Iterator[Change]:
+    """Hold the part turned half round against the belt: the frame turned about its normal."""
+    T_contact0_turned = from_roll_pitch_yaw(np.array([0.0, 0.0, np.pi]), np.zeros(3))
+    T_base_contact0 = cell.wheel.T_base_contact0 @ T_contact0_turned
+    change = (
+        f"the part fed in the opposite direction across the wheel ({keys.WHEEL_POSE} turned 180 "
+        "degrees about its z)"
+    )
+    yield change, replace(cell, wheel=replace(cell.wheel, T_base_contact0=T_base_contact0))
+
+
+def _turned_fixture(cell: WorkCell) -> Iterator[Change]:
+    for turn in TURNED_FIXTURE_DEG:
+        about_z = np.array([0.0, 0.0, np.deg2rad(turn)])
+        T_flange_turned = from_roll_pitch_yaw(about_z, np.zeros(3))
+        change = f"the fixture turned {turn:g} degrees about z of the flange"
+        yield change, replace(cell, T_flange_workpiece=T_flange_turned @ cell.T_flange_workpiece)
+
+
+# tried in this order, each kind by itself
+KINDS: tuple[Callable[[WorkCell], Iterator[Change]], ...] = (
+    _more_roll,
+    _other_width,
+    _more_penetration,
+    _other_side,
+    _fed_in_reverse,
+    _turned_fixture,
+)
+
+
+def _open_at(problem: GrindingProblem) -> bool:
+    """Return whether each cutter point has a free node, all of them in one node matrix at least."""
+    every = (problem.free_nodes(nodes).any(axis=1).all() for nodes in problem.field.matrices)
+    return any(every) and all(free_at(problem, column) for column in range(len(problem.points)))

@@ -1,0 +1,209 @@
+"""``result.json`` as a value: what is reported of a run, in plain numbers.
+
+The fields are the keys of the file, which are stable, in its units and with its digits. A trailing
+underscore is no part of a key: ``pass_`` is ``pass``. None stands for what was not computed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True)
+class RobotReport:
+    """The robot of a job."""
+
+    name: str
+    unverified_pulse_ratios: Sequence[str]
+
+
+@dataclass(frozen=True)
+class FixedReport:
+    """The path with the contact kept at t = 0."""
+
+    joint_ranges_rad: Sequence[float] | None
+    joint_range_sum_rad: float | None
+    joint_ranges_by_pass_rad: Sequence[Sequence[float]] | None  # the paper's are of one pass
+    feasible: bool
+    reason: str  # why it is not
+
+
+@dataclass(frozen=True)
+class WeightedReport:
+    """The weighted sum of the path, and its lower bound."""
+
+    value: float
+    lower_bound: float
+    gap: float
+
+
+@dataclass(frozen=True)
+class FiguresReport:
+    """The figures by which paths are compared; a weighted sum only if that is the objective."""
+
+    joint_ranges_rad: Sequence[float]
+    joint_range_sum_rad: float
+    joint_travel_rad: float
+    contact_travel: float
+    seconds_on_wheel: float
+    weighted_sum: float | None
+
+
+@dataclass(frozen=True)
+class PathReport:
+    """The path that was found."""
+
+    method: str
+    objective: str
+    branch: str  # of the inverse kinematics, in words
+    joint_ranges_rad: Sequence[float]
+    joint_range_sum_rad: float
+    joint_travel_rad: float
+    contact_travel: float
+    nodes: int
+    intermediate_nodes: int
+    lower_bound_rad: float | None  # no path has a smaller sum, whatever its contact positions
+    gap: float | None  # fraction by which the sum may be above the least there is
+    weighted: WeightedReport | None
+
+
+@dataclass(frozen=True)
+class SlowLimitReport:
+    """What makes the ground point slow, the joint if one is to blame, and what it costs."""
+
+    kind: str
+    joint: str | None
+    longer_s: float
+
+
+@dataclass(frozen=True)
+class SlowReport:
+    """A part of a pass that is slower than the feed; passes count from 1."""
+
+    pass_: int
+    from_cutter_point: float
+    to_cutter_point: float
+    lowest_mm_s: float
+    lowest_at: float
+    longer_s: float
+    limits: Sequence[SlowLimitReport]  # the dearest first
+    dwell_s: float  # longest time beyond that at the feed on one spot
+
+
+@dataclass(frozen=True)
+class FeedReport:
+    """The feed, and where the ground point is slower."""
+
+    set_mm_s: float
+    lowered: Sequence[SlowReport]
+    longest_dwell_s: float
+    longest_dwell_at: float | None
+    max_dwell_s: float
+
+
+@dataclass(frozen=True)
+class CycleReport:
+    """How long the program runs, ramps included."""
+
+    passes_s: float
+    approach_and_retract_s: float
+    air_s: float
+    waits_s: float
+    total_s: float
+    ramps_s: float  # of all this, coming up to speed and to rest
+    open_ended: bool  # it also waits for inputs or runs other programs
+    accelerations_assumed: bool
+
+
+@dataclass(frozen=True)
+class FileReport:
+    """What was found when the files of the program were read back."""
+
+    proven: bool
+    files: Sequence[str]
+    postures: int
+    largest_rounding_mm: float
+    largest_difference_mm: float
+    replayed: bool
+
+
+@dataclass(frozen=True)
+class VerificationReport:
+    """What the replay found."""
+
+    engine: str
+    poses: int
+    collisions: int
+    min_clearance_mm: float
+    max_contact_error_mm: float
+    limit_violations: int
+    file: FileReport | None  # None if nothing was read back
+
+
+@dataclass(frozen=True)
+class PassTimeReport:
+    """How long a pass should take, takes, and by how much that is off."""
+
+    wanted_s: float
+    written_s: float
+    error_percent: float
+
+
+@dataclass(frozen=True)
+class ProgramReport:
+    """The program, and the SHA-256 of every file of the run."""
+
+    files: Sequence[str]
+    sha256: Mapping[str, str]
+    read_back: bool  # false where the language has no reader: nothing is claimed of the file itself
+    moves: int
+    duration_s: float
+    passes: Sequence[PassTimeReport]
+
+
+@dataclass(frozen=True)
+class Report:
+    """What is reported of a run: the content of its ``result.json``.
+
+    Attributes:
+        status: ``ok``, ``no_path`` or ``unsafe``.
+        reasons: Why there is no program, one line each.
+        remedies: Single changes that would open the job, one line each.
+        compared: The figures of the paths that exist: ``fixed``, ``paper_start``, ``recursive``,
+            ``optimal``.
+        seconds: Time of each stage, and their ``total``.
+    """
+
+    status: str
+    job: str
+    robot: RobotReport
+    cutter_points: int
+    passes: int
+    warnings: Sequence[str]
+    reasons: Sequence[str]
+    remedies: Sequence[str]
+    fixed: FixedReport
+    path: PathReport | None
+    compared: Mapping[str, FiguresReport]
+    feed: FeedReport | None
+    cycle: CycleReport | None
+    verification: VerificationReport | None
+    program: ProgramReport | None
+    seconds: Mapping[str, float]
+
+
+def to_json(value: Any) -> str:
+    """Return reports and rows of a batch, alone or in lists and mappings, as JSON text."""
+    return json.dumps(value, indent=2, default=_plain)
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value):
+        return {field.name.rstrip("_"): getattr(value, field.name) for field in fields(value)}
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"{type(value).__name__} has no place in JSON")

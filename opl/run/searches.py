@@ -1,0 +1,95 @@
+"""Which search a job wants, and how what it finds compares with the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from opl.job.search import Method, Objective, Search
+from opl.motion.path import Figures, figures_of_path, figures_of_points
+from opl.planning.cheapest import plan_cheapest
+from opl.planning.costs import ObjectiveWeights
+from opl.planning.multi_start import Start, plan_recursive, try_recursive
+from opl.planning.optimal import plan_optimal
+from opl.planning.plan import Found, Plan
+from opl.planning.problem import GrindingProblem
+from opl.planning.weighted import plan_weighted
+from opl.run.values import Prepared
+
+# of motions from the paper's start node, which are searched for comparison only
+MOST_CHECKS = 20
+
+
+@dataclass(frozen=True)
+class FoundPaths:
+    """What the searches of a job found.
+
+    Attributes:
+        plan: The path by the method and for the objective of the job.
+        recursive: That of the paper's search; the same if the job wants nothing better.
+    """
+
+    plan: Plan
+    recursive: Plan
+
+
+def search_path(search: Search, problem: GrindingProblem) -> FoundPaths:
+    """Search the path by the method and for the objective of a job.
+
+    Args:
+        search: What the job wants.
+        problem: What is to be planned.
+
+    Raises:
+        NoPathError: If there is none.
+    """
+    recursive = plan_recursive(problem, search.start)
+    if search.method is Method.RECURSIVE:
+        return FoundPaths(recursive, recursive)
+    return FoundPaths(_search_best(search, problem, recursive), recursive)
+
+
+def _search_best(search: Search, problem: GrindingProblem, recursive: Plan) -> Plan:
+    settings = search.optimal
+    change = settings.max_contact_change
+    if search.objective is Objective.RANGE:
+        return plan_optimal(problem, settings, recursive)
+    if search.objective is Objective.WEIGHTED:
+        weights = search.objective_weights
+        return plan_weighted(problem, weights, settings, recursive)
+    travel, time = (0.0, 1.0) if search.objective is Objective.TIME else (1.0, 0.0)
+    joint_weights = travel * settings.costs.joint_weights
+    costs = replace(settings.costs, joint_weights=joint_weights, time_weight=time)
+    # the cheapest at the cutter points need not be so between them
+    alone = ObjectiveWeights(0.0, travel, time)
+    plans = (plan_cheapest(problem, costs, change), recursive)
+    return min(plans, key=lambda plan: alone.value(_figures(problem, plan)))
+
+
+def compare(prepared: Prepared, found: FoundPaths) -> Mapping[str, Figures]:
+    """Return the figures of the contact-fixed path and of all that were found, by what they are.
+
+    The paper's search from its own start node is made here: nothing else needs what it finds.
+
+    Args:
+        prepared: What was to be planned.
+        found: What was found.
+    """
+    problem, q = prepared.problem, prepared.fixed.q
+    compared = {}
+    if q is not None:
+        compared["fixed"] = figures_of_points(
+            q, problem.points, problem.process, problem.cell.robot
+        )
+    from_paper_start = try_recursive(problem, Start.NEAREST, MOST_CHECKS)
+    if isinstance(from_paper_start, Found):
+        compared["paper_start"] = _figures(problem, from_paper_start.plan)
+    compared["recursive"] = _figures(problem, found.recursive)
+    if prepared.surfaced.job.search.method is Method.OPTIMAL:
+        compared["optimal"] = _figures(problem, found.plan)
+    return compared
+
+
+def _figures(problem: GrindingProblem, plan: Plan) -> Figures:
+    robot = problem.cell.robot
+    return figures_of_path(plan.path, plan.motion, problem.points, problem.process, robot)

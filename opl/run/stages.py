@@ -1,0 +1,136 @@
+"""From a job to proven files: the stages in order."""
+
+from __future__ import annotations
+
+from opl.errors import NoFreeMoveError, NoPathError
+from opl.job.load import Job
+from opl.job.refusals import dwell_refusal, keys_named
+from opl.motion.feed import slow_stretches
+from opl.motion.timing import time_motion
+from opl.proof.read_back import in_file_digits, read_back
+from opl.run.exporting import draw_charts, job_date, render_program
+from opl.run.preparing import prepare
+from opl.run.remedies import find_remedies
+from opl.run.searches import compare, search_path
+from opl.run.surfacing import cut_surface
+from opl.run.values import Planned, Prepared, Proven, Refused, Run, Surfaced, Written
+from opl.run.watch import Stage, Watch
+from opl.verification.replay import replay
+
+
+def run_job(job: Job, watch: Watch | None = None) -> Run:
+    """Take a job through all stages: cut, plan, verify, write.
+
+    Args:
+        job: The job.
+        watch: Follows the run, and can cancel it; one for each run, here and in each stage.
+
+    Returns:
+        `Written` with a proven program, or `Refused` with the reason why there is none.
+
+    Raises:
+        InputError: If the surface of the job cannot be cut into passes, lies out of reach, or
+            something collides at home.
+        OplError: If the program cannot be written for the controller.
+        Cancelled: If the run was cancelled.
+    """
+    job_date()  # refused before the work, not after it
+    watch = watch or Watch()
+    planned = plan_path(cut_surface(job, watch), watch)
+    if isinstance(planned, Refused):
+        return planned
+    proven = verify_motion(planned, watch)
+    return proven if isinstance(proven, Refused) else write_program(proven, watch)
+
+
+def plan_path(surfaced: Surfaced, watch: Watch | None = None) -> Planned | Refused:
+    """Plan a path over the wheel and the motion around it, collision-free for the planner.
+
+    Returns:
+        The plan; `Refused` if there is no path, or if the belt would dwell on one spot too long.
+
+    Raises:
+        InputError: If cutter points lie out of reach, or something collides at home.
+        Cancelled: If the run was cancelled.
+    """
+    watch = watch or Watch()
+    with keys_named(surfaced.job.source):
+        return _plan(surfaced, watch)
+
+
+def _plan(surfaced: Surfaced, watch: Watch) -> Planned | Refused:
+    prepared, job = prepare(surfaced, watch), surfaced.job
+    try:
+        with watch.stage(Stage.SEARCH):
+            found = search_path(job.search, prepared.problem)
+    except NoPathError as error:
+        return _without_path(prepared, error, watch)
+    with watch.stage(Stage.COMPARISON):
+        compared = compare(prepared, found)
+    with watch.stage(Stage.MOTION):
+        # what is proven is what the digits of the program can say
+        motion = in_file_digits(found.plan.motion, job)
+        timing = time_motion(motion, surfaced.points, job.process, job.cell.robot)
+        slow = slow_stretches(timing, job.process)
+    planned = Planned(prepared, found.plan, compared, timing, slow)
+    refusal = dwell_refusal(slow, job.process)
+    return planned if refusal is None else Refused(planned, refusal, (), watch.seconds)
+
+
+def verify_motion(planned: Planned, watch: Watch | None = None) -> Proven | Refused:
+    """Replay a planned motion in PyBullet, which shares no code with the planner.
+
+    Returns:
+        The verified motion; `Refused` if the replay finds anything wrong.
+
+    Raises:
+        Cancelled: If the run was cancelled.
+    """
+    watch = watch or Watch()
+    surfaced = planned.surfaced
+    job = surfaced.job
+    with watch.stage(Stage.VERIFICATION) as progress:
+        verification = replay(
+            job.cell,
+            surfaced.points,
+            planned.timing.timed,
+            job.search.max_contact_error,
+            progress,
+        )
+    if verification.verified is None:
+        return Refused(planned, verification, (), watch.seconds)
+    return Proven(planned, verification, verification.verified)
+
+
+def write_program(proven: Proven, watch: Watch | None = None) -> Run:
+    """Write the program of a verified motion, and prove what its files say.
+
+    The files are texts yet; `deliver` puts them into a folder.
+
+    Returns:
+        The program and its files; `Refused` if they do not say what was proven.
+
+    Raises:
+        OplError: If the program cannot be written for the controller.
+        Cancelled: If the run was cancelled.
+    """
+    watch = watch or Watch()
+    surfaced, plan = proven.surfaced, proven.planned.plan
+    with watch.stage(Stage.EXPORT), keys_named(surfaced.job.source):
+        program, files = render_program(proven)
+        files = {**files, **draw_charts(proven.planned)}
+    with watch.stage(Stage.READ_BACK):
+        found = read_back(surfaced.job, surfaced.points, plan.motion, proven.motion, program, files)
+    if found is not None and not found.proven:
+        return Refused(proven, found, (), watch.seconds)
+    return Written(proven, program, files, found, watch.seconds)
+
+
+def _without_path(prepared: Prepared, error: NoPathError, watch: Watch) -> Refused:
+    """Return the refusal of a job without a path, with what would open one."""
+    if isinstance(error, NoFreeMoveError):  # on the wheel nothing has to change
+        return Refused(prepared, error, (), watch.seconds)
+    surfaced = prepared.surfaced
+    with watch.stage(Stage.REMEDIES) as progress:
+        remedies = find_remedies(surfaced.job, surfaced.points, progress)
+    return Refused(prepared, error, tuple(remedies), watch.seconds)

@@ -1,0 +1,34 @@
+"""From the surface of a job to its cutter points, and what is doubtful about them."""
+
+from __future__ import annotations
+
+from opl.errors import InputError
+from opl.geometry.inspection import inspect
+from opl.geometry.nurbs import DegenerateNormalError
+from opl.geometry.passes import PassesError, lay_passes
+from opl.job import keys
+from opl.job.load import Job
+from opl.run.values import Surfaced
+from opl.run.watch import Stage, Watch
+
+
+def cut_surface(job: Job, watch: Watch | None = None) -> Surfaced:
+    """Cut the surface of a job into passes of cutter points and inspect them.
+
+    Raises:
+        InputError: If that cannot be done; names the key that is to blame.
+        Cancelled: If the run was cancelled.
+    """
+    with (watch or Watch()).stage(Stage.CUTTER_POINTS):
+        try:
+            laid = lay_passes(job.surface, job.passes)
+        except DegenerateNormalError as error:
+            raise InputError(job.source.at(keys.SURFACE), str(error)) from error
+        except PassesError as error:
+            key = keys.OF_PASSES[error.attribute]
+            raise InputError(job.source.at(key), error.message) from error
+        except ValueError as error:
+            raise InputError(job.source.at(keys.PASSES), str(error)) from error
+        cell = job.cell
+        found = inspect(job.surface, job.passes, laid, cell.wheel, cell.max_belt_penetration)
+        return Surfaced(job, laid, found)

@@ -1,0 +1,196 @@
+"""What the stages of a run make: each value holds those before it, so its type says how far it is.
+
+    Surfaced -> Prepared -> Planned -> Proven -> Written
+
+A run ends as `Written` or, wherever it stops, as `Refused`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from opl.errors import NoPathError, OplError, UnsafeError
+from opl.findings import Finding
+from opl.geometry.inspection import Inspection
+from opl.geometry.passes import LaidPasses
+from opl.geometry.toolpath import CutterPoints
+from opl.job.load import Job
+from opl.motion.feed import SlowStretch
+from opl.motion.motion import VerifiedMotion
+from opl.motion.path import Figures
+from opl.motion.timing import Timing
+from opl.planning.fixed_contact import FixedContact
+from opl.planning.plan import Plan
+from opl.planning.problem import GrindingProblem
+from opl.program.moves import Program
+from opl.proof.read_back import FileProof
+from opl.run.watch import Stage
+from opl.verification.replay import Verification
+
+
+@dataclass(frozen=True, eq=False)
+class Surfaced:
+    """A job whose surface is cut into cutter points.
+
+    Attributes:
+        job: The job.
+        laid: The cutter points, and how the surface bends there.
+        inspection: What is doubtful about them.
+    """
+
+    job: Job
+    laid: LaidPasses
+    inspection: Inspection
+
+    @property
+    def points(self) -> CutterPoints:
+        """The cutter points."""
+        return self.laid.points
+
+    @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """What is doubtful about the cutter points."""
+        return self.inspection.findings
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """Cutter points with everything that a search needs.
+
+    Attributes:
+        surfaced: The cutter points.
+        problem: Nodes, clearances and scene.
+        fixed: The same work with the contact kept at t = 0, for comparison.
+    """
+
+    surfaced: Surfaced
+    problem: GrindingProblem
+    fixed: FixedContact
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A path and the motion that it became, not verified yet.
+
+    Attributes:
+        prepared: What the search was given.
+        plan: The path, and its motion as planned.
+        compared: The figures of this path and of those that it is compared with, by what they are:
+            ``fixed``, ``paper_start``, ``recursive``, ``optimal``; those that exist.
+        timing: The motion in the digits of the program, its times, and what sets them.
+        slow: Where the ground point is slower than the feed.
+    """
+
+    prepared: Prepared
+    plan: Plan
+    compared: Mapping[str, Figures]
+    timing: Timing
+    slow: tuple[SlowStretch, ...]
+
+    @property
+    def surfaced(self) -> Surfaced:
+        """The cutter points."""
+        return self.prepared.surfaced
+
+
+@dataclass(frozen=True, eq=False)
+class Proven:
+    """A motion that passed every check of the replay.
+
+    Attributes:
+        planned: The path and its motion.
+        verification: What the replay found.
+        motion: The motion, verified.
+    """
+
+    planned: Planned
+    verification: Verification
+    motion: VerifiedMotion
+
+    @property
+    def prepared(self) -> Prepared:
+        """What the search was given."""
+        return self.planned.prepared
+
+    @property
+    def surfaced(self) -> Surfaced:
+        """The cutter points."""
+        return self.planned.surfaced
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """A finished run: a program, its files, and the proof of these files.
+
+    Attributes:
+        proven: The verified motion.
+        program: The moves of the program.
+        files: Texts by file name: program, table and pictures.
+        read_back: What was found when the program was read back from its texts; None for languages
+            that opl writes, but does not read.
+        seconds: Time of each stage in [s].
+    """
+
+    proven: Proven
+    program: Program
+    files: Mapping[str, str]
+    read_back: FileProof | None
+    seconds: Mapping[Stage, float]
+
+    @property
+    def status(self) -> str:
+        """``ok``."""
+        return "ok"
+
+    @property
+    def surfaced(self) -> Surfaced:
+        """The cutter points."""
+        return self.proven.surfaced
+
+
+@dataclass(frozen=True, eq=False)
+class Refused:
+    """A finished run without a program, and why.
+
+    Attributes:
+        reached: The last value that was made.
+        cause: Why there is no program: no path, a replay with findings, or files that do not hold
+            what was proven.
+        remedies: Single changes of the job that would open a path, one line each.
+        seconds: Time of each stage in [s].
+    """
+
+    reached: Prepared | Planned | Proven
+    cause: NoPathError | Verification | FileProof
+    remedies: tuple[str, ...]
+    seconds: Mapping[Stage, float]
+
+    @property
+    def status(self) -> str:
+        """``no_path`` or ``unsafe``."""
+        return "no_path" if isinstance(self.cause, NoPathError) else "unsafe"
+
+    @property
+    def surfaced(self) -> Surfaced:
+        """The cutter points."""
+        return self.reached.surfaced
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why there is no program, one line each."""
+        if isinstance(self.cause, NoPathError):
+            return (self.cause.message, *self.cause.reasons)
+        return tuple(str(finding) for finding in self.cause.findings)
+
+    @property
+    def error(self) -> OplError:
+        """The error that a command ends with which needs a program."""
+        if isinstance(self.cause, NoPathError):
+            return NoPathError(self.cause.message, [*self.cause.reasons, *self.remedies])
+        first = "planned, but not proven safe; no program was written"
+        return UnsafeError("\n".join([first, *self.reasons]))
+
+
+Run: TypeAlias = Written | Refused
