@@ -19,7 +19,7 @@ from opl.geometry.mesh import TriangleMesh
 from opl.geometry.wheel import ContactWheel
 
 FEW = 64  # poses that are not worth more than one thread
-TOLERANCE = 2e-5  # [m] distances returned are at most this much too large
+TOLERANCE = 2e-6  # [m] distances returned are at most this much too large
 
 
 @dataclass(frozen=True)

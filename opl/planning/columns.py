@@ -29,7 +29,7 @@ from opl.planning.nodes import SEAM_GAP
 from opl.search.walls import UNKNOWN, Image, Line, Piece, Wall
 
 CELL = 1.0  # belt units that a cell covers at first
-MOST_HALVINGS = 5  # of a cell where the part begins to cut into the wheel
+MOST_HALVINGS = 8  # of a cell where the part begins to cut into the wheel
 MOST_PARTS = 32  # of a cell whose pads are large
 ROW_PARTS = 16  # cells between two places of a wall along a contact position
 FINER = 8  # cells that one is cut into where a proof needs it
