@@ -6,6 +6,7 @@ flipped. Which image a pass uses is its placement.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,9 @@ from opl.planning.columns import ColumnWalls, Seams
 from opl.search.box import JointBox
 from opl.search.outside import outside
 
+FEW_COLUMNS = 40  # over which a box is grown at first
+STARTS = 8  # nodes from which one is grown
+MOST_PASSES = 8  # in which families are ruled out before the proof begins
 MOST_GROWN = 200  # times that a box is grown for a column
 GROWN = 1e-7  # [rad] less need not be grown for
 JUMP = 0.5  # [rad] between neighbouring contact positions; more is no motion
@@ -72,7 +76,7 @@ def grown(q: Array, free: np.ndarray, box: JointBox) -> JointBox | None:
         box: The box.
     """
     by_joint = np.ascontiguousarray(np.moveaxis(q, 1, 2))
-    low, high = box.lower.copy(), box.upper.copy()
+    low, high, free = box.lower.copy(), box.upper.copy(), np.ascontiguousarray(free)
     missing, row = np.empty(len(q)), np.empty(len(q))
     for _ in range(MOST_GROWN):
         outside(by_joint, free, low, high, JUMP, missing, row)
@@ -115,6 +119,50 @@ class Families:
             free[free] = walls.within_limits(unrolled[free])
             if free.any():
                 self._unrolled[family] = unrolled, free
+
+    def smallest_grown(self) -> JointBox | None:
+        """Return a small box that holds a point of every column, grown from one of a few nodes."""
+        best: JointBox | None = None
+        step = max(len(self._pass_index) // FEW_COLUMNS, 1)
+        for family, (unrolled, free) in self._unrolled.items():
+            if not free.any(axis=1).all():
+                continue
+            rows = np.flatnonzero(free[0])
+            loose = ~self._seams.kept[family]
+            for row in rows[np.linspace(0, len(rows) - 1, STARTS).astype(int)]:
+                start = unrolled[0, row]
+                here = Placement(family, self._walls.flips[0], np.zeros(6), loose, start)
+                few = grown(here.of(unrolled[::step]), free[::step], JointBox(start, start))
+                if few is None or (best is not None and few.size >= best.size):
+                    continue
+                whole = grown(here.of(unrolled), free, few)
+                if whole is not None and (best is None or whole.size < best.size):
+                    best = whole
+        return best
+
+    def unreached(self) -> list[float]:
+        """Return a cutter point of each pass that rules out each family that does not grind all."""
+        places: list[float] = []
+        for index in range(min(int(self._pass_index[-1]) + 1, MOST_PASSES)):
+            columns = np.flatnonzero(self._pass_index == index)
+            left = [~free[columns].any(axis=1) for _, free in self._unrolled.values()]
+            left = [lacks for lacks in left if lacks.any()]
+            while left:
+                worst = int(np.argmax(np.sum(left, axis=0)))
+                places.append(float(columns[worst]))
+                left = [lacks for lacks in left if not lacks[worst]]
+        return places
+
+    def grown(self, box: JointBox, placements: Sequence[Placement]) -> JointBox | None:
+        """Return a box grown for all columns at the field's contact positions, as `grown` does."""
+        for index, placement in enumerate(placements):
+            columns = self._pass_index == index
+            unrolled, free = self._unrolled[placement.family]
+            larger = grown(placement.of(unrolled[columns]), free[columns], box)
+            if larger is None:
+                return None
+            box = larger
+        return box
 
     def fits(self, index: int, low: Array, high: Array, reference: bool) -> list[Fit]:
         """Return how every image of every family of a pass fits into a box.

@@ -26,6 +26,8 @@ PROOF_SHARE = 0.9  # of the widening: how far the bound may stay below the path
 ROOM_SHARE = 0.4  # of the widening: how much larger than its box the path may be
 MISSED = 0.05  # of the widening: what a box may miss a cutter point by and still hold it
 RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for next
+CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
+MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
 
 
@@ -69,18 +71,22 @@ class OptimalSearch:
         self._tracks = BoxTracks(problem, seams, settings.costs, settings.max_contact_change, most)
         self.plan = fallback
         self._proven = self._least_hope = 0.0
-        self._spent = 0
+        self._spent = self._given_up = 0
         gap = PROOF_SHARE * settings.widen
         self.proof = BoxProof(self._walls.images, self._walls.finer, found, gap)
         self._places: set[float] = set()
         self._sweeps: set[tuple[int, int, bool]] = set()
         self._columns = np.arange(len(problem.points), dtype=float)
+        self._hope(self._families.smallest_grown())
         n = len(problem.points)
-        self._add([0.0, float(n // 2), float(n - 1)])
+        first = [0.0, float(n // 2), float(n - 1)]
+        self._add(list(dict.fromkeys(first + self._families.unreached())))
 
     @property
     def finished(self) -> bool:
         """Whether there is nothing left to do."""
+        if self._given_up >= MOST_GIVEN_UP:
+            return True
         spent = self._spent + self.proof.subproblems >= self._settings.max_subproblems
         return spent or (self.proof.closed and self.proof.threshold >= self._value)
 
@@ -103,13 +109,19 @@ class OptimalSearch:
             return
         box = JointBox(candidate.low, candidate.high)
         placements, missed = self._hold(candidate)
+        if not candidate.settled:
+            self._hope(self._families.grown(box, placements))
+            if missed:
+                self._add(missed)
+                self.proof.put_back()
+            else:
+                self.proof.split()
+            return
         columns = None
         if len({(one.family, float(one.flip[0][4])) for one in placements}) == 1:
             columns = self._tracks.columns(box, placements, self._columns)
             inner = grown(columns.q, columns.free, box)
-            if inner is not None:
-                hoped = max(inner.size * (1.0 + self._settings.widen), self._least_hope)
-                self.proof.threshold = min(self.proof.threshold, hoped)
+            self._hope(inner)
             missed = missed or self._missed(columns, box)
         if missed:
             self._add(missed)
@@ -118,7 +130,15 @@ class OptimalSearch:
         if columns is not None and inner is not None and self._try(columns, inner):
             self.proof.put_back()
         elif candidate.bound < self.proof.closing:
+            # the bound cannot rise further; the path may still come nearer to it
+            self._given_up += 1
             self.proof.give_up()
+
+    def _hope(self, box: JointBox | None) -> None:
+        """Look only for what is as good as a motion in a box would be."""
+        if box is not None:
+            hoped = max(box.size * (1.0 + self._settings.widen), self._least_hope)
+            self.proof.threshold = min(self.proof.threshold, hoped)
 
     def _hope_for_less(self) -> None:
         """Begin the proof again: no motion is as good as a box had made hope."""
@@ -161,7 +181,8 @@ class OptimalSearch:
 
     def _hold(self, candidate: Candidate) -> tuple[list[Placement], list[float]]:
         """Return the image of each pass that fits into the box, and the cutter points it misses."""
-        allowed = MISSED * self._settings.widen * self.proof.threshold
+        share = MISSED * self._settings.widen if candidate.settled else CLEARLY_MISSED
+        allowed = share * self.proof.threshold
         reference = self.proof.walls[0].pass_index
         placements, missed = [], []
         for index in range(self._points.n_passes):

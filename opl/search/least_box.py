@@ -24,6 +24,7 @@ from opl.search.walls import Image, Piece, Wall, relaxed
 SETTLED = (
     0.1  # of the gap wanted: what the bend of the spans may lose where no wall is split further
 )
+PROBE_EVERY = 16  # subproblems: how often a box is shown that is not settled
 STILL = 1e-6  # [rad] a core that grows by less in a round has stopped growing
 MOST_ROUNDS = 12  # of cutting spans off; more would cut little
 
@@ -74,12 +75,14 @@ class Candidate:
         low: Lower faces in [rad], shape (6,).
         high: Upper faces.
         held_by: For each wall, how hard it presses on the box.
+        settled: Whether nothing is gained by splitting its subproblem further.
     """
 
     bound: float
     low: Array
     high: Array
     held_by: dict[int, Array]
+    settled: bool
 
 
 class _Body:
@@ -141,7 +144,10 @@ class _Body:
         return self._boxes[at]
 
     def distance(self, span: Span, low: Array, high: Array) -> float:
-        """Return by how much a box misses the chords of a span, in [rad]."""
+        """Return by how much a box misses the chords of a span, in [rad]; 0 where one is open."""
+        piece = self.pieces[span.piece]
+        if piece.open_cells[span.first : span.end].any():
+            return 0.0
         at = (span.piece, span.image)
         if at not in self._chords:
             self._chords[at] = np.ascontiguousarray(self.moved(span).corners.T)[None]
@@ -208,8 +214,9 @@ class BoxProof:
         """Work on the subproblem with the least bound.
 
         Returns:
-            Its box, where nothing is gained by splitting it further: the caller adds a wall that
-            misses the box, or lowers the threshold, and puts it back; or gives it up.
+            Its box, where nothing is gained by splitting it further, and now and then before: the
+            caller adds a wall that misses the box, or lowers the threshold, and puts it back; or
+            splits it, or gives it up.
         """
         node = heapq.heappop(self._open)
         self.subproblems += 1
@@ -220,15 +227,20 @@ class BoxProof:
             if self._open and node.bound > self._open[0].bound + 1e-9:
                 heapq.heappush(self._open, node)  # others are more promising now
                 return None
-        branch = self._where_to_split(node)
-        if branch is not None:
-            self._split(node, *branch)
+        self._kept, self._branch = node, self._where_to_split(node)
+        settled = self._branch is None
+        if not settled and self.subproblems % PROBE_EVERY:
+            self.split()
             return None
-        self._kept = node
         found, alone = node.found, self._alone(node)
         assert found is not None
         held_by = {k: found.prices[i] for i, k in enumerate(alone) if found.prices[i].any()}
-        return Candidate(node.bound, found.low, found.high, held_by)
+        return Candidate(node.bound, found.low, found.high, held_by, settled)
+
+    def split(self) -> None:
+        """Split the subproblem of the last candidate."""
+        if self._branch is not None:
+            self._split(self._kept, *self._branch)
 
     @staticmethod
     def _alone(node: Subproblem) -> list[int]:
@@ -325,6 +337,8 @@ class BoxProof:
         assert found is not None
         low, high = found.low, found.high
         settled = SETTLED * self._gap * self.threshold
+        if len(node.spans[0]) > 1:
+            return 0, 0.5
         score, at = np.zeros(len(node.spans)), np.full(len(node.spans), 0.5)
         for index, (body, spans) in enumerate(zip(self._bodies, node.spans, strict=True)):
             score[index] = min(body.distance(span, low, high) for span in spans)
@@ -334,7 +348,7 @@ class BoxProof:
         wall = int(np.argmax(score))
         if score[wall] > settled:
             return wall, float(at[wall])
-        return (0, 0.5) if len(node.spans[0]) > 1 else None
+        return None
 
     def _split(self, node: Subproblem, index: int, x: float) -> None:
         spans = node.spans[index]

@@ -10,6 +10,7 @@ wrist flipped.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -50,6 +51,11 @@ class Piece:
     corners: Array
     pad_low: Array
     pad_high: Array
+
+    @cached_property
+    def open_cells(self) -> np.ndarray:
+        """In which cells the pads of some joint are not known, shape (n,)."""
+        return np.asarray((self.pad_high >= UNKNOWN).any(axis=1))
 
     @property
     def low(self) -> Array:
