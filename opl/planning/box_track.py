@@ -7,32 +7,31 @@ the box between two places, more places are taken in.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.geometry.toolpath import CutterPoints
-from opl.planning.columns import Seams, wrist_flips
+from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.costs import CostWeights, track_cost
-from opl.planning.families import GROWN, JUMP, Placement
 from opl.planning.filling import BrokenEdgeError, fill_in
-from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
+from opl.planning.images import wrist_flips
+from opl.planning.nodes import NodeField, NodeMatrix
 from opl.planning.open_matrix import Track, open_matrices
 from opl.planning.plan import Found, Plan, propose_and_check
-from opl.planning.problem import GrindingProblem, wheel_distances
+from opl.planning.problem import GrindingProblem
 from opl.planning.symmetry import twins
 from opl.search.box import JointBox
-from opl.search.outside import outside
+from opl.search.in_box import missing as missing_of
+from opl.search.in_box import nearest
+from opl.search.in_box import sampled as samples_in
 from opl.search.smooth import Travel, smoothest_within
 
 SAMPLES = 17  # contact positions of a place
 ROUNDS = 3  # of sampling closer around a track
 SUBDIVIDE = np.array([0.25, 0.5, 0.75])  # where an edge that bulges is given places
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
-BEND = 2.0  # times the sagitta that second differences tell: how far postures stand off a chord
-BORDER = 1e-2  # belt units to look beyond what lies in the box
 SWEEP = 2.0  # belt units that the contact moves from cutter point to cutter point in a sweep
 MOST_CHECKS = 12  # of motions in one box
 
@@ -42,7 +41,7 @@ class BoxTracks:
 
     Args:
         problem: What is to be planned.
-        seams: Where angles are cut open.
+        sampler: Samples its places.
         costs: What a track is charged for.
         max_contact_change: Largest change of t between neighbouring places in belt units.
         most: How far joints and contact should move at the most.
@@ -51,79 +50,17 @@ class BoxTracks:
     def __init__(
         self,
         problem: GrindingProblem,
-        seams: Seams,
+        sampler: ColumnSampler,
         costs: CostWeights,
         max_contact_change: float,
         most: Travel,
     ) -> None:
         self._problem = problem
-        self._seams = seams
+        self._sampler = sampler
         self._costs = costs
         self._max_contact_change = max_contact_change
         self._most = most
         self.checks = 0
-
-    def columns(self, box: JointBox, placements: Sequence[Placement], places: Array) -> Columns:
-        """Sample the postures of places where they are near to a box.
-
-        Args:
-            box: The box.
-            placements: The image that each pass uses.
-            places: Fractional cutter points, the cutter points among them, shape (n,).
-        """
-        problem = self._problem
-        before, points = places.astype(int), problem.points
-        there = CutterPoints(
-            points.frames_at(places),
-            points.pass_index[before],
-            np.interp(places, np.arange(len(points)), points.arc_length),
-        )
-        positions = problem.field.contact_positions
-        whole = places % 1.0 == 0.0
-        q = np.empty((len(places), len(positions), *problem.field.q.shape[2:]))
-        q[whole] = problem.field.q[before[whole]]
-        q[~whole] = inverse_solutions(
-            problem.cell, there.Ts_workpiece_cutter[~whole][:, None], positions
-        )
-        cuts = np.empty(q.shape[:2], dtype=bool)
-        cuts[whole] = problem.cuts[before[whole]]
-        if not whole.all():
-            between = CutterPoints(
-                there.Ts_workpiece_cutter[~whole],
-                np.zeros(np.sum(~whole), dtype=int),
-                places[~whole],
-            )
-            layer = wheel_distances(problem.scene, between, positions)
-            cuts[~whole] = layer < -problem.cell.planned_penetration
-        grid = np.broadcast_to(positions, q.shape[:2])
-        coarse = self._placed(there, q, placements)
-        free = ~cuts & ~np.isnan(coarse[..., 0])
-        t, _ = _sampled(grid, coarse, free, box, 2 * SAMPLES - 1, whole=True)
-        # where the part begins to cut is known to a hair only
-        last = problem.cell.wheel.last_position
-        t = np.clip(np.concatenate([t[:, :1] - BORDER, t, t[:, -1:] + BORDER], axis=1), -last, last)
-        return self._at(places, there, placements, t)
-
-    def _at(
-        self, places: Array, there: CutterPoints, placements: Sequence[Placement], t: Array
-    ) -> Columns:
-        """Return the postures of places at contact positions, shape (n, m)."""
-        problem = self._problem
-        q = inverse_solutions(problem.cell, there.Ts_workpiece_cutter[:, None], t)
-        layer = wheel_distances(problem.scene, there, t)
-        q = self._placed(there, q, placements)
-        free = ~np.isnan(q[..., 0]) & ~(layer < -problem.cell.planned_penetration)
-        return Columns(places, there, tuple(placements), t, q, free, layer)
-
-    def _placed(self, there: CutterPoints, q: Array, placements: Sequence[Placement]) -> Array:
-        """Return the placed postures of all inverse solutions, shape (n, m, 6)."""
-        placed = np.empty((*q.shape[:2], 6))
-        for index, placement in enumerate(placements):
-            own = there.pass_index == index
-            start = self._seams.start[placement.family]
-            unrolled = start + np.remainder(q[own][:, :, placement.family] - start, 2.0 * np.pi)
-            placed[own] = placement.of(unrolled)
-        return placed
 
     def plan(
         self, columns: Columns, box: JointBox, room: float, learn: Callable[[Bulges], bool]
@@ -141,9 +78,9 @@ class BoxTracks:
             The motion; None if nothing is free, or if something was learnt instead.
         """
         inner = box.widened(room / 2.0)
-        t, spacing = _sampled(columns.t, columns.q, columns.free, inner, SAMPLES)
+        t, spacing = samples_in(columns.t, columns.q, columns.free, inner, SAMPLES)
         sampled = _Sampled(
-            self, self._at(columns.places, columns.points, columns.placements, t), inner
+            self, self._sampler.at(columns.places, columns.points, columns.placements, t), inner
         )
         track = sampled.smoothest()
         if track is None:
@@ -180,61 +117,6 @@ class Bulges:
     sweeps: tuple[tuple[float, float, bool], ...]
 
 
-@dataclass(frozen=True)
-class Columns:
-    """The postures of places near to a box.
-
-    Attributes:
-        places: Fractional cutter points, shape (n,).
-        points: The places as points of their own.
-        placements: The image that each pass uses.
-        t: Contact positions, shape (n, m).
-        q: Placed postures in [rad], NaN where there are none, shape (n, m, 6).
-        free: Which are within reach and do not cut into the wheel, shape (n, m).
-        wheel_distance: Signed distance of the part to the wheel in [m], shape (n, m).
-    """
-
-    places: Array
-    points: CutterPoints
-    placements: tuple[Placement, ...]
-    t: Array
-    q: Array
-    free: np.ndarray
-    wheel_distance: Array
-
-    def without(
-        self, box: JointBox, place: float, t: float, back: bool, above: bool
-    ) -> float | None:
-        """Return the cutter point nearest to a place that has nothing in a box on one side of t.
-
-        Args:
-            box: The box.
-            place: The place.
-            t: The contact position.
-            back: Whether to look before the place, not after it.
-            above: Whether nothing is to lie in the box above t, not below it.
-        """
-        index = self.points.pass_index[int(np.searchsorted(self.places, place, side="right")) - 1]
-        own = np.flatnonzero(
-            (self.points.pass_index == index)
-            & (self.places % 1.0 == 0.0)
-            & ((self.places <= place) if back else (self.places >= place))
-        )
-        for column in own[::-1] if back else own:
-            side = self.t[column] > t if above else self.t[column] < t
-            inside = _missing(self.q[column], box) <= GROWN
-            if not (side & inside & self.free[column]).any():
-                return float(self.places[column])
-        return None
-
-    def missing(self, box: JointBox) -> Array:
-        """Return by how much a box must grow for each place, in [rad], shape (n,)."""
-        missing, row = np.empty(len(self.q)), np.empty(len(self.q))
-        by_joint = np.ascontiguousarray(np.moveaxis(self.q, 1, 2))
-        outside(by_joint, self.free, box.lower, box.upper, JUMP, missing, row)
-        return missing
-
-
 class _Sampled:
     """The nodes of some places at contact positions of their own."""
 
@@ -244,7 +126,7 @@ class _Sampled:
         self._box = box
         problem = search._problem
         q = np.where(
-            (columns.free & _near(columns.q, columns.free, box))[..., None], columns.q, np.nan
+            (columns.free & nearest(columns.q, columns.free, box))[..., None], columns.q, np.nan
         )
         self.problem = replace(
             problem,
@@ -284,7 +166,7 @@ class _Sampled:
         about = np.linspace(-1.0, 1.0, SAMPLES)
         last = search._problem.cell.wheel.last_position
         t = np.clip(own[:, None] + about * spacing[:, None], -last, last)
-        around = search._at(columns.places, columns.points, columns.placements, t)
+        around = search._sampler.at(columns.places, columns.points, columns.placements, t)
         return _Sampled(search, around, self._box)
 
     def bulges(self, track: Track, box: JointBox) -> Bulges | None:
@@ -298,7 +180,7 @@ class _Sampled:
             return None
         spanned = nodes.along(track.rows)
         outer = JointBox(spanned.min(axis=0), spanned.max(axis=0))
-        excess = _missing(path.q, outer.widened(max(box.size - outer.size, 0.0)))
+        excess = missing_of(path.q, outer.widened(max(box.size - outer.size, 0.0)))
         edge = path.cutter_point.astype(int)
         bulging = np.unique(edge[excess > 0.0])
         places = self._columns.places
@@ -362,80 +244,3 @@ class _Sampled:
                 nodes = NodeMatrix(family + slot, np.ascontiguousarray(at), self._columns.t, index)
                 found.append((near, len(found), nodes))
         return [nodes for _, _, nodes in sorted(found, key=lambda entry: entry[:2])]
-
-
-def _sampled(
-    t: Array, q: Array, free: np.ndarray, box: JointBox, count: int, whole: bool = False
-) -> tuple[Array, Array]:
-    """Return contact positions where the chords between postures lie in a box.
-
-    Args:
-        t: Contact positions, increasing, shape (n, m).
-        q: The postures in [rad], shape (n, m, 6).
-        free: Which may be used: a chord with neither end free is left out, shape (n, m).
-        box: The box; around the posture nearest to it where a column does not meet it.
-        count: How many for each column.
-        whole: Whether whole chords are sampled, and those beside them, not what is in the box.
-
-    Returns:
-        They, shape (n, count), and how far they are apart, shape (n,).
-    """
-    enter, leave = _clipped(q, box)
-    leave = np.where(free[:, :-1] | free[:, 1:], leave, -1.0)
-    nearest = np.argmin(np.where(free, _missing(q, box), np.inf), axis=1)
-    found, spacing = np.empty((len(q), count)), np.empty(len(q))
-    share = np.linspace(0.0, 1.0, count)
-    for column, (start, end) in enumerate(zip(enter, leave, strict=True)):
-        own, hit = t[column], np.flatnonzero(end >= start)
-        if len(hit):
-            if whole:
-                hit = np.unique(np.clip(hit[:, None] + np.array([-1, 0, 1]), 0, len(own) - 2))
-                start, end = np.zeros_like(start), np.ones_like(end)
-            step = own[hit + 1] - own[hit]
-            first, last = own[hit] + start[hit] * step, own[hit] + end[hit] * step
-        else:  # the curve passes the box by a hair
-            first = own[[max(nearest[column] - 1, 0)]]
-            last = own[[min(nearest[column] + 1, len(own) - 1)]]
-        length = np.concatenate([[0.0], np.cumsum(last - first)])
-        along = share * length[-1]
-        at = np.clip(np.searchsorted(length, along, side="right") - 1, 0, len(first) - 1)
-        found[column] = first[at] + np.minimum(along - length[at], (last - first)[at])
-        spacing[column] = length[-1] / (count - 1)
-    return found, spacing
-
-
-def _missing(q: Array, box: JointBox) -> Array:
-    """Return by how much a box must grow to hold postures, infinite for none, shape (...)."""
-    away = np.maximum(q - box.upper, 0.0) + np.maximum(box.lower - q, 0.0)
-    return np.asarray(np.nan_to_num(away.sum(axis=-1), nan=np.inf))
-
-
-def _near(q: Array, free: np.ndarray, box: JointBox) -> np.ndarray:
-    """Return which free postures are in a box, or the nearest of a column, shape (n, m)."""
-    missing = np.where(free, _missing(q, box), np.inf)
-    least = missing.min(axis=1, keepdims=True)
-    return np.asarray((missing <= least + 1e-12) & np.isfinite(missing))
-
-
-def _clipped(q: Array, box: JointBox) -> tuple[Array, Array]:
-    """Return where the chords between neighbouring rows enter and leave a box, 0 to 1.
-
-    Shape (n, m - 1) each; one that does not meet the box leaves before it enters.
-    """
-    start, along = q[:, :-1], np.diff(q, axis=1)
-    bend = np.nan_to_num(np.abs(np.diff(q, n=2, axis=1)))
-    bend = np.where(bend < JUMP, bend, 0.0)
-    nothing = np.zeros_like(bend[:, :1])
-    bend = np.maximum(
-        np.concatenate([nothing, bend], axis=1), np.concatenate([bend, nothing], axis=1)
-    )
-    low, high = box.lower - BEND * bend / 8.0, box.upper + BEND * bend / 8.0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        one, other = (low - start) / along, (high - start) / along
-    inside = (start >= low) & (start <= high)
-    still = np.abs(along) < 1e-12
-    enter = np.where(still, np.where(inside, 0.0, 2.0), np.minimum(one, other)).max(axis=2)
-    leave = np.where(still, np.where(inside, 1.0, -1.0), np.maximum(one, other)).min(axis=2)
-    enter, leave = np.maximum(enter, 0.0), np.minimum(leave, 1.0)
-    jump = ~(np.abs(along).max(axis=2) <= JUMP)
-    return np.where(jump, 2.0, enter), np.where(jump, -1.0, leave)

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.columns import ColumnWalls, Seams
+from opl.planning.images import Images
 from opl.search.box import JointBox
+from opl.search.in_box import JUMP
 from opl.search.outside import outside
 
 FEW_COLUMNS = 40  # over which a box is grown at first
@@ -21,7 +22,6 @@ STARTS = 8  # nodes from which one is grown
 MOST_PASSES = 8  # in which families are ruled out before the proof begins
 MOST_GROWN = 200  # times that a box is grown for a column
 GROWN = 1e-7  # [rad] less need not be grown for
-JUMP = 0.5  # [rad] between neighbouring contact positions; more is no motion
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Placement:
 
     Attributes:
         family: The family.
-        flip: Whether its wrist is flipped, index of `ColumnWalls.flips`.
+        flip: Whether its wrist is flipped, index of `Images.flips`.
         shift: Full turns in [rad], shape (6,).
         loose: Joints whose full turns are counted anew at each node, shape (6,).
         center: Where those should be near to, in [rad], shape (6,).
@@ -98,25 +98,21 @@ class Families:
     """The unrolled angles of every family at some places.
 
     Args:
-        walls: For families, flips and seams.
-        seams: Where angles are cut open.
+        images: The images of each posture.
         q: Inverse solutions in [rad], shape (N, M, 8, 6).
         cuts: Where the part would sink too deep into the wheel, shape (N, M).
         pass_index: Pass of each column, shape (N,).
     """
 
-    def __init__(
-        self, walls: ColumnWalls, seams: Seams, q: Array, cuts: np.ndarray, pass_index: np.ndarray
-    ) -> None:
-        self._walls = walls
-        self._seams = seams
+    def __init__(self, images: Images, q: Array, cuts: np.ndarray, pass_index: np.ndarray) -> None:
+        self._images = images
         self._pass_index = pass_index
         self._unrolled = {}
-        for family in walls.families:
-            start = seams.start[family]
+        for family in images.families:
+            start = images.seams.start[family]
             unrolled = start + np.remainder(q[:, :, family] - start, 2.0 * np.pi)
             free = ~np.isnan(unrolled[..., 0]) & ~cuts
-            free[free] = walls.within_limits(unrolled[free])
+            free[free] = images.within_limits(unrolled[free])
             if free.any():
                 self._unrolled[family] = unrolled, free
 
@@ -128,10 +124,10 @@ class Families:
             if not free.any(axis=1).all():
                 continue
             rows = np.flatnonzero(free[0])
-            loose = ~self._seams.kept[family]
+            loose = ~self._images.seams.kept[family]
             for row in rows[np.linspace(0, len(rows) - 1, STARTS).astype(int)]:
                 start = unrolled[0, row]
-                here = Placement(family, self._walls.flips[0], np.zeros(6), loose, start)
+                here = Placement(family, self._images.flips[0], np.zeros(6), loose, start)
                 few = grown(here.of(unrolled[::step]), free[::step], JointBox(start, start))
                 if few is None or (best is not None and few.size >= best.size):
                     continue
@@ -177,11 +173,11 @@ class Families:
         found = []
         center = (low + high) / 2.0
         for family, (unrolled, free) in self._unrolled.items():
-            for flip in self._walls.flips[: 1 if reference else None]:
+            for flip in self._images.flips[: 1 if reference else None]:
                 sign, shift = flip
                 now = unrolled[columns] * sign + shift
                 open_now = free[columns]
-                loose = ~self._seams.kept[family]
+                loose = ~self._images.seams.kept[family]
                 mean = now[open_now].mean(axis=0) if open_now.any() else center
                 turns = 2.0 * np.pi * np.round((center - mean) / (2.0 * np.pi))
                 whole = np.zeros(6) if reference else np.where(loose, 0.0, turns)

@@ -12,10 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opl.planning.box_track import BoxTracks, Bulges, Columns
-from opl.planning.columns import ColumnWalls, seams_of
+from opl.planning.box_columns import Columns, ColumnSampler
+from opl.planning.box_track import BoxTracks, Bulges
+from opl.planning.columns import ColumnWalls
 from opl.planning.costs import CostWeights
 from opl.planning.families import Families, Fit, Placement, grown
+from opl.planning.images import Images, seams_of
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
 from opl.search.box import JointBox
@@ -63,17 +65,20 @@ class OptimalSearch:
         self._settings = settings
         seams = seams_of(problem.field.q)
         found = fallback.path.joint_range_sum
-        self._walls = ColumnWalls(problem.cell, problem.scene.part, problem.points, seams, found)
-        self._families = Families(
-            self._walls, seams, problem.field.q, problem.cuts, problem.points.pass_index
-        )
+        images = Images(problem.cell.robot, seams, found)
+        part, points = problem.scene.part, problem.points
+        self._walls = ColumnWalls(problem.cell, part, points, images)
+        self._families = Families(images, problem.field.q, problem.cuts, points.pass_index)
+        self._sampler = ColumnSampler(problem, seams)
         most = Travel(fallback.path.joint_travel, fallback.path.contact_travel)
-        self._tracks = BoxTracks(problem, seams, settings.costs, settings.max_contact_change, most)
+        self._tracks = BoxTracks(
+            problem, self._sampler, settings.costs, settings.max_contact_change, most
+        )
         self.plan = fallback
         self._proven = self._least_hope = 0.0
         self._spent = self._given_up = 0
         gap = PROOF_SHARE * settings.widen
-        self.proof = BoxProof(self._walls.images, self._walls.finer, found, gap)
+        self.proof = BoxProof(self._walls.images.of, self._walls.finer, found, gap)
         self._places: set[float] = set()
         self._sweeps: set[tuple[int, int, bool]] = set()
         self._columns = np.arange(len(problem.points), dtype=float)
@@ -119,7 +124,7 @@ class OptimalSearch:
             return
         columns = None
         if len({(one.family, float(one.flip[0][4])) for one in placements}) == 1:
-            columns = self._tracks.columns(box, placements, self._columns)
+            columns = self._sampler.columns(box, placements, self._columns)
             inner = grown(columns.q, columns.free, box)
             self._hope(inner)
             missed = missed or self._missed(columns, box)
@@ -147,7 +152,7 @@ class OptimalSearch:
         self._least_hope = min(self._value, self.proof.threshold * RAISED)
         walls = self.proof.walls
         gap = PROOF_SHARE * self._settings.widen
-        self.proof = BoxProof(self._walls.images, self._walls.finer, self._least_hope, gap)
+        self.proof = BoxProof(self._walls.images.of, self._walls.finer, self._least_hope, gap)
         for wall in walls:
             self.proof.add(wall)
 
