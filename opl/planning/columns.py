@@ -103,9 +103,9 @@ class ColumnWalls:
         inside = np.arange(np.floor(before) + 1.0, np.ceil(after))
         places = np.unique(np.concatenate([[before], inside, [after]]))
         grid = _cut_finer(places, np.full(len(places) - 1, ROW_PARTS))
-        pieces = [piece for piece in low.pieces for piece in _below(piece, t)]
+        pieces = [part for piece in low.pieces for part in piece.below(t)]
         pieces += self._row_pieces(grid, t)
-        pieces += [piece for piece in high.pieces for piece in _above(piece, t)]
+        pieces += [part for piece in high.pieces for part in piece.above(t)]
         index = int(self._points.pass_index[int(before)])
         return Wall(index, (before + after) / 2.0, tuple(pieces))
 
@@ -278,18 +278,6 @@ class _Cells:
         wanted = np.where(self.known[self.families].all(axis=1), wanted, MOST_PARTS)
         wanted = np.where(self.none[self.families], 1, wanted)
         return np.asarray(np.minimum(wanted.max(axis=0), MOST_PARTS), dtype=int)
-
-
-def _below(piece: Piece, t: float) -> list[Piece]:
-    """Return what of a piece of a column lies below a contact position, whole cells."""
-    end = int(np.searchsorted(piece.at[:-1], t))
-    return [piece.part(0, end)] if end else []
-
-
-def _above(piece: Piece, t: float) -> list[Piece]:
-    """Return what of a piece of a column lies above a contact position, whole cells."""
-    first = int(np.searchsorted(piece.at[1:], t, side="right"))
-    return [piece.part(first, len(piece.pad_low))] if first < len(piece.pad_low) else []
 
 
 def _cut_finer(t: Array, parts: np.ndarray) -> Array:

@@ -65,8 +65,7 @@ def plan_weighted(
         sweeps[index] = sweep = _Sweep(index, matrix, ladder, box, cost, weights)
         queue += sweep.entries(range(len(WIDENINGS)))
     heapq.heapify(queue)
-    best = min(smallest, fallback, key=lambda plan: _value(problem, plan, weights))
-    value = _value(problem, best, weights)
+    best, value = fallback, _value(problem, fallback, weights)
     checks = 0
     # what a track costs at its nodes bounds from below what its path does
     while queue and queue[0][0] < value and checks < MOST_CHECKS:

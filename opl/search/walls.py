@@ -67,6 +67,17 @@ class Piece:
         """Upper faces of it."""
         return np.maximum(self.corners[:-1], self.corners[1:]) + self.pad_high
 
+    def below(self, place: float) -> list[Piece]:
+        """Return what of the piece lies below a place along it, whole cells, if anything."""
+        end = int(np.searchsorted(self.at[:-1], place))
+        return [self.part(0, end)] if end else []
+
+    def above(self, place: float) -> list[Piece]:
+        """Return what of the piece lies above a place along it, whole cells, if anything."""
+        first = int(np.searchsorted(self.at[1:], place, side="right"))
+        n = len(self.pad_low)
+        return [self.part(first, n)] if first < n else []
+
     def part(self, first: int, end: int) -> Piece:
         """Return the cells from ``first`` to before ``end`` alone."""
         corners = slice(first, end + 1)

@@ -9,20 +9,13 @@ import pytest
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from opl.cell.robot import forward_kinematics
 from opl.motion.collision_check import RESOLUTION, densify
 from opl.motion.path import figures_of_path
 from opl.planning.cheapest import plan_cheapest
-from opl.planning.costs import ObjectiveWeights, track_cost
-from opl.planning.finer_bound import finer_bound
+from opl.planning.costs import ObjectiveWeights
 from opl.planning.multi_start import plan_recursive
 from opl.planning.optimal import plan_optimal
-from opl.planning.refine import RefinedProblem
-from opl.planning.tube import REACH, halved, tube
 from opl.planning.weighted import plan_weighted
-from opl.search.certificate import least_box
-from opl.search.low_travel import low_travel_box
-from opl.search.smooth import Travel, smoothest, travel_of
 from opl.verification.replay import replay
 from tests.support.bare_cells import Ghosts
 from tests.support.fcl_scene import FclScene
@@ -79,7 +72,7 @@ def free_tracks(problem):
         free = problem.free_nodes(nodes)
         for rows in product(*(np.flatnonzero(column) for column in free)):
             q = nodes.q[np.arange(len(rows)), list(rows)]
-            t = nodes.contact_position[list(rows)]
+            t = nodes.contact_position[0, list(rows)]
             moves = np.maximum(np.ceil(np.abs(np.diff(t)) / rule.max_contact_step - 1e-9), 1.0)
             turned = np.abs(np.diff(q, axis=0)).max(axis=1)
             if (turned <= rule.max_joint_step * moves).all():
@@ -90,40 +83,13 @@ CELLS = pytest.mark.parametrize("make", [v_row, two_rows], ids=["V row", "two ro
 
 
 @CELLS
-def test_the_motion_attains_the_value_and_the_bound_lies_below_that_of_the_field(make):
+def test_the_motion_attains_the_value_and_the_bound_lies_below_it(make):
     plan = optimal(make)
     value = np.ptp(on_wheel(plan.motion), axis=0).sum()
     assert plan.path.joint_range_sum == pytest.approx(value, abs=1e-12)
     assert value <= recursive(make).path.joint_range_sum
     assert 0.0 < plan.lower_bound <= plan.path.joint_range_sum
-    assert plan.refinement.lower_bound <= plan.refinement.joint_range_sum
     assert plan.gap == pytest.approx(1.0 - plan.lower_bound / plan.path.joint_range_sum)
-
-
-@CELLS
-def test_refinement_never_makes_it_worse_and_tells_its_gain(make):
-    plan = optimal(make)
-    refined = plan.refinement
-    assert refined.gain >= 0.0
-    assert refined.gain == pytest.approx(refined.joint_range_sum - plan.path.joint_range_sum)
-    _, t = at_cutter_points(plan.path)
-    away = np.abs(t[:, None] - make().field.contact_positions).min(axis=1)
-    assert (away.max() > 0.1) == (refined.rounds > 0)  # between the contact positions of the field
-
-
-def test_refinement_ends_where_the_gain_is_below_the_tolerance():
-    # that joints and contact travel too far is to be no reason to go on
-    other = recursive(one_row)
-    q, t = other.path.q, other.path.contact_position
-    far = replace(other, path=replace(other.path, q=1.5 * q, contact_position=10.0 * t))
-    plans = [
-        plan_optimal(one_row(), replace(SETTINGS, tolerance=tolerance), far)
-        for tolerance in (1.0, 1e-9)
-    ]
-    assert plans[0].refinement.rounds == 1
-    assert plans[1].refinement.rounds > 1
-    assert plans[1].path.joint_range_sum < plans[0].path.joint_range_sum
-    assert plans[1].refinement.joint_range_sum == plans[0].refinement.joint_range_sum
 
 
 @CELLS
@@ -139,7 +105,7 @@ def test_a_row_of_the_v_part_is_within_a_thousandth_of_the_least_there_is():
     assert found.joint_range_sum <= 1.895
     assert optimal(v_row).gap <= 1e-3
     assert found.joint_travel <= other.joint_travel
-    assert found.contact_travel <= other.contact_travel + 1e-9
+    assert found.contact_travel <= 1.01 * other.contact_travel
 
 
 def test_the_motion_is_free_in_two_other_scenes():
@@ -160,28 +126,35 @@ def test_the_same_problem_gives_the_same_bytes():
 
 
 @pytest.mark.parametrize("first", [22, 36, 57])
-def test_the_bound_of_a_tiny_field_is_the_least_sum_of_all_its_tracks(first):
-    problem = problem_of(with_positions(small_job(), 7), slice(first, first + 4))
-    plan = plan_optimal(problem, SETTINGS, plan_recursive(problem))
-    least = min(np.ptp(q, axis=0).sum() for q, _ in free_tracks(problem))
-    bound = plan.refinement.lower_bound
-    assert bound == pytest.approx(least, rel=1e-5)
-    assert bound <= least + 1e-12
-
-
-@pytest.mark.parametrize("first", [22, 36])
-def test_the_bound_of_a_finer_field_is_the_least_sum_of_all_its_tracks(first):
+def test_the_bound_of_a_tiny_field_is_the_least_sum_of_all_its_tracks_as_t_becomes_finer(first):
     coarse, fine = (
-        problem_of(with_positions(small_job(), count), slice(first, first + 4)) for count in (7, 13)
+        problem_of(with_positions(small_job(), count), slice(first, first + 4)) for count in (7, 41)
     )
-    least = min(np.ptp(q, axis=0).sum() for q, _ in free_tracks(fine))
-    positions = halved(coarse.field.contact_positions)
-    np.testing.assert_allclose(positions, fine.field.contact_positions, atol=1e-9)
-    bound = finer_bound(coarse, positions, SETTINGS, 1.1 * least, np.inf)
-    assert least * (1.0 - 2.0 * SETTINGS.widen) <= bound <= least + 1e-9
-    # nothing is smaller than the least, up to the fraction to which boxes are solved
-    below = finer_bound(coarse, positions, SETTINGS, 0.9 * least, np.inf)
-    assert below == pytest.approx(0.9 * least, rel=2e-6)
+    plan = plan_optimal(coarse, SETTINGS, plan_recursive(coarse))
+    q, free = fine.field.q, ~fine.cuts
+    least = least_range_sum(fine, q, free)
+    assert plan.lower_bound <= least + 1e-12
+    assert plan.lower_bound <= plan.path.joint_range_sum <= least * (1.0 + SETTINGS.widen)
+    assert plan.gap <= 0.1  # of a hundredth of a radian
+
+
+def least_range_sum(problem, q, free):
+    """Return the least sum of the tracks of a field of four columns that jump as they like."""
+    within = problem.cell.within_limits(q) & free[:, :, None]
+    best = np.inf
+    for branch in range(8):
+        nodes = [q[column, within[column, :, branch], branch] for column in range(len(q))]
+        if any(len(column) == 0 for column in nodes):
+            continue
+        a, b = nodes[0][:, None], nodes[1][None]
+        low, high = np.minimum(a, b).reshape(-1, 6), np.maximum(a, b).reshape(-1, 6)
+        for point in nodes[2]:
+            low3, high3 = np.minimum(low, point), np.maximum(high, point)
+            kept = (high3 - low3).sum(axis=1) < best
+            for last in nodes[3]:
+                sums = np.maximum(high3[kept], last) - np.minimum(low3[kept], last)
+                best = min(best, float(sums.sum(axis=1).min(initial=np.inf)))
+    return best
 
 
 def test_what_collides_is_avoided_and_the_bound_still_holds():
@@ -191,24 +164,23 @@ def test_what_collides_is_avoided_and_the_bound_still_holds():
     haunted = with_scene(problem, collision=ghosts)
     plan = plan_optimal(haunted, SETTINGS, plan_recursive(haunted))
     assert not ghosts.collides(densify(plan.motion.q, RESOLUTION)[0]).any()
-    bound = plan.refinement.lower_bound
-    assert bound <= plan.refinement.joint_range_sum
-    assert bound >= free.refinement.lower_bound - 1e-9  # what is out can only raise it
+    assert plan.lower_bound <= plan.path.joint_range_sum
+    assert plan.lower_bound <= free.path.joint_range_sum  # what collides is not in the bound
 
 
 def test_an_interrupted_search_returns_what_there_was_and_a_bound_that_holds():
     problem = one_row()
-    plan = plan_optimal(problem, replace(SETTINGS, seconds=1e-9), recursive(one_row))
+    plan = plan_optimal(problem, replace(SETTINGS, max_subproblems=1), recursive(one_row))
     assert plan.motion is recursive(one_row).motion
     assert 0.0 <= plan.lower_bound <= optimal(one_row).lower_bound + 1e-12
 
 
 def test_an_interrupted_proof_still_leaves_a_verified_program(tmp_path):
-    job = write_job(tmp_path / "job", {"search.time_limit_s": 1e-9})
+    job = write_job(tmp_path / "job", {"search.max_subproblems": 1})
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 0, ended.err
     assert "0 collisions" in ended.out
-    assert "the time was up before anything was proven of the least joint range sum" in ended.out
+    assert "no motion along these passes has a joint range sum below" in ended.out
     assert (tmp_path / "out" / "V_SHAPE.JBI").is_file()
 
 
@@ -231,7 +203,7 @@ def shortest(problem, price):
             here, there = np.flatnonzero(free[column]), np.flatnonzero(free[column + 1])
             a, b = (grid.ravel() for grid in np.meshgrid(here, there, indexing="ij"))
             q_a, q_b = nodes.q[column, a], nodes.q[column + 1, b]
-            t_a, t_b = nodes.contact_position[a], nodes.contact_position[b]
+            t_a, t_b = nodes.contact_position[0, a], nodes.contact_position[0, b]
             moves = np.maximum(np.ceil(np.abs(t_b - t_a) / rule.max_contact_step - 1e-9), 1.0)
             small = np.abs(q_b - q_a).max(axis=1) <= rule.max_joint_step * moves
             tails.append((column * m + a)[small])
@@ -288,7 +260,7 @@ WEIGHTS = ObjectiveWeights(joint_range=1.0, travel=0.5, time=0.05)
 
 
 def weighted(problem, weights, fallback):
-    return plan_weighted(problem, weights, SETTINGS.max_contact_change, 60.0, fallback)
+    return plan_weighted(problem, weights, SETTINGS, fallback)
 
 
 def sum_of(problem, plan, weights):
@@ -334,67 +306,7 @@ def test_no_track_of_a_tiny_field_has_less_than_the_bound_of_the_weighted_sum(fi
 def test_one_part_alone_has_the_bound_of_that_part():
     problem = one_row()
     only_range = weighted(problem, ObjectiveWeights(1.0, 0.0, 0.0), recursive(one_row))
-    ladders = [problem.ladder(nodes, problem.free_nodes(nodes)) for nodes in problem.field.matrices]
-    nothing = np.empty(0, dtype=np.int64)
-    least = min(least_box(ladder, nothing).lower_bound for ladder in ladders)
-    assert only_range.weighted.lower_bound == pytest.approx(least, rel=2e-4)
+    assert only_range.weighted.lower_bound == optimal(one_row).lower_bound
     only_travel = weighted(problem, ObjectiveWeights(0.0, 1.0, 0.0), recursive(one_row))
     bound = shortest(problem, lambda a, b, *_: np.abs(b - a).sum(axis=1))
     assert only_travel.weighted.lower_bound == pytest.approx(bound, abs=1e-9)
-
-
-# the tube around a path, and the box of low travel in it
-
-
-def test_a_tube_holds_the_path_and_only_configurations_that_grind_near_it():
-    problem, path = one_row(), recursive(one_row).path
-    whole = RefinedProblem(problem, np.arange(len(problem.points), dtype=float))
-    finer = halved(problem.field.contact_positions)
-    around = tube(whole, path, finer).problem
-    (nodes,) = around.field.matrices
-    free = around.free_nodes(nodes)
-    q_path, t_path = at_cutter_points(path)
-    for column, (q, t) in enumerate(zip(q_path, t_path, strict=True)):
-        row = int(np.abs(nodes.contact_position - t).argmin())
-        np.testing.assert_array_equal(nodes.q[column, row], q)
-        assert free[column, row]
-        near = nodes.contact_position[free[column]]
-        assert np.abs(near - t).max() <= REACH * np.diff(finer).max() + 1e-9
-        assert len(near) > 1
-    columns, rows = np.nonzero(free)
-    Ts = forward_kinematics(problem.cell.robot, nodes.q[free]) @ problem.cell.T_flange_workpiece
-    Ts_base_cutter = Ts @ problem.points.Ts_workpiece_cutter[columns]
-    on_wheel = problem.cell.wheel.T_base_contact(nodes.contact_position[rows])
-    np.testing.assert_allclose(Ts_base_cutter - on_wheel, 0.0, atol=1e-9)
-
-
-def test_halved_contact_positions_keep_the_old_ones_to_the_bit():
-    t = np.linspace(-70.0, 70.0, 140)
-    finer = halved(halved(t))
-    assert np.isin(t, finer).all()
-    np.testing.assert_allclose(np.diff(finer), 140.0 / 139.0 / 4.0)
-
-
-def test_a_low_travel_box_holds_a_track_of_low_travel_and_is_widened_no_more_than_allowed():
-    problem = one_row()
-    found = 0
-    for nodes in problem.field.matrices:
-        free = problem.free_nodes(nodes)
-        ladder, nothing = problem.ladder(nodes, free), np.empty(0, dtype=np.int64)
-        costs = track_cost(problem, nodes, ONLY_TRAVEL, np.zeros_like(free))
-        box = least_box(ladder, nothing).box
-        if box is None:
-            continue
-        q = np.nan_to_num(nodes.q, nan=np.inf)
-        dear = replace(costs, contact_weight=1.0)
-        before = travel_of(ladder, smoothest(ladder, nothing, box.holds(q), dear).rows)
-        most = Travel(np.inf, before.contact - 4.0)  # one step of t less than the box permits
-        wider = low_travel_box(ladder, nothing, costs, box, 2.0 * box.size, most)
-        assert low_travel_box(ladder, nothing, costs, box, box.size, most) is None
-        if wider is not None:
-            found += 1
-            assert box.size < wider.size <= 2.0 * box.size
-            assert (wider.lower <= box.lower).all() and (wider.upper >= box.upper).all()
-            track = smoothest(ladder, nothing, wider.holds(q), dear)
-            assert travel_of(ladder, track.rows).within(most)
-    assert found

@@ -1,4 +1,4 @@
-"""The certified least box and the smoothest track against exhaustive enumeration."""
+"""The smoothest track against exhaustive enumeration."""
 
 from dataclasses import replace
 
@@ -8,14 +8,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from opl.search.box import JointBox
-from opl.search.certificate import least_box
 from opl.search.ladder import Ladder
 from opl.search.smooth import TrackCost, Travel, smoothest, smoothest_within
 from tests.support.brute_force import all_tracks, keys_of, may_step, random_field
-
-
-def range_sum(ladder, rows):
-    return float(np.ptp(ladder.q[np.arange(len(rows)), list(rows)], axis=0).sum())
 
 
 def cost_of(ladder, rows, cost):
@@ -45,55 +40,6 @@ def random_cost(ladder, seed):
         contact_speed=float(random.uniform(1.0, 10.0)),
         node_cost=random.uniform(0.0, 0.5, ladder.free.shape),
     )
-
-
-@pytest.mark.parametrize("block", range(10))
-def test_the_least_box_is_the_one_that_enumeration_finds(block):
-    for seed in range(20 * block, 20 * block + 20):
-        ladder, blocked = random_field(seed)
-        least = min((range_sum(ladder, rows) for rows in all_tracks(ladder, blocked)), default=None)
-        certificate = least_box(ladder, keys_of(ladder, blocked))
-        if least is None:
-            assert certificate.rows is None
-            assert certificate.lower_bound == np.inf
-            continue
-        assert certificate.box.size == pytest.approx(least, abs=1e-8)
-        assert certificate.lower_bound <= least + 1e-12
-        assert certificate.lower_bound == pytest.approx(least, abs=1e-8)
-        assert range_sum(ladder, certificate.rows) == pytest.approx(certificate.box.size, abs=1e-12)
-        assert tuple(certificate.rows) in set(all_tracks(ladder, blocked))
-
-
-@pytest.mark.parametrize("seed", range(40))
-def test_a_proof_with_a_gap_keeps_its_promise(seed):
-    ladder, blocked = random_field(seed)
-    least = min((range_sum(ladder, rows) for rows in all_tracks(ladder, blocked)), default=None)
-    if least is None:
-        return
-    certificate = least_box(ladder, keys_of(ladder, blocked), gap=0.1)
-    assert certificate.lower_bound <= least + 1e-12
-    assert certificate.box.size * 0.9 <= certificate.lower_bound + 1e-8
-
-
-@pytest.mark.parametrize("seed", range(40))
-def test_a_proof_that_is_cut_short_still_bounds_from_below(seed):
-    ladder, blocked = random_field(seed)
-    certificate = least_box(ladder, keys_of(ladder, blocked), seconds=-1.0)
-    least = min((range_sum(ladder, rows) for rows in all_tracks(ladder, blocked)), default=np.inf)
-    assert certificate.lower_bound <= least
-    assert not certificate.finished or least == np.inf
-
-
-@pytest.mark.parametrize("seed", range(40))
-def test_nothing_is_found_below_the_least_box(seed):
-    ladder, blocked = random_field(seed)
-    keys = keys_of(ladder, blocked)
-    first = least_box(ladder, keys)
-    if first.rows is None:
-        return
-    again = least_box(ladder, keys, bound=first.box.size)
-    assert again.rows is None
-    assert again.lower_bound >= first.box.size - 1e-8
 
 
 @pytest.mark.parametrize("block", range(10))
