@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from opl.cell.robot import forward_kinematics
 from opl.motion.collision_check import RESOLUTION, densify
-from opl.motion.path import figures_of_path
+from opl.motion.figures import figures_of_path
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import ObjectiveWeights, track_cost
 from opl.planning.finer_bound import finer_bound
