@@ -30,8 +30,9 @@ from opl.cell.triangle import bend_to, heading_to
 from opl.geometry.frames import Array
 
 # Below this sine of theta5, axis 6 is parallel to axes 2, 3 and 4. Taking it for parallel there
-# turns the flange by no more than this in [rad].
-_WRIST_TOLERANCE = 1e-12
+# turns the flange by no more than this in [rad]; above it, round-off leaves the tilt of the wrist
+# uncertain by 1e-7 rad at most, which only an arm in line to less than that would miss.
+_WRIST_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)

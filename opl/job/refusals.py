@@ -35,7 +35,8 @@ def keys_named(source: Source) -> Iterator[None]:
     try:
         yield
     except SettingError as error:
-        raise InputError(source.at(keys.OF_PROGRAM[error.where]), error.message) from error
+        key = keys.OF_PROGRAM.get(error.where, error.where)  # a post of a site names its own
+        raise InputError(source.at(key), error.message) from error
     except PassTimeError as error:
         advice = f"raise {keys.PROCESS_FEED}, or write {keys.PROGRAM_MOTION}: straight"
         raise OplError(f"{error}; {advice}") from error

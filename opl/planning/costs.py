@@ -9,7 +9,7 @@ import numpy as np
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import singularity_margins
 from opl.geometry.frames import Array
-from opl.motion.path import Figures
+from opl.motion.figures import Figures
 from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
 from opl.search.smooth import TrackCost

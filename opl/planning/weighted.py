@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opl.motion.path import figures_of_path
+from opl.motion.figures import figures_of_path
 from opl.planning.costs import CostWeights, ObjectiveWeights, track_cost
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
 from opl.planning.optimal import OptimalSettings, plan_optimal

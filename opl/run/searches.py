@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from opl.job.search import Method, Objective, Search
-from opl.motion.path import Figures, figures_of_path, figures_of_points
+from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import ObjectiveWeights
 from opl.planning.multi_start import Start, plan_recursive, try_recursive

@@ -18,8 +18,8 @@ from opl.geometry.passes import LaidPasses
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.feed import SlowStretch
+from opl.motion.figures import Figures
 from opl.motion.motion import VerifiedMotion
-from opl.motion.path import Figures
 from opl.motion.timing import Timing
 from opl.planning.fixed_contact import FixedContact
 from opl.planning.plan import Plan

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from opl.motion.collision_check import RESOLUTION, densify
-from opl.motion.path import figures_of_path
+from opl.motion.figures import figures_of_path
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import ObjectiveWeights
 from opl.planning.multi_start import plan_recursive
