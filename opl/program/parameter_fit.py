@@ -78,7 +78,8 @@ def choose_group(
 
 def compare_parameters(robot: Robot, parameters: AxisParameters) -> Comparison:
     """Hold axes, soft limits, ratios and link lengths of a group against those of a robot."""
-    compared, against = [f"axes: {len(parameters.upper)}, as {robot.title}"], []
+    compared = [f"axes: {len(parameters.upper)}, as {robot.title}"]
+    against: list[str] = []
     for agrees, lines in (
         _limits(robot, parameters),
         _ratios(robot, parameters),
