@@ -11,10 +11,14 @@ from pathlib import Path
 
 import pytest
 
+import opl
 from opl.errors import InputError
 from opl.files import switching
 from opl.files.claiming import claimed
 from opl.files.writing import HIDDEN
+
+# children use the opl that is tested here
+CHILD = {**os.environ, "PYTHONPATH": str(Path(opl.__file__).parents[1])}
 
 OLD = {"V.JBI": b"old\r\n", "V01.JBI": b"old part\r\n", "result.json": b"old result\n"}
 NEW = {"V.JBI": "new\r\n" * 2000, "V.csv": "new table\r\n", "result.json": "new result\n"}
@@ -188,7 +192,7 @@ def test_a_disk_that_is_full_keeps_the_good_result(tmp_path):
     script = Path(__file__).parent / "full_disk.py"
     ended = subprocess.run(
         ["unshare", "--user", "--map-root-user", "--mount", sys.executable, script, tmp_path],
-        capture_output=True, text=True, timeout=120,
+        capture_output=True, text=True, timeout=120, env=CHILD,
     )  # fmt: skip
     if "unshare" in ended.stderr and ended.returncode == 1:
         pytest.skip(ended.stderr)
@@ -203,7 +207,7 @@ def test_two_runs_into_one_folder_exclude_each_other(tmp_path):
         "with claimed(Path(sys.argv[1])) as claim: print('held', flush=True); time.sleep(600)"
     )
     command = [sys.executable, "-c", holder, str(tmp_path / "out")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as other:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=CHILD) as other:
         assert other.stdout.readline() == "held\n"
         with pytest.raises(InputError, match=f"another run writes to it .process {other.pid}."):
             deliver(tmp_path / "out")
@@ -216,7 +220,8 @@ def test_two_runs_into_one_folder_exclude_each_other(tmp_path):
 def test_many_runs_at_once_leave_the_files_of_one(tmp_path):
     """Processes deliver to one folder again and again; a reader never sees a mixture."""
     writer = (
-        "import sys; from pathlib import Path; from opl.errors import InputError\n"
+        "import sys; from pathlib import Path; import opl
+from opl.errors import InputError\n"
         "from opl.files.claiming import claimed\n"
         "done = 0\n"
         "while done < 60:\n"
@@ -229,7 +234,7 @@ def test_many_runs_at_once_leave_the_files_of_one(tmp_path):
     )
     folder = tmp_path / "out"
     folder.mkdir()
-    others = [subprocess.Popen([sys.executable, "-c", writer, str(folder), name]) for name in "abc"]
+    others = [subprocess.Popen([sys.executable, "-c", writer, str(folder), name], env=CHILD) for name in "abc"]
     seen = set()
     while any(other.poll() is None for other in others):
         opened = os.open(folder, os.O_RDONLY)  # one state of it, whatever comes after
