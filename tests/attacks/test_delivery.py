@@ -220,8 +220,7 @@ def test_two_runs_into_one_folder_exclude_each_other(tmp_path):
 def test_many_runs_at_once_leave_the_files_of_one(tmp_path):
     """Processes deliver to one folder again and again; a reader never sees a mixture."""
     writer = (
-        "import sys; from pathlib import Path; import opl
-from opl.errors import InputError\n"
+        "import sys; from pathlib import Path; from opl.errors import InputError\n"
         "from opl.files.claiming import claimed\n"
         "done = 0\n"
         "while done < 60:\n"
@@ -234,7 +233,10 @@ from opl.errors import InputError\n"
     )
     folder = tmp_path / "out"
     folder.mkdir()
-    others = [subprocess.Popen([sys.executable, "-c", writer, str(folder), name], env=CHILD) for name in "abc"]
+    others = [
+        subprocess.Popen([sys.executable, "-c", writer, str(folder), name], env=CHILD)
+        for name in "abc"
+    ]
     seen = set()
     while any(other.poll() is None for other in others):
         opened = os.open(folder, os.O_RDONLY)  # one state of it, whatever comes after
