@@ -125,7 +125,8 @@ def search(part: str, rows: int) -> None:
     assert plan.gap is not None
     print(
         f"{part}, {rows} rows, {len(points)} points: {clock.text('clearance', 'search')}; sum "
-        f"{path.joint_range_sum:.5f} rad, bound {plan.lower_bound:.5f}, gap {100 * plan.gap:.3f} %; "
+        f"{path.joint_range_sum:.5f} rad, bound {plan.lower_bound:.5f}, gap "
+        f"{100 * plan.gap:.3f} %; "
         f"joint travel {path.joint_travel:.2f} (recursive {other.joint_travel:.2f}), "
         f"travel of t {path.contact_travel:.1f} (recursive {other.contact_travel:.1f})"
     )
