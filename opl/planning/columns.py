@@ -11,24 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from opl.cell.flange_jets import contact_jets, path_jets
 from opl.cell.inverse_jets import FlangeJets, joint_derivatives
 from opl.cell.inverse_kinematics import inverse_kinematics
-from opl.cell.wheel_distance import TOLERANCE, PartTree, signed_wheel_distance
+from opl.cell.wheel_distance import PartTree
 from opl.cell.workcell import WorkCell
 from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.geometry.wheel import MM_PER_M
+from opl.planning.cut_cells import cells_of, cut_finer
 from opl.planning.images import Images
 from opl.search.walls import UNKNOWN, Image, Line, Piece, Wall
 
-CELL = 1.0  # belt units that a cell covers at first
-MOST_HALVINGS = 8  # of a cell where the part begins to cut into the wheel
 MOST_PARTS = 32  # of a cell whose pads are large
 ROW_PARTS = 16  # cells between two places of a wall along a contact position
 FINER = 8  # cells that one is cut into where a proof needs it
@@ -78,11 +75,11 @@ class ColumnWalls:
     def walls(self, places: Sequence[float]) -> list[Wall]:
         """Return the walls at fractional cutter points."""
         Ts_workpiece_cutter = self._points.frames_at(np.asarray(places, dtype=float))
-        grids, cuts = self._borders(Ts_workpiece_cutter)
+        grids, cuts = cells_of(self._cell, self._part, Ts_workpiece_cutter)
         cells = self._cells(Ts_workpiece_cutter, grids, cuts)
         parts = [np.where(cut, 1, now) for cut, now in zip(cuts, cells.parts(), strict=True)]
         if any((now > 1).any() for now in parts):
-            grids = [_cut_finer(t, now) for t, now in zip(grids, parts, strict=True)]
+            grids = [cut_finer(t, now) for t, now in zip(grids, parts, strict=True)]
             cuts = [np.repeat(cut, now) for cut, now in zip(cuts, parts, strict=True)]
             cells = self._cells(Ts_workpiece_cutter, grids, cuts)
         passes = self._points.pass_index[np.asarray(places, dtype=int)]
@@ -115,7 +112,7 @@ class ColumnWalls:
         for s in sweeps:
             inside = np.arange(np.floor(s.before) + 1.0, np.ceil(s.after))
             along = np.unique(np.concatenate([[s.before], inside, [s.after]]))
-            grids.append(_cut_finer(along, np.full(len(along) - 1, ROW_PARTS)))
+            grids.append(cut_finer(along, np.full(len(along) - 1, ROW_PARTS)))
         rows = self._rows(grids, [s.contact_position for s in sweeps])
         found = []
         for s, (low, high), row in zip(sweeps, ends, rows, strict=True):
@@ -187,64 +184,6 @@ class ColumnWalls:
         for low, high in _runs(allowed):
             if allowed[low]:
                 yield piece.part(low, high)
-
-    def _borders(self, Ts_workpiece_cutter: Array) -> tuple[list[Array], list[np.ndarray]]:
-        """Return the ends of cells at each place, and in which the part surely cuts into the wheel.
-
-        Cells are smaller where it begins to cut.
-        """
-        wheel = self._cell.wheel
-        t = np.array([-wheel.last_position])
-        for end in (-wheel.flat_end, wheel.flat_end, wheel.last_position):
-            if end > t[-1]:
-                count = int(np.ceil((end - t[-1]) / CELL))
-                t = np.concatenate([t[:-1], np.linspace(t[-1], end, count + 1)])
-        k = len(Ts_workpiece_cutter)
-        place = np.repeat(np.arange(k), len(t) - 1)
-        low, high = np.tile(t[:-1], k), np.tile(t[1:], k)
-        cuts, deep = self._surely_cuts(Ts_workpiece_cutter[place], low, high)
-        for _ in range(MOST_HALVINGS):
-            unsure = deep & ~cuts
-            begins = (deep[:-1] != deep[1:]) & (place[:-1] == place[1:])
-            unsure[:-1] |= begins & ~deep[:-1]
-            unsure[1:] |= begins & ~deep[1:]
-            if not unsure.any():
-                break
-            parts = np.where(unsure, 2, 1)
-            middle = (low + high) / 2.0
-            fresh, second = np.repeat(unsure, parts), np.zeros(parts.sum(), dtype=bool)
-            second[(np.cumsum(parts) - 1)[unsure]] = True
-            first = fresh & ~second
-            place, low, high, middle, cuts, deep = (
-                np.repeat(values, parts) for values in (place, low, high, middle, cuts, deep)
-            )
-            low[second], high[first] = middle[second], middle[first]
-            found = self._surely_cuts(Ts_workpiece_cutter[place[fresh]], low[fresh], high[fresh])
-            cuts[fresh], deep[fresh] = found
-        ends = np.searchsorted(place, np.arange(k + 1))
-        runs = [slice(a, b) for a, b in pairwise(ends)]
-        return [np.append(low[run], high[run][-1:]) for run in runs], [cuts[run] for run in runs]
-
-    def _surely_cuts(
-        self, Ts_workpiece_cutter: Array, low: Array, high: Array
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return in which cells the part cuts into the wheel all over, and at the middle."""
-        cell, wheel = self._cell, self._cell.wheel
-        middle, radius = (low + high) / 2.0, (high - low) / 2.0
-        Ts_cutter_workpiece = frames.inverse(Ts_workpiece_cutter)
-        x, _, z = np.moveaxis(
-            frames.transform(Ts_cutter_workpiece, self._part.spheres[0, :3]), -1, 0
-        )
-        # about the edge; and a point in the wheel is not farther from it than the wheel is large
-        lever = np.minimum(
-            np.hypot(x, z) + self._part.spheres[0, 3], np.hypot(wheel.width, 2.0 * wheel.radius)
-        )
-        rolled = np.abs(middle) > wheel.flat_end
-        moved = np.where(rolled, 2.0 * np.sin(np.deg2rad(radius) / 2.0) * lever, radius / MM_PER_M)
-        Ts_contact0_workpiece = wheel.T_contact0_contact(middle) @ Ts_cutter_workpiece
-        allowed = -cell.planned_penetration
-        clearance = signed_wheel_distance(self._part, wheel, Ts_contact0_workpiece, allowed)
-        return (clearance + moved + TOLERANCE < allowed), clearance < allowed
 
     def _cells(
         self, Ts_workpiece_cutter: Array, grids: list[Array], cuts: list[np.ndarray]
@@ -326,14 +265,6 @@ class _Cells:
         wanted = np.where(self.none[self.families], 1, wanted)
         parts = np.minimum(wanted.max(axis=0), MOST_PARTS).astype(int)
         return np.split(parts, self.first[1:])
-
-
-def _cut_finer(t: Array, parts: np.ndarray) -> Array:
-    """Return the ends of cells after each is cut into some parts."""
-    cell = np.repeat(np.arange(len(parts)), parts)
-    part = np.arange(len(cell)) - np.repeat(np.cumsum(parts) - parts, parts)
-    fine = t[cell] + (t[cell + 1] - t[cell]) * (part / parts[cell])
-    return np.append(fine, t[-1])
 
 
 def _runs(kind: np.ndarray) -> list[tuple[int, int]]:
