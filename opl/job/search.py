@@ -104,6 +104,10 @@ class SearchSection(Document):
     renamed: ClassVar[Mapping[str, str]] = {
         "widen_percent": "range_tolerance_percent",
     }
+    retired: ClassVar[Mapping[str, str]] = {
+        "refine_tolerance_percent": "the search finds contact positions between the given ones",
+        "time_limit_s": "the search is bounded by counted work, see max_subproblems",
+    }
 
     method: Literal["recursive", "optimal"] = Field(
         default="optimal",
