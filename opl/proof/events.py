@@ -30,7 +30,7 @@ def name_findings(job: Job, name: str) -> Iterator[Finding]:
     """Give a finding if a program is not called what the program of its job is called."""
     home = Move(job.process.home, START_SPEED, exact_stop=True, on_wheel=False, motion_index=0)
     wanted = _written(job, [home]).name
-    if name != wanted:
+    if name.casefold() != wanted.casefold():  # RAPID and KRL ignore case
         message = f"is called {name}, the program of the job {wanted}"
         yield Finding(Level.ERROR, "name", "program", message)
 
