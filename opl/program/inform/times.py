@@ -9,7 +9,7 @@ import numpy as np
 from opl.cell.robot import Robot
 from opl.geometry.frames import Array, inverse
 from opl.program.inform.cartesian import configurations, rectan_pose
-from opl.program.inform.job import InformJob, Instruction
+from opl.program.inform.job import ROBOT_KINDS, InformJob, Instruction
 from opl.program.played import SpeedUnit, WrittenSpeed, move_time
 from opl.program.pulses import PulseScale
 
@@ -24,16 +24,16 @@ _UNITS = {
 def job_configurations(
     job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool: Array
 ) -> Array:
-    """Return the joint positions of the taught positions of a job in [rad], shape (n, 6).
+    """Return the joint positions of the robot's own positions of a job in [rad], shape (n, 6).
 
     NaN stands for a position that no configuration within the limits, or more than one, belongs to.
     """
     scale = PulseScale.of(robot)
     q = np.full((len(job.positions), 6), np.nan)
     for k, position in enumerate(job.positions):
-        if position.kind != "C" or len(position.values) < 6:
+        if position.kind not in ROBOT_KINDS or len(position.values) < 6:
             continue
-        if position.coordinates == "PULSE":
+        if position.coordinates == "PULSE" and len(position.values) == 6:
             q[k] = scale.to_angles(np.array(position.values[:6]))
         elif position.coordinates == "RECTAN" and len(position.rconf) >= 6:
             T_base_flange = T_base_frame @ rectan_pose(position.values) @ inverse(T_flange_tool)
