@@ -9,10 +9,10 @@ import numpy as np
 
 from opl.cell.robot import Robot
 from opl.program.changes import Coordinate, Said, changed_lines
+from opl.program.events import same_number
 from opl.program.inform.job import ROBOT_KINDS, InformJob, Instruction, Position, read_label
 from opl.program.listing import pose_coordinates
 from opl.program.pulses import PulseScale
-from opl.program.statements import same_number
 
 _TAUGHT = ("C", "BC", "EC")  # their numbers only tie a move to its position
 _GROUPS = {"B": "base", "E": "station"}  # the others, by their first letter
