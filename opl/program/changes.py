@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count, takewhile
 
@@ -108,12 +108,12 @@ def _side_by_side(before: Sequence[Said], after: Sequence[Said], level: int = 0)
         yield from ((a, None) for a in before)
         yield from ((None, b) for b in after)
         return
-    keys = [[_LIKENESS[level](said) for said in some] for some in (before, after)]
-    if keys[0] == keys[1]:  # matching blocks of equal keys would be slow to find
+    first, second = ([_LIKENESS[level](said) for said in some] for some in (before, after))
+    if first == second:  # matching blocks of equal keys would be slow to find
         yield from zip(before, after, strict=True)
         return
     # no line is too common to matter: autojunk would skip them
-    matcher = difflib.SequenceMatcher(None, *keys, autojunk=False)
+    matcher = difflib.SequenceMatcher(None, first, second, autojunk=False)
     for tag, a, b, c, d in matcher.get_opcodes():
         if tag == "equal":
             yield from zip(before[a:b], after[c:d], strict=True)
@@ -122,7 +122,7 @@ def _side_by_side(before: Sequence[Said], after: Sequence[Said], level: int = 0)
 
 
 # In what two things are alike, strictest first.
-_LIKENESS: tuple[Callable[[Said], object], ...] = (
+_LIKENESS: tuple[Callable[[Said], Hashable], ...] = (
     lambda said: said.text,
     lambda said: said.target or said.text,
     lambda said: tuple(c.name for c in said.target) or said.text.partition(" ")[0],
