@@ -83,7 +83,7 @@ def test_what_no_controller_would_take_is_told():
 def test_job_is_held_against_the_controller_it_fits_best():
     text = written().replace("\r\n", "\n").replace("NOP\n", 'NOP\nSKILLSND "X"\n')
     assert not [line for line in shown(text) if "caution" in line]  # known on DX100 alone
-    broken = [line for line in shown(text.replace("VJ=", "VJ=1")) if "caution" in line]
+    broken = [line for line in shown(text.replace("VJ=", "VJ=2000")) if "caution" in line]
     assert all(line.startswith("caution, on DX100: line ") for line in broken[:10])
     assert broken[10].endswith("more of this kind")
 
