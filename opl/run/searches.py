@@ -27,8 +27,8 @@ class FoundPaths:
     """What the searches of a job found.
 
     Attributes:
-        plan: The path by the method and for the objective of the job, the quickest of its equals; its
-            approaches and retracts are no longer than they need be.
+        plan: The path by the method and for the objective of the job, the quickest of its equals.
+            Its approaches and retracts are no longer than they need be.
         recursive: That of the paper's search; the same if the job wants nothing better.
     """
 
