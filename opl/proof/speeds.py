@@ -77,8 +77,8 @@ def _ahead(
             yield _finding(written, playback, k, wanted, "the feed")
         elif early > allowed:  # because of the moves before it
             message = f"{1e3 * early:.2f} mm ahead of the feed that the job asks for"
-            place = f"{motion.place(k)} ({playback.moves[k].place})"
-            yield Finding(Level.ERROR, "speed", place, message)
+            where = f"{motion.place(k)} ({playback.moves[k].place})"
+            yield Finding(Level.ERROR, "speed", where, message)
 
 
 def _last_digit(move: ReadMove, takes: float) -> float:
