@@ -43,7 +43,7 @@ HOMES = {
     "pybullet_utils": {"verification"},
     "pybullet_data": set(),
     "jinja2": {"program"},
-    "yaml": {"files/documents"},
+    "yaml": {"files/yaml_text"},
     "click": {"cli"},
     "rich": {"cli"},
     "matplotlib": {"report"},
