@@ -14,7 +14,7 @@ from typing import Any
 import yaml
 
 MOST_DEPTH = 60
-MOST_VALUES = 1_000_000  # with each alias counted as what it stands for
+MOST_VALUES = 600_000  # with each alias counted as what it stands for
 MOST_DIGITS = 64  # of a number
 
 _BOOL = re.compile(r"true|True|TRUE|false|False|FALSE")
