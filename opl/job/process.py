@@ -37,7 +37,9 @@ class ProcessSection(Document):
         "cell file.",
     )
     approach_mm: Annotated[float, between(0.01, 2000.0)] = Field(
-        default=50.0, description="Length of approach and retract off the wheel."
+        default=50.0,
+        description="Longest that approach and retract lead off the wheel; they end where the "
+        "straight free move from there is proven free.",
     )
     approach_turn_deg: Annotated[float, Field(ge=0.0, le=90.0)] = Field(
         default=0.0,
