@@ -13,11 +13,11 @@ from opl.program.inform.job import ROBOT_KINDS, InformJob, Instruction
 from opl.program.played import SpeedUnit, WrittenSpeed, move_time
 from opl.program.pulses import PulseScale
 
-# What the number of each speed is multiplied by to be in SI.
+# What the number of each speed is multiplied by to be in SI, and its decimals.
 _UNITS = {
-    "VJ": (SpeedUnit.TOP_SPEED, 1e-2),
-    "V": (SpeedUnit.TOOL_POINT, 1e-3),
-    "VR": (SpeedUnit.HAND, float(np.deg2rad(1.0))),
+    "VJ": (SpeedUnit.TOP_SPEED, 1e-2, 2),
+    "V": (SpeedUnit.TOOL_POINT, 1e-3, 1),
+    "VR": (SpeedUnit.HAND, float(np.deg2rad(1.0)), 1),
 }
 
 
@@ -46,8 +46,8 @@ def job_configurations(
 def written_speed(move: Instruction) -> WrittenSpeed:
     """Return the one speed of a move, VJ, V or VR."""
     tag, value = next((name, value) for name, value in move.tags if name in _UNITS)
-    unit, factor = _UNITS[tag]
-    return WrittenSpeed(unit, factor * float(value), f"{tag}={value}")
+    unit, factor, decimals = _UNITS[tag]
+    return WrittenSpeed.of_number(unit, factor, value, decimals, f"{tag}={value}")
 
 
 def move_times(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool: Array) -> Array:
