@@ -120,11 +120,11 @@ if TYPE_CHECKING:
     from opl.run.descriptions import cell_figures as cell_figures
     from opl.run.descriptions import describe_cell as describe_cell
     from opl.run.descriptions import describe_job as describe_job
+    from opl.run.listings import compare_programs as compare_programs
+    from opl.run.listings import describe_program as describe_program
     from opl.run.points import points_files as points_files
     from opl.run.points import report_points as report_points
     from opl.run.programs import ProgramProof as ProgramProof
-    from opl.run.programs import compare_programs as compare_programs
-    from opl.run.programs import describe_program as describe_program
     from opl.run.programs import prove_program as prove_program
     from opl.run.reporting import make_report as make_report
     from opl.run.result import Report as Report
@@ -170,7 +170,8 @@ _HOMES = {
     "opl.run.delivery": "claim_folder deliver",
     "opl.run.descriptions": "cell_figures describe_cell describe_job",
     "opl.run.points": "points_files report_points",
-    "opl.run.programs": "ProgramProof compare_programs describe_program prove_program",
+    "opl.run.listings": "compare_programs describe_program",
+    "opl.run.programs": "ProgramProof prove_program",
     "opl.run.reporting": "make_report",
     "opl.run.result": "Report to_json",
     "opl.run.stages": "plan_path run_job verify_motion write_program",
