@@ -9,7 +9,7 @@ from datetime import datetime, timezone
 from opl.errors import InputError
 from opl.geometry.frames import transform
 from opl.geometry.mesh import box_corners
-from opl.planning.reasons import NodeState, node_states
+from opl.planning.survey import NodeState
 from opl.program.export import StraightLimit, export_program
 from opl.program.moves import Program
 from opl.report.pictures import contact_chart, joint_chart
@@ -35,7 +35,7 @@ def draw_charts(planned: Planned) -> Mapping[str, str]:
     contact = contact_chart(
         title=f"{job.name}: where the part touches the wheel",
         contact_positions=prepared.problem.field.contact_positions,
-        states=node_states(prepared.problem, path.ik_branch),
+        states=planned.survey.states,
         state_names=[state.value for state in NodeState],
         pass_index=pass_index,
         flat_end=job.cell.wheel.flat_end,
