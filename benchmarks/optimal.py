@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from opl.job.load import load_job
-from opl.run.preparing import build_problem
+from opl.planning.scene import planning_scene
+from opl.run.preparing import problem_in
 from opl.run.searches import search_path
 from opl.run.surfacing import cut_surface
 from opl.run.watch import Stage, Watch
@@ -115,19 +116,17 @@ def search(part: str, rows: int) -> None:
     job = replace(job, passes=replace(passes, pitch=FINE_PITCH) if rows > 5 else passes)
     points = cut_surface(job).points
     clock = Clock()
-    problem = build_problem(job, job.cell, points, clock.watch())
+    problem = problem_in(planning_scene(job.cell), job, points, clock.watch())
     with clock("search"):
         found = search_path(job.search, problem)
     plan = found.plan
     assert plan.lower_bound is not None
     path, other = plan.path, found.recursive.path
-    refinement = plan.refinement
-    assert refinement is not None and plan.gap is not None
+    assert plan.gap is not None
     print(
         f"{part}, {rows} rows, {len(points)} points: {clock.text('clearance', 'search')}; sum "
-        f"{path.joint_range_sum:.5f} rad, bound {plan.lower_bound:.5f} at "
-        f"{refinement.bound_positions} positions, gap {100 * plan.gap:.3f} %; in the field "
-        f"{refinement.joint_range_sum:.5f}, bound {refinement.lower_bound:.5f}; "
+        f"{path.joint_range_sum:.5f} rad, bound {plan.lower_bound:.5f}, gap "
+        f"{100 * plan.gap:.3f} %; "
         f"joint travel {path.joint_travel:.2f} (recursive {other.joint_travel:.2f}), "
         f"travel of t {path.contact_travel:.1f} (recursive {other.contact_travel:.1f})"
     )

@@ -41,6 +41,7 @@ Runs
 Results
     `make_report`       `Run` -> `Report`: the content of ``result.json``
     `deliver`           `Run` -> program, table, pictures and ``result.json`` in a folder
+    `claim_folder`      keeps a folder for the run of one job, from before its work
     `report_points`     `Surfaced` -> figures of its cutter points
     `points_files`      `Surfaced` -> table and picture of its cutter points, as texts
     `to_json`           any of these figures -> JSON text
@@ -89,10 +90,10 @@ if TYPE_CHECKING:
     from opl.errors import NoPathError as NoPathError
     from opl.errors import OplError as OplError
     from opl.errors import UnsafeError as UnsafeError
+    from opl.files.claiming import write_files as write_files
     from opl.files.resources import start_job as start_job
     from opl.files.writing import check_folder as check_folder
     from opl.files.writing import write_file as write_file
-    from opl.files.writing import write_files as write_files
     from opl.findings import Finding as Finding
     from opl.geometry.faces import FaceSummary as FaceSummary
     from opl.geometry.faces import list_faces as list_faces
@@ -114,6 +115,7 @@ if TYPE_CHECKING:
     from opl.run.batch import BatchRow as BatchRow
     from opl.run.batch import find_jobs as find_jobs
     from opl.run.batch import run_batch as run_batch
+    from opl.run.delivery import claim_folder as claim_folder
     from opl.run.delivery import deliver as deliver
     from opl.run.descriptions import cell_figures as cell_figures
     from opl.run.descriptions import describe_cell as describe_cell
@@ -150,8 +152,9 @@ _HOMES = {
     "opl.cell.robot_file": "read_robot_file",
     "opl.cell.urdf_import": "import_urdf",
     "opl.errors": "Cancelled InputError NoFreeMoveError NoPathError OplError UnsafeError",
+    "opl.files.claiming": "write_files",
     "opl.files.resources": "start_job",
-    "opl.files.writing": "check_folder write_file write_files",
+    "opl.files.writing": "check_folder write_file",
     "opl.findings": "Finding",
     "opl.geometry.faces": "FaceSummary list_faces preview_face",
     "opl.geometry.mesh": "TriangleMesh",
@@ -164,7 +167,7 @@ _HOMES = {
     "opl.program.ratios": "import_pulse_ratios with_ratios",
     "opl.report.arm_view": "arm_view",
     "opl.run.batch": "BatchRow find_jobs run_batch",
-    "opl.run.delivery": "deliver",
+    "opl.run.delivery": "claim_folder deliver",
     "opl.run.descriptions": "cell_figures describe_cell describe_job",
     "opl.run.points": "points_files report_points",
     "opl.run.programs": "ProgramProof compare_programs describe_program prove_program",

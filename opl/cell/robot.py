@@ -56,6 +56,8 @@ class Robot:
         controller_base_height: The same of the base frame that the maker's controller counts from.
         controller_base_turn: How far that one is turned about axis 1 against ours in [rad].
         payload: What the flange may carry in [kg], None if not known.
+        position_level_zones: How far its controller may cut a corner at the position levels PL=1 to
+            PL=8 in [m], eight, as its own parameters say; None if they are not known.
     """
 
     name: str
@@ -75,6 +77,7 @@ class Robot:
     controller_base_height: float
     controller_base_turn: float
     payload: float | None
+    position_level_zones: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper", "max_speed", "max_acceleration", "pulses_per_radian"):

@@ -62,10 +62,10 @@ def run_job(
     """
     loaded = opl.load_job(job, method=method)
     folder = out or Path("out") / loaded.name
-    opl.check_folder(folder)
-    with progress_bar(quiet or as_json) as watch:
-        run = opl.run_job(loaded, watch)
-    written = opl.deliver(run, folder)
+    with opl.claim_folder(folder, loaded.name) as claim:
+        with progress_bar(quiet or as_json) as watch:
+            run = opl.run_job(loaded, watch)
+        written = opl.deliver(run, claim)
     report = opl.make_report(run)
     if as_json:
         click.echo(opl.to_json(report))

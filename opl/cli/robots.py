@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -104,18 +105,27 @@ def import_description(file: Path, name: str, out: Path, maker: str, base: str) 
 @robots.command("import-params")
 @click.argument("file", type=FILE)
 @click.option("--robot", required=True, help="Whose controller the file is from.")
+@click.option("--group", type=click.IntRange(1, 8), help="Its group of axes: 2 for R2.")
 @click.option("--out", type=FILE, help="File to write; default <robot>_pulses.yaml.")
-def import_params(file: Path, robot: str, out: Path | None) -> None:
-    """Read pulse ratios and soft limits from a controller's RC.PRM or ALL.PRM.
+def import_params(file: Path, robot: str, group: int | None, out: Path | None) -> None:
+    """Read pulse ratios, soft limits and corner zones from a controller's parameter file.
 
-    Writes a small file that a job names as program.pulse_ratios.
+    RC.PRM has ratios and limits, ALL.PRM the zones of the position levels PL=1 to PL=8 too. A file
+    whose number of axes, soft limits, ratios or links contradict the robot is refused. Writes a
+    small file that a job names as program.pulse_ratios.
 
-    Example: opl robots import-params RC.PRM --robot mh24 --out pulses.yaml
+    Example: opl robots import-params ALL.PRM --robot mh24 --out pulses.yaml
     """
     owner = opl.load_robot(robot)
-    made = opl.import_pulse_ratios(file, owner, out or Path(f"{owner.name}_pulses.yaml"))
+    made = opl.import_pulse_ratios(file, owner, out or Path(f"{owner.name}_pulses.yaml"), group)
+    click.echo(f"group {made.group} of {file.name}, compared with {owner.title}:")
+    for line in made.compared:
+        click.echo(textwrap.fill(line, 80, initial_indent="  ", subsequent_indent="    "))
     for name, ratio in made.pulses_per_degree.items():
         click.echo(f"{name} {ratio:.2f} pulses per degree")
-    for line in made.cautions:
-        click.echo(f"caution: {line}", err=True)
+    if made.zones is None:
+        click.echo("zones of the position levels: not in the file, ALL.PRM has them")
+    else:
+        zones = " ".join(f"{zone * 1e3:g}" for zone in made.zones)
+        click.echo(f"zones of PL=1 to PL=8: {zones} mm")
     click.echo(f"wrote {made.file}; name it in the job as {opl.keys.PROGRAM_PULSE_RATIOS}")

@@ -22,9 +22,11 @@ class Document(BaseModel):
 
     Attributes:
         renamed: Keys of earlier versions, and what they are called now.
+        retired: Keys of earlier versions without a successor, and why none is needed.
     """
 
     renamed: ClassVar[Mapping[str, str]] = {}
+    retired: ClassVar[Mapping[str, str]] = {}
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, ser_json_inf_nan="constants"
@@ -167,6 +169,9 @@ def _fault(fault: Any, model: type[BaseModel]) -> str:
     if _is_unknown(fault):
         if (new := _new_place(fault["loc"], model)) is not None:
             return f"{place}: was renamed, write {new[-1]}"
+        retired = getattr(_model_at(fault["loc"], model), "retired", {})
+        if (reason := retired.get(fault["loc"][-1])) is not None:
+            return f"{place}: no longer exists, remove it: {reason}"
         known = _keys_beside(fault["loc"], model)
         return f"{place}: unknown key" + (f"; known here: {', '.join(known)}" if known else "")
     if kind in ("too_short", "too_long"):

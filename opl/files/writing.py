@@ -1,13 +1,14 @@
-"""Files that are written whole or not at all."""
+"""Single files written whole or not at all, and folders that can be written to."""
 
 from __future__ import annotations
 
+import errno
 import os
-import tempfile
-from collections.abc import Mapping
 from pathlib import Path
 
 from opl.errors import InputError
+
+HIDDEN = ".opl-"  # how the names begin of what is there only while something is written
 
 
 def check_folder(folder: Path) -> None:
@@ -25,34 +26,51 @@ def check_folder(folder: Path) -> None:
         raise InputError(str(existing), "is a folder that cannot be written to")
 
 
-def write_files(folder: Path, texts: Mapping[str, str]) -> list[Path]:
-    """Write texts by file name into a folder, which is made if needed; all of them or none.
-
-    Line ends stay as they are.
-
-    Raises:
-        InputError: If the folder cannot be written to.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        # all beside their places first, then moved there one after the other
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".writing-") as waiting:
-            for name, text in texts.items():
-                (Path(waiting) / name).write_bytes(text.encode("utf-8"))
-            for name in texts:
-                os.replace(Path(waiting) / name, folder / name)
-    except OSError as error:
-        raise InputError(str(folder), f"cannot be written to: {error.strerror}") from error
-    return [folder / name for name in texts]
-
-
 def write_file(path: Path, text: str) -> None:
-    """Write one file into a folder that is there.
+    """Write one file into a folder that is there: beside its place first, then moved there.
+
+    Line ends stay as they are. What was there stays until the new text is on the disk.
 
     Raises:
         InputError: If it cannot be written.
     """
+    aside = path.with_name(HIDDEN + "file-" + path.name)
     try:
-        path.write_bytes(text.encode("utf-8"))
+        try:
+            write_through(aside, text.encode("utf-8"))
+            os.replace(aside, path)
+            sync_folder(path.parent)
+        except BaseException:
+            aside.unlink(missing_ok=True)
+            raise
     except OSError as error:
         raise InputError(str(path), f"cannot be written: {error.strerror}") from error
+
+
+def write_through(path: Path, content: bytes) -> None:
+    """Write a file and wait until it is on the disk."""
+    file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, 0o666)
+    try:
+        left = memoryview(content)
+        while left:
+            left = left[os.write(file, left) :]
+        os.fsync(file)
+    finally:
+        os.close(file)
+
+
+def sync_folder(folder: Path) -> None:
+    """Wait until the names in a folder are on the disk."""
+    opened = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(opened)
+    except OSError as error:
+        if error.errno != errno.EINVAL:  # a file system that has nothing to wait for
+            raise
+    finally:
+        os.close(opened)
+
+
+def told(folder: Path, error: OSError) -> InputError:
+    """Return what a folder that cannot be written to is refused with."""
+    return InputError(str(folder), f"cannot be written to: {error.strerror}")

@@ -104,6 +104,10 @@ class SearchSection(Document):
     renamed: ClassVar[Mapping[str, str]] = {
         "widen_percent": "range_tolerance_percent",
     }
+    retired: ClassVar[Mapping[str, str]] = {
+        "refine_tolerance_percent": "the search finds contact positions between the given ones",
+        "time_limit_s": "the search is bounded by counted work, see max_subproblems",
+    }
 
     method: Literal["recursive", "optimal"] = Field(
         default="optimal",
@@ -221,3 +225,10 @@ class Search:
     def requested_weights(self) -> ObjectiveWeights | None:
         """The weights of the objective, if it is a weighted sum."""
         return self.objective_weights if self.objective is Objective.WEIGHTED else None
+
+    @property
+    def counts_ranges(self) -> bool:
+        """Whether the joint range sum is among what the method keeps small."""
+        if self.method is Method.RECURSIVE or self.objective is Objective.RANGE:
+            return True
+        return self.objective is Objective.WEIGHTED and self.objective_weights.joint_range > 0.0

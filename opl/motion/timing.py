@@ -103,6 +103,13 @@ def time_motion(
     return Timing(TimedMotion(motion, duration), distance, tuple(cause), joint)
 
 
+def air_seconds(motion: Motion, robot: Robot, process: ProcessSettings) -> float:
+    """Return the time of all free moves in [s], ramps left out."""
+    turned = np.abs(np.diff(motion.q, axis=0, prepend=motion.q[:1]))
+    fastest = (turned / robot.max_speed).max(axis=1)
+    return float(fastest[motion.free].sum()) / process.air_speed
+
+
 def followed(q: Array, times: Array, robot: Robot) -> Array:
     """Return the times of moves that run on without a rest, longer where the joints need it.
 

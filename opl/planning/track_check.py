@@ -59,11 +59,20 @@ def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -
 
     `rows` are those of the track in each column, shape (N,).
     """
-    scene, points = problem.scene, problem.points
+    cell, points = problem.cell, problem.points
     try:
-        path = fill_in(scene.cell, points, nodes, rows, problem.interpolation)
-        motion = whole_motion(scene.cell, points, path, problem.process)
-    except (BrokenEdgeError, UnreachableApproachError) as error:
+        path = fill_in(cell, points, nodes, rows, problem.interpolation)
+    except BrokenEdgeError as error:
+        return NoMotion(error)
+    return check_path(problem, path)
+
+
+def check_path(problem: GrindingProblem, path: GrindingPath) -> Free | Blocked:
+    """Return the motion of a path if it is free, else what blocks it."""
+    scene = problem.scene
+    try:
+        motion = whole_motion(scene.cell, problem.points, path, problem.process)
+    except UnreachableApproachError as error:
         return NoMotion(error)
     faults = colliding_moves(scene.cell, scene.collision, scene.part, motion)
     # free moves are led around what blocks them, unless it is where an approach begins

@@ -1,12 +1,14 @@
-"""Pulses per turn and soft limits from a Yaskawa controller's own parameter file.
+"""Pulses per turn, soft limits and corner zones from a Yaskawa controller's own parameter file.
 
-``RC.PRM`` and ``ALL.PRM`` hold the section ///RC1G: whole numbers, ten a row. Where the numbers of
-interest stand differs between the DX generation and YRC1000, whose section is longer.
+``RC.PRM`` and ``ALL.PRM`` hold a section ///RC1G for the first group of axes, ///RC2G for the
+second, and so on: whole numbers, ten a row. Where the numbers of interest stand differs between the
+DX generation and YRC1000, whose sections are longer.
 
     pulses per turn of an axis = 4096 |numerator / denominator|
 
 4096 is what jobs count per turn of a motor; the sign is the sense in which the motor turns, which
-jobs do not show.
+jobs do not show. ``SC.PRM`` and ``ALL.PRM`` hold ///S1C1G and so on: numbers 33 to 40 of it are the
+zones of the position levels PL=1 to PL=8 in 0.001 mm, as saved by a GP25 and a GP88.
 """
 
 from __future__ import annotations
@@ -19,14 +21,16 @@ from opl.errors import InputError
 N_JOINTS = 6
 PULSES_PER_MOTOR_TURN = 4096
 _PER_ROW = 10
-_SECTION = "///RC1G"
+_MOST_AXES = 8  # of a group
+_GROUP = re.compile(r"///(RC|S1C)([1-8])G")
 _LINK_PLACES = (1, 3, 5, 8, 12)  # a1, upper arm, a2, forearm, wrist to flange, in micrometres
+_FIRST_ZONE, _ZONES = 33, 8  # of PL=1, and how many
 _NUMBER = re.compile(r"[+-]?[0-9]{1,12}")
 
 
 @dataclass(frozen=True)
 class ParameterLayout:
-    """Where the numbers stand in ///RC1G, each the first of six.
+    """Where the numbers stand in ///RC1G, each the first of up to eight.
 
     Attributes:
         name: The controllers that have it.
@@ -55,74 +59,136 @@ LAYOUTS = (
 
 @dataclass(frozen=True)
 class AxisParameters:
-    """What a parameter file says of the axes of robot 1.
+    """What a parameter file says of the axes of one group.
 
     Attributes:
+        group: Its number.
         layout: Name of the layout it was read by.
         pulses_per_degree: Of each axis, six.
         lower: Soft limits in pulses, six.
         upper: Soft limits in pulses, six.
         link_lengths: Of the arm in [m], five; zeros where the file does not say.
+        zones: Of the position levels PL=1 to PL=8 in [m], None where the file does not say.
     """
 
+    group: int
     layout: str
     pulses_per_degree: tuple[float, ...]
     lower: tuple[int, ...]
     upper: tuple[int, ...]
     link_lengths: tuple[float, ...]
+    zones: tuple[float, ...] | None
 
 
-def read_parameters(text: str, source: str) -> AxisParameters:
-    """Read the text of ``RC.PRM`` or ``ALL.PRM``, line ends of any kind.
+@dataclass(frozen=True)
+class ParameterGroup:
+    """The numbers of one group of axes as they stand in a file.
+
+    Attributes:
+        number: 1 for ///RC1G.
+        layout: Where what stands.
+        numbers: All numbers of the section.
+        zones: Of the position levels in [m], None where the file does not say.
+    """
+
+    number: int
+    layout: ParameterLayout
+    numbers: tuple[int, ...]
+    zones: tuple[float, ...] | None
+
+    @property
+    def n_axes(self) -> int:
+        """How many axes have soft limits; 0 in a group that the controller does not have."""
+        return sum(
+            (high, low) != (0, 0)
+            for high, low in zip(
+                self._from(self.layout.upper, _MOST_AXES),
+                self._from(self.layout.lower, _MOST_AXES),
+                strict=True,
+            )
+        )
+
+    def axes(self) -> AxisParameters:
+        """Return what it says of the axes of an arm.
+
+        Raises:
+            InputError: If it is no group of six axes, or its numbers cannot be ratios or limits.
+        """
+        layout, section = self.layout, f"///RC{self.number}G"
+        if self.n_axes != N_JOINTS:
+            raise InputError(section, f"has {self.n_axes} axes, must have {N_JOINTS}")
+        ratios = []
+        overs = self._from(layout.numerator, N_JOINTS)
+        unders = self._from(layout.denominator, N_JOINTS)
+        for axis, (over, under) in enumerate(zip(overs, unders, strict=True), start=1):
+            if over == 0 or under == 0:
+                raise InputError(section, f"axis {axis} has the ratio {over}/{under}")
+            ratios.append(PULSES_PER_MOTOR_TURN * abs(over / under) / 360.0)
+        upper, lower = (self._from(place, N_JOINTS) for place in (layout.upper, layout.lower))
+        for axis, (low, high) in enumerate(zip(lower, upper, strict=True), start=1):
+            if low >= high:
+                raise InputError(section, f"axis {axis} has the soft limits {low}, {high}")
+        links = tuple(self.numbers[place] * 1e-6 for place in _LINK_PLACES)
+        return AxisParameters(
+            self.number, layout.name, tuple(ratios), lower, upper, links, self.zones
+        )
+
+    def _from(self, place: int, count: int) -> tuple[int, ...]:
+        return self.numbers[place : place + count]
+
+
+def read_parameters(text: str, source: str) -> tuple[ParameterGroup, ...]:
+    """Return the groups with axes of ``RC.PRM`` or ``ALL.PRM``, line ends of any kind.
 
     Raises:
-        InputError: If the section is missing, too short, or its numbers cannot be ratios.
+        InputError: If there is no such group, or a section is too short or holds no numbers.
     """
-    rows = _rows(text, source)
-    layout = next((layout for layout in LAYOUTS if len(rows) >= layout.rows), None)
-    if layout is None:
-        least = min(layout.rows for layout in LAYOUTS)
-        raise InputError(
-            source,
-            f"{_SECTION} has {len(rows)} rows; DX controllers have {least} or more, and of older "
-            "ones the places of the ratios are not known: give calibration readings instead",
-        )
-    numbers = [number for row in rows for number in row]
-
-    def six(place: int) -> tuple[int, ...]:
-        return tuple(numbers[place : place + N_JOINTS])
-
-    ratios = []
-    for axis, (over, under) in enumerate(
-        zip(six(layout.numerator), six(layout.denominator), strict=True), start=1
-    ):
-        if over == 0 or under == 0:
-            raise InputError(source, f"{_SECTION}: axis {axis} has the ratio {over}/{under}")
-        ratios.append(PULSES_PER_MOTOR_TURN * abs(over / under) / 360.0)
-    upper, lower = six(layout.upper), six(layout.lower)
-    for axis, (low, high) in enumerate(zip(lower, upper, strict=True), start=1):
-        if low >= high:
-            raise InputError(source, f"{_SECTION}: axis {axis} has the soft limits {low}, {high}")
-    links = tuple(numbers[place] * 1e-6 for place in _LINK_PLACES)
-    return AxisParameters(layout.name, tuple(ratios), lower, upper, links)
+    sections = _sections(text, source)
+    if not any(kind == "RC" for kind, _ in sections):
+        raise InputError(source, "holds no section ///RC1G; give RC.PRM or ALL.PRM")
+    groups = []
+    for (kind, number), numbers in sections.items():
+        if kind != "RC":
+            continue
+        rows = len(numbers) // _PER_ROW
+        layout = next((layout for layout in LAYOUTS if rows >= layout.rows), None)
+        if layout is None:
+            least = min(layout.rows for layout in LAYOUTS)
+            raise InputError(
+                source,
+                f"///RC{number}G has {rows} rows; DX controllers have {least} or more, and of "
+                "older ones the places of the ratios are not known: give calibration readings "
+                "instead",
+            )
+        zones = _zones(sections.get(("S1C", number), ()))
+        groups.append(ParameterGroup(number, layout, numbers, zones))
+    found = tuple(group for group in groups if group.n_axes)
+    if not found:
+        raise InputError(source, "no axis of it has soft limits")
+    return found
 
 
-def _rows(text: str, source: str) -> list[list[int]]:
-    rows: list[list[int]] = []
-    inside = False
+def _zones(numbers: tuple[int, ...]) -> tuple[float, ...] | None:
+    """Return the zones in [m] if the numbers are some: each level as wide as the last or wider."""
+    zones = tuple(number * 1e-6 for number in numbers[_FIRST_ZONE : _FIRST_ZONE + _ZONES])
+    usable = len(zones) == _ZONES and zones[0] > 0.0 and list(zones) == sorted(zones)
+    return zones if usable else None
+
+
+def _sections(text: str, source: str) -> dict[tuple[str, int], tuple[int, ...]]:
+    """Return the numbers of the sections of interest by kind and group."""
+    found: dict[tuple[str, int], list[int]] = {}
+    inside: list[int] | None = None
     for number, line in enumerate(re.split(r"\r\n?|\n", text), start=1):
         line = line.strip(" \t\x1a")
-        if line.startswith("//"):
-            if inside:
-                break
-            inside = line.split()[0] == _SECTION
-        elif inside and line:
+        if line.startswith("/"):
+            group = _GROUP.fullmatch(line.split()[0])
+            inside = found.setdefault((group[1], int(group[2])), []) if group else None
+        elif inside is not None and line:
             items = [item.strip() for item in line.rstrip(",").split(",")]
             if len(items) != _PER_ROW or not all(map(_NUMBER.fullmatch, items)):
                 raise InputError(
                     f"{source}: line {number}", f"must hold {_PER_ROW} whole numbers, got {line!r}"
                 )
-            rows.append([int(item) for item in items])
-    if not rows:
-        raise InputError(source, f"holds no section {_SECTION}; give RC.PRM or ALL.PRM")
-    return rows
+            inside += [int(item) for item in items]
+    return {key: tuple(numbers) for key, numbers in found.items()}

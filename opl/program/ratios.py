@@ -1,12 +1,13 @@
-"""Pulse ratios of one robot in a small file of the user's own, written by opl or by hand.
+"""What one controller says of its robot, in a small file of the user's own.
 
-By axis it holds either what the controller's parameters say, or two readings from the pendant: the
-same axis in two positions, each in pulses and in degrees.
+Written by opl from a parameter file, or by hand: pulse ratios and soft limits, and the zones of the
+position levels. By axis it holds either what the controller's parameters say, or two readings from
+the pendant: the same axis in two positions, each in pulses and in degrees.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -15,18 +16,19 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from opl.cell.robot import Robot
-from opl.cell.spherical_wrist import SphericalWristArm
 from opl.errors import InputError
 from opl.files.documents import Document, read
 from opl.files.writing import write_file
+from opl.program.parameter_fit import choose_group
 from opl.program.parameters import AxisParameters, read_parameters
 
 # Readings nearer than this in [deg] give a ratio of too few digits: the pendant shows hundredths.
 LEAST_SPAN = 20.0
 # Farthest from zero pulses [deg] that two readings may meet zero degrees.
 ZERO_TOLERANCE = 0.1
-# Link lengths [m] of a calibrated arm stray from the drawing's by some millimetres.
-LINK_TOLERANCE = 0.01
+
+
+_Zone = Annotated[float, Field(gt=0.0)]
 
 
 class _Reading(Document):
@@ -73,6 +75,15 @@ class _RatioFile(Document):
     robot: str
     source: str
     axes: Annotated[list[_Axis], Field(min_length=1)]
+    # of PL=1 to PL=8
+    position_level_zones_mm: Annotated[list[_Zone], Field(min_length=8, max_length=8)] | None = None
+
+    @model_validator(mode="after")
+    def _widening(self) -> _RatioFile:
+        zones = self.position_level_zones_mm
+        if zones is not None and zones != sorted(zones):
+            raise ValueError("position_level_zones_mm must not get narrower from level to level")
+        return self
 
 
 def with_ratios(robot: Robot, path: Path) -> Robot:
@@ -108,8 +119,14 @@ def with_ratios(robot: Robot, path: Path) -> Robot:
         if lower[joint] >= upper[joint]:
             raise InputError(str(path), f"joint {axis.name}: no range is left between the limits")
     unverified = tuple(name for name in robot.unverified_pulses if name not in names)
+    zones = file.position_level_zones_mm
     return replace(
-        robot, pulses_per_radian=ratios, lower=lower, upper=upper, unverified_pulses=unverified
+        robot,
+        pulses_per_radian=ratios,
+        lower=lower,
+        upper=upper,
+        unverified_pulses=unverified,
+        position_level_zones=None if zones is None else tuple(zone * 1e-3 for zone in zones),
     )
 
 
@@ -119,29 +136,43 @@ class ImportedRatios:
 
     Attributes:
         file: What was written; a job names it as ``program.pulse_ratios``.
+        group: Number of the group of axes that was taken.
         pulses_per_degree: By joint name.
-        cautions: What speaks against the parameters being those of the robot, one line each.
+        zones: Of the position levels PL=1 to PL=8 in [m], None where the parameters do not say.
+        compared: What was compared with the robot and agrees, one line each.
     """
 
     file: Path
+    group: int
     pulses_per_degree: Mapping[str, float]
-    cautions: tuple[str, ...]
+    zones: tuple[float, ...] | None
+    compared: tuple[str, ...]
 
 
-def import_pulse_ratios(parameter_file: Path, robot: Robot, file: Path) -> ImportedRatios:
-    """Make a file of pulse ratios and soft limits from a controller's RC.PRM or ALL.PRM.
+def import_pulse_ratios(
+    parameter_file: Path, robot: Robot, file: Path, group: int | None = None
+) -> ImportedRatios:
+    """Make a file of pulse ratios, soft limits and corner zones from a controller's parameters.
+
+    Args:
+        parameter_file: RC.PRM or ALL.PRM; only the latter has the zones.
+        robot: Whose parameters are taken.
+        file: What is written.
+        group: Number of the robot's group of axes, None for the only one that can be its.
 
     Raises:
-        InputError: If the one cannot be read or is no such file, or the other cannot be written.
+        InputError: If the one cannot be read, is no such file or contradicts the robot, or the
+            other cannot be written.
     """
     try:
         text = parameter_file.read_text(encoding="latin-1")
     except OSError as error:
         raise InputError(str(parameter_file), f"cannot be read: {error.strerror}") from error
-    parameters = read_parameters(text, str(parameter_file))
+    source = str(parameter_file)
+    parameters, found = choose_group(read_parameters(text, source), robot, group, source)
     write_file(file, ratio_file(robot, parameters, parameter_file.name))
     ratios = dict(zip(robot.joint_names, parameters.pulses_per_degree, strict=True))
-    return ImportedRatios(file, ratios, tuple(mismatches(robot, parameters)))
+    return ImportedRatios(file, parameters.group, ratios, parameters.zones, found.compared)
 
 
 def ratio_file(robot: Robot, parameters: AxisParameters, source: str) -> str:
@@ -157,28 +188,19 @@ def ratio_file(robot: Robot, parameters: AxisParameters, source: str) -> str:
         f"  - {{name: {name}, per_degree: {ratio:.6f}, lower_pulses: {low}, upper_pulses: {high}}}"
         for name, ratio, low, high in axes
     ]
-    cautions = [f"# caution: {line}" for line in mismatches(robot, parameters)]
-    return "\n".join(
-        [
-            f"# Pulse ratios and soft limits of one {robot.title}; the section program of a",
-            "# job names this file as pulse_ratios.",
-            *cautions,
-            f"robot: {robot.name}",
-            f"source: '{source.replace(chr(39), chr(39) * 2)}, layout of {parameters.layout}'",
-            "axes:",
-            *rows,
-            "",
+    quoted = source.replace("'", "''")
+    lines = [
+        f"# Pulse ratios and soft limits of one {robot.title}; the section program of a",
+        "# job names this file as pulse_ratios.",
+        f"robot: {robot.name}",
+        f"source: '{quoted}, group {parameters.group}, layout of {parameters.layout}'",
+        "axes:",
+        *rows,
+    ]
+    if parameters.zones is not None:
+        zones = ", ".join(f"{zone * 1e3:g}" for zone in parameters.zones)
+        lines += [
+            "# how far a corner may be cut at PL=1 to PL=8",
+            f"position_level_zones_mm: [{zones}]",
         ]
-    )
-
-
-def mismatches(robot: Robot, parameters: AxisParameters) -> Sequence[str]:
-    """Return what speaks against the parameters being those of the robot, one line each."""
-    arm, links = robot.arm, np.array(parameters.link_lengths)
-    if not isinstance(arm, SphericalWristArm):
-        return (f"the file is of an arm with a spherical wrist, {robot.title} has none",)
-    drawn = np.abs([arm.a1, arm.c2, arm.a2, arm.c3, arm.c4])
-    if not links.any() or np.abs(links - drawn).max() <= LINK_TOLERANCE:
-        return ()
-    seen, known = (" ".join(f"{length * 1e3:.0f}" for length in row) for row in (links, drawn))
-    return (f"the file is of an arm with links of {seen} mm, {robot.title} has {known} mm",)
+    return "\n".join([*lines, ""])

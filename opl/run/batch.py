@@ -15,7 +15,7 @@ from opl.errors import InputError, OplError
 from opl.files import documents
 from opl.job import keys
 from opl.job.load import load_job
-from opl.run.delivery import deliver
+from opl.run.delivery import claim_folder, deliver
 from opl.run.reporting import make_report
 from opl.run.result import Report
 from opl.run.stages import run_job
@@ -157,9 +157,10 @@ def _one_thread() -> None:
 def _run_one(path: Path, out: Path) -> BatchRow:
     try:
         job = load_job(path)
-        run = run_job(job)
         folder = out / job.name
-        deliver(run, folder)
+        with claim_folder(folder, job.name) as claim:
+            run = run_job(job)
+            deliver(run, claim)
     except OplError as error:
         return _refused(path, error)
     except Exception as error:  # a bug in one job must not take the night's other jobs with it

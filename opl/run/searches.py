@@ -9,6 +9,7 @@ from opl.job.search import Method, Objective, Search
 from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import ObjectiveWeights
+from opl.planning.equals import quickest_of_equals
 from opl.planning.multi_start import Start, plan_recursive, try_recursive
 from opl.planning.optimal import plan_optimal
 from opl.planning.plan import Found, Plan
@@ -25,7 +26,7 @@ class FoundPaths:
     """What the searches of a job found.
 
     Attributes:
-        plan: The path by the method and for the objective of the job.
+        plan: The path by the method and for the objective of the job, the quickest of its equals.
         recursive: That of the paper's search; the same if the job wants nothing better.
     """
 
@@ -44,9 +45,10 @@ def search_path(search: Search, problem: GrindingProblem) -> FoundPaths:
         NoPathError: If there is none.
     """
     recursive = plan_recursive(problem, search.start)
-    if search.method is Method.RECURSIVE:
-        return FoundPaths(recursive, recursive)
-    return FoundPaths(_search_best(search, problem, recursive), recursive)
+    plan = recursive
+    if search.method is Method.OPTIMAL:
+        plan = _search_best(search, problem, recursive)
+    return FoundPaths(quickest_of_equals(problem, plan, search.counts_ranges), recursive)
 
 
 def _search_best(search: Search, problem: GrindingProblem, recursive: Plan) -> Plan:

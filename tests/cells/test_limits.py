@@ -123,7 +123,7 @@ def test_a_step_and_an_approach_beyond_a_limit_are_refused_by_name():
 
     nodes = next(n for n in problem.field.matrices if n.ik_branch == path.ik_branch)
     at_points = np.flatnonzero(path.cutter_point % 1.0 == 0.0)
-    wanted = np.interp(path.contact_position[at_points], nodes.contact_position, np.arange(30))
+    wanted = np.interp(path.contact_position[at_points], nodes.contact_position[0], np.arange(30))
     rows = np.round(wanted).astype(int)
     shut = replace(problem.cell, limits=(JointLimit("T", T, EVERYWHERE, EVERYWHERE + 1.0),))
     with pytest.raises(BrokenEdgeError) as broken:

@@ -111,9 +111,7 @@ def test_configurations_of_nodes_are_kept_to_the_bit(problem, plan):
     nodes, rows = rows_of(problem(), plan())
     at_node = plan().path.cutter_point % 1.0 == 0.0
     np.testing.assert_array_equal(plan().path.q[at_node], nodes.q[np.arange(len(rows)), rows])
-    np.testing.assert_array_equal(
-        plan().path.contact_position[at_node], nodes.contact_position[rows]
-    )
+    np.testing.assert_array_equal(plan().path.contact_position[at_node], nodes.t_along(rows))
 
 
 @PLANS
@@ -172,7 +170,7 @@ def two_points(p_first=None, p_second=None, t=(0.0, 3.0)):
     nodes = NodeMatrix(
         small_plan().path.ik_branch,
         np.repeat(q[:, None], 2, axis=1),
-        np.array(t),
+        np.tile(t, (2, 1)),
         np.arange(2),
     )
     return problem.cell, points, nodes, np.array([0, 1])

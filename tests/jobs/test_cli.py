@@ -129,16 +129,10 @@ def test_each_method_is_no_worse_than_the_one_before(result):
 def test_the_optimal_path_is_certified_and_smoother_than_the_recursive_one(result):
     path, recursive = result["path"], result["compared"]["recursive"]
     assert path["joint_range_sum_rad"] <= 1.98
-    refined = path["refinement"]
-    in_field = refined["field_joint_range_sum_rad"]
     found = path["joint_range_sum_rad"]
     assert path["lower_bound_rad"] <= found
-    assert refined["field_lower_bound_rad"] <= in_field
     assert 0.0 <= path["gap"] <= 0.001
     assert path["gap"] == pytest.approx(1.0 - path["lower_bound_rad"] / found, abs=1e-6)
-    assert refined["rounds"] >= 1
-    assert refined["gain_rad"] == pytest.approx(in_field - path["joint_range_sum_rad"], abs=2e-6)
-    assert refined["gain_rad"] > 0.0
     assert path["joint_travel_rad"] <= recursive["joint_travel_rad"]
     assert path["contact_travel"] <= recursive["contact_travel"]
 

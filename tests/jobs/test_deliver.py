@@ -10,7 +10,7 @@ import pytest
 from opl.errors import InputError, NoPathError
 from opl.files import writing
 from opl.job.load import load_job
-from opl.run.delivery import deliver
+from opl.run.delivery import claim_folder, deliver
 from opl.run.stages import run_job
 from opl.run.values import Refused
 from tests.support.jobs import POST, document, opl, write_job, write_robot, write_trough
@@ -26,12 +26,12 @@ def result_in(folder):
     return json.loads((folder / "result.json").read_text(encoding="utf-8"))
 
 
-def leave_earlier_run(folder):
-    """Put the files of a good run into a folder, and something that is not of a run."""
+def leave_earlier_run(folder, job="V_SHAPE"):
+    """Put the files of a good run of a job into a folder, and something that is not of a run."""
     folder.mkdir()
     for name in (*PROGRAM, "notes.txt"):
         (folder / name).write_text("earlier")
-    told = {"status": "ok", "program": {"files": [*PROGRAM, "../outside.txt"]}}
+    told = {"status": "ok", "job": job, "program": {"files": [*PROGRAM, "../outside.txt"]}}
     (folder / "result.json").write_text(json.dumps(told), encoding="utf-8")
     (folder.parent / "outside.txt").write_text("not ours")
 
@@ -84,16 +84,46 @@ def test_a_result_that_cannot_be_read_hinders_nothing(run, tmp_path, text):
     assert written(tmp_path) == ["A.JBI", "result.json"]
 
 
-def test_a_write_that_fails_leaves_no_file_of_the_run(run, tmp_path, monkeypatch):
-    class FullDisk(type(tmp_path)):
-        def write_bytes(self, data):
+def test_a_write_that_fails_leaves_the_earlier_run_as_it_was(run, tmp_path, monkeypatch):
+    write = os.write
+
+    def full_disk(file, data):
+        if b"status" in bytes(data):  # the result, written after the others
             raise OSError(28, "No space left on device")
+        return write(file, data)
 
     leave_earlier_run(tmp_path / "out")
-    monkeypatch.setattr(writing, "Path", FullDisk)
+    before = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    monkeypatch.setattr(os, "write", full_disk)
     with pytest.raises(InputError, match="out: cannot be written to: No space left on device"):
         deliver(with_files(run, "A.JBI", "B.JBI"), tmp_path / "out")
-    assert written(tmp_path / "out") == ["notes.txt"]
+    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
+    assert written(tmp_path) == ["out", "outside.txt"]
+
+
+def test_a_folder_belongs_to_one_job(run, tmp_path):
+    leave_earlier_run(tmp_path / "out", "OTHER")
+    before = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    told = "belongs to job OTHER, says its result.json: name another folder for job V_SHAPE, or"
+    for other in (run, refused(run)):
+        with pytest.raises(InputError, match=f"out: {told}"):
+            deliver(other, tmp_path / "out")
+    ended = opl("run", write_job(tmp_path / "j"), "--out", tmp_path / "out")
+    assert (ended.status, ended.out) == (2, "") and told in ended.err
+    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == before
+
+
+def test_a_folder_is_held_from_before_the_work(run, tmp_path):
+    job = write_job(tmp_path / "j")
+    with claim_folder(tmp_path / "a" / "b", "V_SHAPE") as claim:
+        ended = opl("run", job, "--out", tmp_path / "a" / "b")
+        told = f"{tmp_path / 'a' / 'b'}: another run writes to it (process {os.getpid()})"
+        assert ended.status == 2 and told in ended.err
+        deliver(with_files(run, "A.JBI"), claim)
+    assert written(tmp_path / "a" / "b") == ["A.JBI", "result.json"]
+    with claim_folder(tmp_path / "c" / "d", "V_SHAPE"):
+        pass  # cut short before it had anything to deliver
+    assert not (tmp_path / "c").exists()
 
 
 def test_the_folder_is_checked_before_the_work_and_not_made(tmp_path, monkeypatch):
@@ -134,9 +164,9 @@ def test_an_out_that_is_a_file_is_refused_and_kept(tmp_path):
 # no path: why, and nothing left
 
 
-def run_without_path(job, out):
+def run_without_path(job, out, name="V_SHAPE"):
     """Run a job into the folder of an earlier good run; return the lines that say why not."""
-    leave_earlier_run(out)
+    leave_earlier_run(out, name)
     ended = opl("run", job, "--out", out)
     assert ended.status == 3, ended.err
     assert "Traceback" not in ended.err
@@ -150,7 +180,7 @@ def run_without_path(job, out):
 
 
 def test_a_trough_too_narrow_for_the_wheel_says_how_deep_the_part_would_cut(tmp_path):
-    first, *why = run_without_path(write_trough(tmp_path / "t"), tmp_path / "out")
+    first, *why = run_without_path(write_trough(tmp_path / "t"), tmp_path / "out", "TROUGH")
     assert first == "no path: no free configuration at cutter point 0 (0 of 3 reached)"
     assert len(why) == 1
     assert why[0].startswith(

@@ -85,6 +85,17 @@ def test_old_names_of_a_cell_are_told_their_new_ones():
     assert "clearances: was renamed, write pair_clearances" in caught.value.message
 
 
+def test_a_key_that_is_gone_is_refused_with_the_reason():
+    content = document()
+    content["search"]["time_limit_s"] = 60.0
+    with pytest.raises(documents.InputError) as caught:
+        documents.check(content, JobFile, "job.yaml")
+    assert caught.value.message == (
+        "search.time_limit_s: no longer exists, remove it: the search is bounded by counted work, "
+        "see max_subproblems"
+    )
+
+
 # the page and the schema
 
 

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import forward_kinematics, load_robot
 from opl.job.load import load_job
-from opl.planning.multi_start import plan_recursive
 from opl.run.delivery import deliver
 from opl.run.preparing import prepare
+from opl.run.searches import search_path
 from opl.run.stages import run_job
 from opl.run.surfacing import cut_surface
 from tests.support.fcl_scene import margin_along
@@ -94,7 +94,7 @@ def planned(job):
     """Return the configurations of the motion of a job, as bytes; for another process."""
     loaded = load_job(Path(job))
     problem = prepare(cut_surface(loaded)).problem
-    return plan_recursive(problem, loaded.search.start).motion.q.tobytes()
+    return search_path(loaded.search, problem).plan.motion.q.tobytes()
 
 
 def test_another_process_finds_the_same_ways():

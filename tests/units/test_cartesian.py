@@ -108,9 +108,10 @@ def test_configuration_that_the_controller_could_mistake_is_refused(q_deg, messa
         write(np.deg2rad(q_deg))
 
 
-def test_meaning_of_flip_nobody_has_seen_is_said_in_the_job():
-    assert "'RCONF FLIP AT B > 0 NOT VERIFIED" in write(np.deg2rad([0, 0, 0, 0, 60, 0]))
-    assert "NOT VERIFIED" not in write(np.deg2rad([0, 0, 0, 0, -60, 0]))
+@pytest.mark.parametrize(("bend", "no_flip"), [(60, 0), (-60, 1)])
+def test_flip_is_the_configuration_with_b_not_negative(bend, no_flip):
+    text = write(np.deg2rad([0, 0, 0, 0, bend, 0]))
+    assert f"///RCONF {no_flip},0,0,0,0,0" in text and "NOT VERIFIED" not in text
 
 
 @pytest.mark.parametrize(("number", "profile"), [(64, DX200), (25, NX100)])

@@ -1,9 +1,8 @@
 """Cartesian positions of INFORM jobs: RECTAN values and RCONF, written and read.
 
 RCONF names one of the eight configurations of a pose: flip or not, upper or lower arm, front or
-rear, and whether R, T and S stand beyond half a turn. That flip is the configuration with B not
-negative is inferred: jobs saved by controllers show no-flip for B < 0, and none was found with
-B > 0.
+rear, and whether R, T and S stand beyond half a turn. Flip is the configuration with B not
+negative, as jobs saved by controllers show.
 """
 
 from __future__ import annotations

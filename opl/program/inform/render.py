@@ -82,7 +82,7 @@ def _layout(
     user = str(frame.number) if form is PositionForm.USER and frame is not None else None
     pulses = form is PositionForm.PULSES
     postype = "PULSE" if pulses else form.value.upper()
-    notes = _ratio_notes(robot, profile.comment_length) if pulses else _flip_notes(part)
+    notes = _ratio_notes(robot, profile.comment_length) if pulses else []
     return JobLayout(
         name=part.name,
         tool=str(settings.tool),
@@ -136,12 +136,6 @@ def _ratio_notes(robot: Robot, width: int) -> list[str]:
     if not robot.unverified_pulses:
         return []
     return textwrap.wrap(f"PULSE RATIO NOT VERIFIED: {' '.join(robot.unverified_pulses)}", width)
-
-
-def _flip_notes(part: Program) -> list[str]:
-    """Return the comment line that warns of RCONF where no saved job shows what it means."""
-    bent_up = any(move.q[4] > 0.0 for move in part.moves)
-    return ["RCONF FLIP AT B > 0 NOT VERIFIED"] if bent_up else []
 
 
 def _require_legal(

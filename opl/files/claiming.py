@@ -1,0 +1,131 @@
+"""A folder that one process at a time writes to."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+from collections.abc import Iterator, Mapping, Set
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from opl.errors import InputError
+from opl.files.switching import recover, switch
+from opl.files.writing import HIDDEN, check_folder, told
+
+LOCK = HIDDEN + "lock"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A folder that nobody else writes to through `claimed`.
+
+    Attributes:
+        folder: The folder, as it was named.
+        place: The same without symbolic links.
+    """
+
+    folder: Path
+    place: Path
+
+    def switch(self, texts: Mapping[str, str], leaving: Set[str] = frozenset()) -> list[Path]:
+        """Put texts into the folder by file name, and take other files out of it, in one step.
+
+        Line ends stay as they are. `opl.files.switching` says what one step is.
+
+        Args:
+            texts: The texts; the last is the one whose presence says that all are there.
+            leaving: Names of files that go, if they are there.
+
+        Raises:
+            InputError: If the folder cannot be written to; it is then whole, with the old
+                files or the new.
+        """
+        files = {name: text.encode("utf-8") for name, text in texts.items()}
+        try:
+            self.place.mkdir(parents=True, exist_ok=True)  # somebody may have removed it
+            switch(self.place, files, leaving)
+        except OSError as error:
+            raise told(self.folder, error) from error
+        return [self.folder / name for name in texts]
+
+
+@contextmanager
+def claimed(folder: Path) -> Iterator[Claim]:
+    """Claim a folder, which is made if needed, and bring it to a whole state if it is not in one.
+
+    A folder that was made and stays empty is removed again.
+
+    Raises:
+        InputError: If another process holds it, or it cannot be written to.
+    """
+    check_folder(folder)
+    place = folder.resolve()
+    missing = _missing(place)
+    lock = None
+    try:
+        try:
+            for one in reversed(missing):
+                one.mkdir(exist_ok=True)
+            lock = _lock(place, folder)
+            recover(place)
+        except OSError as error:
+            raise told(folder, error) from error
+        yield Claim(folder, place)
+    finally:
+        if lock is not None:
+            with suppress(OSError):
+                (place / LOCK).unlink(missing_ok=True)
+            os.close(lock)
+        for one in missing:
+            with suppress(OSError):  # it is not empty
+                one.rmdir()
+
+
+def write_files(folder: Path, texts: Mapping[str, str]) -> list[Path]:
+    """Write texts by file name into a folder, which is made if needed, in one step.
+
+    Raises:
+        InputError: If another process holds the folder, or it cannot be written to.
+    """
+    with claimed(folder) as claim:
+        return claim.switch(texts)
+
+
+def _missing(place: Path) -> list[Path]:
+    """Return the folders that are to be made for a place, the innermost first."""
+    missing = []
+    while not place.exists():
+        missing.append(place)
+        place = place.parent
+    return missing
+
+
+def _lock(place: Path, name: Path) -> int:
+    """Lock a folder by a file in it; the system ends the lock with the process that holds it."""
+    path = place / LOCK
+    while True:
+        lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # whoever held it before may have removed the file
+            if path.exists() and os.path.samestat(os.fstat(lock), path.lstat()):
+                with suppress(OSError):  # a full disk hinders the message of others only
+                    os.ftruncate(lock, 0)
+                    os.write(lock, f"{os.getpid()}\n".encode())
+                return lock
+        except OSError as error:
+            holder = os.read(lock, 20).decode("ascii", "replace").strip() or "unknown"
+            os.close(lock)
+            if error.errno in (errno.EWOULDBLOCK, errno.EACCES):
+                message = (
+                    f"another run writes to it (process {holder}); wait for it, or name "
+                    "another folder"
+                )
+                raise InputError(str(name), message) from error
+            raise
+        except BaseException:
+            os.close(lock)
+            raise
+        os.close(lock)

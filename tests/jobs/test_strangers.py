@@ -1,0 +1,52 @@
+"""The random jobs of benchmarks/strangers.py are jobs, and the same seed draws the same ones."""
+
+import numpy as np
+import pytest
+import trimesh
+
+import opl
+from benchmarks.stranger_jobs import draw_job
+from benchmarks.stranger_parts import FAMILIES, draw_part
+from opl.geometry.mesh import load_mesh
+
+
+@pytest.mark.parametrize("family", list(FAMILIES))
+def test_a_drawn_surface_lies_on_its_closed_solid(family, tmp_path):
+    part = draw_part(family, np.random.default_rng(5), 120.0)
+    part.write(tmp_path)
+    mesh = load_mesh(tmp_path / "part.stl", "mm")  # refused unless closed and free of crossings
+    corners = 1e3 * mesh.vertices[mesh.faces]
+    for T in part.frames(np.array([1.0, 0.0, 0.0]), (3, 5)):
+        p, normal = 1e3 * T[:3, 3], T[:3, 2]
+        nearest = trimesh.triangles.closest_point(corners, np.tile(p, (len(corners), 1)))
+        assert np.linalg.norm(nearest - p, axis=1).min() < 0.05
+        assert winding(corners, p - normal) > 0.9
+        assert winding(corners, p + normal) < 0.1
+
+
+def winding(corners, point):
+    """Return how often a closed mesh goes around a point: solid angles of its triangles."""
+    a, b, c = np.moveaxis(corners - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+    over = np.einsum("ij,ij->i", a, np.cross(b, c))
+    under = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
+    return np.arctan2(over, under).sum() / (2.0 * np.pi)
+
+
+def test_drawn_jobs_are_cut_into_passes_and_repeat_byte_by_byte(tmp_path):
+    drawn = 0
+    for index in range(3):
+        texts = []
+        for again in range(2):
+            folder = tmp_path / f"{index}_{again}"
+            folder.mkdir()
+            stranger = draw_job(11, index, 0, folder)
+            if stranger is None:
+                break
+            texts.append({path.name: path.read_bytes() for path in folder.iterdir()})
+        else:
+            assert texts[0] == texts[1]
+            surfaced = opl.cut_surface(opl.load_job(stranger.job))
+            assert stranger.points / 3 < len(surfaced.points) < 5 * stranger.points
+            drawn += 1
+    assert drawn > 0
