@@ -100,9 +100,7 @@ def acceleration_panels(timing: Timing, robot: Robot, packer: Packer) -> list[di
     ]
 
 
-def feed_panels(
-    timing: Timing, feed: float, robot: Robot, packer: Packer
-) -> list[dict[str, Any]]:
+def feed_panels(timing: Timing, feed: float, robot: Robot, packer: Packer) -> list[dict[str, Any]]:
     """Return the speed along the surface with what lowers it, and the contact position."""
     timed, times = timing.timed, moments(timing.timed)
     speed = MM * timing.surface_distance / np.maximum(timed.duration, SHORTEST)
@@ -149,9 +147,7 @@ def _speeds(timed: TimedMotion) -> Array:
     """Return the mean speed of each joint on the move to each configuration, NaN for none."""
     moved = np.diff(timed.motion.q, axis=0, prepend=timed.motion.q[:1])
     lasting = timed.duration > SHORTEST
-    return np.where(
-        lasting[:, None], moved / np.maximum(timed.duration, SHORTEST)[:, None], np.nan
-    )
+    return np.where(lasting[:, None], moved / np.maximum(timed.duration, SHORTEST)[:, None], np.nan)
 
 
 def _line(packer: Packer, kind: str, x: Any, y: Any, name: str) -> dict[str, Any]:

@@ -60,8 +60,8 @@ def run_page(run: Written | Refused, report: Report) -> str:
             section(
                 "chart-section",
                 "Contact chart",
-                '<p class="screen">Point to see what a cell is; click, or move with the arrow keys, '
-                "to pose the robot there.</p>",
+                '<p class="screen">Point to see what a cell is; click, or use the arrow keys, to '
+                "pose the robot there.</p>",
                 chart,
                 told,
                 page_text.causes(survey),
@@ -112,12 +112,15 @@ def _curves_section() -> str:
     return section(
         "curves-section",
         "Curves",
-        f'<div class="controls">{_choice("curves-of", "show", CURVES)}</div><div id="curves"></div>',
+        f'<div class="controls">{_choice("curves-of", "show", CURVES)}</div>',
+        '<div id="curves"></div>',
     )
 
 
 def _choice(name: str, label: str, options: dict[str, str]) -> str:
-    inside = "".join(f'<option value="{key}">{text(said)}</option>' for key, said in options.items())
+    inside = "".join(
+        f'<option value="{key}">{text(said)}</option>' for key, said in options.items()
+    )
     return f'<label>{label} <select id="{name}">{inside}</select></label>'
 
 

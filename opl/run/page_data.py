@@ -1,4 +1,4 @@
-"""What the viewer of a page draws of a run: the cell, the nodes, the motion, the places to go to."""
+"""What the viewer of a page draws of a run: cell, nodes, motion, and the places to go to."""
 
 from __future__ import annotations
 
@@ -181,9 +181,7 @@ def _along(timed: TimedMotion, prepared: Prepared) -> tuple[Array, Nearest]:
     return times, nearest_pairs(prepared.problem.scene.collision, q)
 
 
-def _paints(
-    planned: Planned, times: Array, nearest: Nearest, packer: Packer
-) -> Mapping[str, Data]:
+def _paints(planned: Planned, times: Array, nearest: Nearest, packer: Packer) -> Mapping[str, Data]:
     """Return what the passes of a planned motion can be coloured by."""
     timing = planned.timing
     motion, duration = timing.timed.motion, timing.timed.duration

@@ -52,9 +52,7 @@ def verdict(report: Report, job: Job) -> str:
     ]
     if not proven:
         columns[:1] = [("Why not", iter([*report.reasons])), ("What would help", _help(report))]
-    lists = "".join(
-        f"<div><h3>{text(name)}</h3>{bullets(lines)}</div>" for name, lines in columns
-    )
+    lists = "".join(f"<div><h3>{text(name)}</h3>{bullets(lines)}</div>" for name, lines in columns)
     return head + section("verdict", "What was found", f'<div class="columns">{lists}</div>')
 
 
@@ -63,7 +61,9 @@ def files(report: Report) -> str:
     if report.program is None:
         return ""
     rows = [(name, digest) for name, digest in report.program.sha256.items()]
-    return section("files", "Files", table("SHA-256 of what was written", ("", ""), rows, (), "words"))
+    return section(
+        "files", "Files", table("SHA-256 of what was written", ("", ""), rows, (), "words")
+    )
 
 
 def tables(report: Report, job: Job, planned: Planned | None) -> str:
@@ -237,22 +237,25 @@ def _slow(report: Report) -> str:
 def _frames(job: Job) -> str:
     robot, cell = job.cell.robot, job.cell
     rows: list[tuple[object, ...]] = [
-        ("contact frame 0, robot base", *_pendant(robot.T_controller_base @ cell.wheel.T_base_contact0)),
+        (
+            "contact frame 0, robot base",
+            *_pendant(robot.T_controller_base @ cell.wheel.T_base_contact0),
+        ),
         ("workpiece, flange", *_pendant(cell.T_flange_workpiece)),
     ]
     frames = table(
         "calibration as the pendant shows it", ("", "X", "Y", "Z", "Rx", "Ry", "Rz"), rows
     )
     angles = [f"{angle:.4f}" for angle in np.rad2deg(job.process.home)]
-    home = table(
-        "home in deg", ("", *robot.joint_names), [("home", *angles)], ["home"]
+    home = table("home in deg", ("", *robot.joint_names), [("home", *angles)], ["home"])
+    fit = job.around.placed.fit
+    fits = (
+        []
+        if fit is None
+        else [
+            (label, f"{MM * off:.3f}") for label, off in zip(fit.labels, fit.residuals, strict=True)
+        ]
     )
-    fits = [
-        (f"{placed.name}: {label}", f"{MM * off:.3f}")
-        for placed in job.around.placed
-        if placed.fit is not None
-        for label, off in zip(placed.fit.labels, placed.fit.residuals, strict=True)
-    ]
     return frames + home + table("touched points", ("", "residual mm"), fits)
 
 

@@ -2,7 +2,7 @@
 
 import {
   AmbientLight, BoxGeometry, BufferAttribute, BufferGeometry, Color, CylinderGeometry, DirectionalLight, DoubleSide,
-  EdgesGeometry, Group, Line, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial,
+  EdgesGeometry, FrontSide, Group, Line, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial,
   MeshLambertMaterial, PerspectiveCamera, Plane, Points, PointsMaterial, Scene, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
@@ -233,7 +233,7 @@ export class CellView {
     const around = solid.joint === 0 && !solid.robot && solid.name !== "wheel";
     const material = new MeshLambertMaterial({
       color: this.paintOf(solid),
-      side: solid.kind === "mesh" ? DoubleSide : undefined,
+      side: solid.kind === "mesh" ? DoubleSide : FrontSide,
       transparent: around,
       opacity: around ? 0.35 : 1,
       depthWrite: !around,
