@@ -49,13 +49,17 @@ def contact_jets(
 
 
 def path_jets(
-    points: CutterPoints, T_base_contact: Array, T_flange_workpiece: Array, at: Array, radius: Array
+    points: CutterPoints,
+    Ts_base_contact: Array,
+    T_flange_workpiece: Array,
+    at: Array,
+    radius: Array,
 ) -> FlangeJets:
-    """Enclose the motion of the flange while the part moves along its path at one contact position.
+    """Enclose the motion of the flange along the path, the contact position the same.
 
     Args:
         points: The cutter points.
-        T_base_contact: The contact frame, shape (4, 4).
+        Ts_base_contact: The contact frame of each cell, shape (n, 4, 4).
         T_flange_workpiece: How the part is held, shape (4, 4).
         at: Middle of each cell, a fractional cutter point, shape (n,).
         radius: Half its width, all of it between the same two, shape (n,).
@@ -80,9 +84,9 @@ def path_jets(
     def in_base(v: Axes) -> Axes:
         in_cutter = (_dot(x, v), _dot(y, v), _dot(z, v))
         a, b, c = (
-            in_cutter[0].times(T_base_contact[k, 0])
-            + in_cutter[1].times(T_base_contact[k, 1])
-            + in_cutter[2].times(T_base_contact[k, 2])
+            in_cutter[0].scaled(Ts_base_contact[:, k, 0])
+            + in_cutter[1].scaled(Ts_base_contact[:, k, 1])
+            + in_cutter[2].scaled(Ts_base_contact[:, k, 2])
             for k in range(3)
         )
         return a, b, c
@@ -93,7 +97,7 @@ def path_jets(
 
     axes = [in_base(fixed(T_workpiece_flange[:3, k])) for k in range(3)]
     origin = in_base(_minus(fixed(T_workpiece_flange[:3, 3]), p))
-    a, b, c = (origin[k].plus(T_base_contact[k, 3]) for k in range(3))
+    a, b, c = (origin[k].plus(Ts_base_contact[:, k, 3]) for k in range(3))
     return FlangeJets(axes[0], axes[1], axes[2], (a, b, c))
 
 

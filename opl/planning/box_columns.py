@@ -9,16 +9,17 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
+from opl.planning.columns import Sweep
 from opl.planning.families import GROWN, Placement
 from opl.planning.images import Seams
 from opl.planning.nodes import inverse_solutions
 from opl.planning.problem import GrindingProblem, wheel_distances
 from opl.search.box import JointBox
-from opl.search.in_box import JUMP, sampled
 from opl.search.in_box import missing as missing_of
-from opl.search.outside import outside
+from opl.search.in_box import missing_chords, sampled
 
 FINE = 33  # contact positions of a place at which a box is held against it
+ROW_SAMPLES = 8  # between two cutter points at one contact position
 BORDER = 1e-2  # belt units to look beyond what lies in the box
 
 
@@ -32,8 +33,8 @@ class Columns:
         placements: The image that each pass uses.
         t: Contact positions, shape (n, m).
         q: Placed postures in [rad], NaN where there are none, shape (n, m, 6).
-        free: Which are within reach and do not cut into the wheel, shape (n, m).
-        wheel_distance: Signed distance of the part to the wheel in [m], shape (n, m).
+        free: Which are within reach and do not cut into the wheel, as far as the field tells,
+            shape (n, m).
     """
 
     places: Array
@@ -42,7 +43,6 @@ class Columns:
     t: Array
     q: Array
     free: np.ndarray
-    wheel_distance: Array
 
     def without(
         self, box: JointBox, place: float, t: float, back: bool, above: bool
@@ -71,10 +71,7 @@ class Columns:
 
     def missing(self, box: JointBox) -> Array:
         """Return by how much a box must grow for each place, in [rad], shape (n,)."""
-        missing, row = np.empty(len(self.q)), np.empty(len(self.q))
-        by_joint = np.ascontiguousarray(np.moveaxis(self.q, 1, 2))
-        outside(by_joint, self.free, box.lower, box.upper, JUMP, missing, row)
-        return missing
+        return missing_chords(self.q, self.free, box)
 
 
 class ColumnSampler:
@@ -111,19 +108,9 @@ class ColumnSampler:
         q[~whole] = inverse_solutions(
             problem.cell, there.Ts_workpiece_cutter[~whole][:, None], positions
         )
-        cuts = np.empty(q.shape[:2], dtype=bool)
-        cuts[whole] = problem.cuts[before[whole]]
-        if not whole.all():
-            between = CutterPoints(
-                there.Ts_workpiece_cutter[~whole],
-                np.zeros(np.sum(~whole), dtype=int),
-                places[~whole],
-            )
-            layer = wheel_distances(problem.scene, between, positions)
-            cuts[~whole] = layer < -problem.cell.planned_penetration
         grid = np.broadcast_to(positions, q.shape[:2])
-        coarse = self._placed(there, q, placements)
-        free = ~cuts & ~np.isnan(coarse[..., 0])
+        coarse = self._placed(there.pass_index, q, placements)
+        free = ~self._cuts(places, there, grid) & ~np.isnan(coarse[..., 0])
         t, _ = sampled(grid, coarse, free, box, FINE, whole=True)
         # where the part begins to cut is known to a hair only
         last = problem.cell.wheel.last_position
@@ -136,16 +123,46 @@ class ColumnSampler:
         """Return the postures of places at contact positions, shape (n, m)."""
         problem = self._problem
         q = inverse_solutions(problem.cell, there.Ts_workpiece_cutter[:, None], t)
-        layer = wheel_distances(problem.scene, there, t)
-        q = self._placed(there, q, placements)
-        free = ~np.isnan(q[..., 0]) & ~(layer < -problem.cell.planned_penetration)
-        return Columns(places, there, tuple(placements), t, q, free, layer)
+        q = self._placed(there.pass_index, q, placements)
+        free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
+        return Columns(places, there, tuple(placements), t, q, free)
 
-    def _placed(self, there: CutterPoints, q: Array, placements: Sequence[Placement]) -> Array:
+    def misses(self, box: JointBox, columns: Columns, sweep: Sweep) -> float:
+        """Return by how much a box misses the places of a sweep at its contact position."""
+        count = ROW_SAMPLES * int(np.ceil(sweep.after - sweep.before)) + 1
+        places = np.linspace(sweep.before, sweep.after, count)
+        points = self._problem.points
+        index = points.pass_index[int(sweep.before)]
+        q = inverse_solutions(
+            self._problem.cell,
+            points.frames_at(places)[:, None],
+            np.array([sweep.contact_position]),
+        )
+        row = np.swapaxes(self._placed(np.full(count, index), q, columns.placements), 0, 1)
+        free = ~np.isnan(row[..., 0])
+        return float(missing_chords(row, free, box)[0])
+
+    def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
+        """Return where the part would sink too deep into the wheel, shape (n, m).
+
+        Where all nodes of the field around a place and contact position agree, so does what lies
+        between them: a motion that is not free for all that is refused when it is checked.
+        """
+        field, cuts = self._problem.field.contact_positions, self._problem.cuts
+        after = np.clip(np.searchsorted(field, t), 1, len(field) - 1)
+        near = np.zeros(t.shape, dtype=int)
+        for column in (np.floor(places).astype(int), np.ceil(places).astype(int)):
+            near += cuts[column[:, None], after - 1].astype(int) + cuts[column[:, None], after]
+        unsure = (near > 0) & (near < 4)
+        distance = wheel_distances(self._problem.scene, there, t, unsure)
+        found = distance < -self._problem.cell.planned_penetration
+        return np.asarray(np.where(unsure, found, near == 4))
+
+    def _placed(self, pass_index: np.ndarray, q: Array, placements: Sequence[Placement]) -> Array:
         """Return the placed postures of all inverse solutions, shape (n, m, 6)."""
         placed = np.empty((*q.shape[:2], 6))
         for index, placement in enumerate(placements):
-            own = there.pass_index == index
+            own = pass_index == index
             start = self._seams.start[placement.family]
             unrolled = start + np.remainder(q[own][:, :, placement.family] - start, 2.0 * np.pi)
             placed[own] = placement.of(unrolled)

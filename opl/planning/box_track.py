@@ -7,11 +7,13 @@ the box between two places, more places are taken in.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opl.cell.collision import CollisionScene
 from opl.geometry.frames import Array
 from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.costs import CostWeights, track_cost
@@ -34,6 +36,7 @@ SUBDIVIDE = np.array([0.25, 0.5, 0.75])  # where an edge that bulges is given pl
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 SWEEP = 2.0  # belt units that the contact moves from cutter point to cutter point in a sweep
 MOST_CHECKS = 12  # of motions in one box
+LAZY_ROUNDS = 3  # in which only the nodes of a track are asked for their clearance
 
 
 class BoxTracks:
@@ -60,7 +63,14 @@ class BoxTracks:
         self._costs = costs
         self._max_contact_change = max_contact_change
         self._most = most
+        self._wider = CollisionScene(problem.cell.widened(costs.push_away))
         self.checks = 0
+
+    def push_charge(self, q: Array) -> Array:
+        """Return what nodes are charged for little clearance, q in [rad], shape (n, 6)."""
+        if self._costs.push_away == 0.0 or self._costs.push_weight == 0.0:
+            return np.zeros(len(q))
+        return self._costs.push_weight * self._wider.collides(q)
 
     def plan(
         self, columns: Columns, box: JointBox, room: float, learn: Callable[[Bulges], bool]
@@ -132,7 +142,7 @@ class _Sampled:
             problem,
             points=columns.points,
             field=NodeField(columns.t[0], problem.field.q[:0], tuple(self._images(q))),
-            wheel_distance=columns.wheel_distance,
+            wheel_distance=np.zeros(columns.t.shape),
         )
         self.matrices = open_matrices(self.problem)
 
@@ -147,16 +157,28 @@ class _Sampled:
         """Return the smoothest track in the matrix that is farthest from the limits."""
         search = self._search
         for index, matrix in enumerate(self.matrices):
-            cost = track_cost(self.problem, matrix.nodes, search._costs, matrix.free)
-            found = smoothest_within(
-                matrix.ladder_within(search._max_contact_change),
-                matrix.blocked_edges,
-                matrix.free,
-                cost,
-                search._most,
+            cost = track_cost(
+                self.problem, matrix.nodes, replace(search._costs, push_weight=0.0), matrix.free
             )
-            if found is not None:
-                return Track(index, found.rows)
+            ladder = matrix.ladder_within(search._max_contact_change)
+            asked = np.zeros_like(matrix.free)
+            columns = np.arange(len(matrix.free))
+            for lazy in itertools.count():
+                edges = matrix.blocked_edges
+                found = smoothest_within(ladder, edges, matrix.free, cost, search._most)
+                if found is None:
+                    break
+                # along most tracks nothing is nearer than wanted: at first only its nodes are asked
+                now = matrix.free & ~asked
+                if lazy < LAZY_ROUNDS:
+                    on_track = np.zeros_like(now)
+                    on_track[columns, found.rows] = True
+                    now &= on_track
+                charge = search.push_charge(matrix.nodes.q[now])
+                if not charge.any():
+                    return Track(index, found.rows)
+                cost.node_cost[now] += charge
+                asked |= now
         return None
 
     def closer(self, track: Track, spacing: Array) -> _Sampled:

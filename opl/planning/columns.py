@@ -17,22 +17,37 @@ import numpy as np
 from opl.cell.flange_jets import contact_jets, path_jets
 from opl.cell.inverse_jets import FlangeJets, joint_derivatives
 from opl.cell.inverse_kinematics import inverse_kinematics
-from opl.cell.wheel_distance import TOLERANCE, PartTree, signed_wheel_distance
+from opl.cell.wheel_distance import PartTree
 from opl.cell.workcell import WorkCell
 from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.geometry.wheel import MM_PER_M
+from opl.planning.cut_cells import cells_of, cut_finer
 from opl.planning.images import Images
 from opl.search.walls import UNKNOWN, Image, Line, Piece, Wall
 
-CELL = 1.0  # belt units that a cell covers at first
-MOST_HALVINGS = 8  # of a cell where the part begins to cut into the wheel
 MOST_PARTS = 32  # of a cell whose pads are large
 ROW_PARTS = 16  # cells between two places of a wall along a contact position
 FINER = 8  # cells that one is cut into where a proof needs it
 COARSE = 5e-4  # [rad] sum of the pads that is small enough
 ROUND_OFF = 1e-9  # [rad] of inverse kinematics and enclosures
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Where the contact moves over the wheel between two places.
+
+    Attributes:
+        before: A place that a motion passes before.
+        after: One that it passes after, on the same pass.
+        contact_position: Which it crosses between them.
+        upwards: Whether from lower contact positions to higher ones.
+    """
+
+    before: float
+    after: float
+    contact_position: float
+    upwards: bool
 
 
 class ColumnWalls:
@@ -60,15 +75,13 @@ class ColumnWalls:
     def walls(self, places: Sequence[float]) -> list[Wall]:
         """Return the walls at fractional cutter points."""
         Ts_workpiece_cutter = self._points.frames_at(np.asarray(places, dtype=float))
-        grids = [self._borders(T) for T in Ts_workpiece_cutter]
-        cells = self._cells(Ts_workpiece_cutter, grids)
-        parts = cells.parts()
-        if (parts > 1).any():
-            grids = [
-                _cut_finer(t, parts[first : first + len(t) - 1])
-                for t, first in zip(grids, cells.first, strict=True)
-            ]
-            cells = self._cells(Ts_workpiece_cutter, grids)
+        grids, cuts = cells_of(self._cell, self._part, Ts_workpiece_cutter)
+        cells = self._cells(Ts_workpiece_cutter, grids, cuts)
+        parts = [np.where(cut, 1, now) for cut, now in zip(cuts, cells.parts(), strict=True)]
+        if any((now > 1).any() for now in parts):
+            grids = [cut_finer(t, now) for t, now in zip(grids, parts, strict=True)]
+            cuts = [np.repeat(cut, now) for cut, now in zip(cuts, parts, strict=True)]
+            cells = self._cells(Ts_workpiece_cutter, grids, cuts)
         passes = self._points.pass_index[np.asarray(places, dtype=int)]
         return [
             Wall(int(passes[k]), float(place), tuple(self._pieces(cells, k)))
@@ -80,61 +93,66 @@ class ColumnWalls:
         grid = np.linspace(piece.at[cell], piece.at[cell + 1], FINER + 1)
         T_workpiece_cutter = piece.line.T_workpiece_cutter
         if T_workpiece_cutter is None:
-            pieces = self._row_pieces(grid, piece.line.contact_position)
+            pieces = self._rows([grid], [piece.line.contact_position])[0]
         else:
-            pieces = self._pieces(self._cells(T_workpiece_cutter[None], [grid]), 0)
+            none = np.zeros(FINER, dtype=bool)
+            pieces = list(self._pieces(self._cells(T_workpiece_cutter[None], [grid], [none]), 0))
         return tuple(found for found in pieces if found.family == piece.family)
 
-    def sweep(self, before: float, after: float, t: float, upwards: bool) -> Wall:
-        """Return the wall of places at one contact position, joined to columns on either side.
+    def sweeps(self, sweeps: Sequence[Sweep]) -> list[Wall]:
+        """Return the walls of places at one contact position, joined to columns on either side.
 
         From the bottom up one of the columns, along the contact position to the other, and up that
         one: every motion from the first column to the second crosses it.
-
-        Args:
-            before: The place where it begins.
-            after: The place where it ends, on the same pass.
-            t: The contact position.
-            upwards: Whether it goes up the later column first: what moves from low to high contact
-                positions between the two then crosses on the way.
         """
-        low_at, high_at = (after, before) if upwards else (before, after)
-        low, high = self.walls([low_at, high_at])
-        inside = np.arange(np.floor(before) + 1.0, np.ceil(after))
-        places = np.unique(np.concatenate([[before], inside, [after]]))
-        grid = _cut_finer(places, np.full(len(places) - 1, ROW_PARTS))
-        pieces = [part for piece in low.pieces for part in piece.below(t)]
-        pieces += self._row_pieces(grid, t)
-        pieces += [part for piece in high.pieces for part in piece.above(t)]
-        index = int(self._points.pass_index[int(before)])
-        return Wall(index, (before + after) / 2.0, tuple(pieces))
+        ends = [(s.after, s.before) if s.upwards else (s.before, s.after) for s in sweeps]
+        places = sorted({place for pair in ends for place in pair})
+        column = dict(zip(places, self.walls(places), strict=True))
+        grids = []
+        for s in sweeps:
+            inside = np.arange(np.floor(s.before) + 1.0, np.ceil(s.after))
+            along = np.unique(np.concatenate([[s.before], inside, [s.after]]))
+            grids.append(cut_finer(along, np.full(len(along) - 1, ROW_PARTS)))
+        rows = self._rows(grids, [s.contact_position for s in sweeps])
+        found = []
+        for s, (low, high), row in zip(sweeps, ends, rows, strict=True):
+            t = s.contact_position
+            pieces = [part for piece in column[low].pieces for part in piece.below(t)]
+            pieces += row
+            pieces += [part for piece in column[high].pieces for part in piece.above(t)]
+            index = int(self._points.pass_index[int(s.before)])
+            found.append(Wall(index, (s.before + s.after) / 2.0, tuple(pieces)))
+        return found
 
-    def _row_pieces(self, grid: Array, t: float) -> Iterator[Piece]:
-        arm = self._cell.robot.arm
-        T_base_contact = self._cell.wheel.T_base_contact(t)
-        middle, radius = (grid[:-1] + grid[1:]) / 2.0, np.diff(grid) / 2.0
-        flange = path_jets(
-            self._points, T_base_contact, self._cell.T_flange_workpiece, middle, radius
+    def _rows(self, grids: list[Array], contact_positions: list[float]) -> list[list[Piece]]:
+        """Return the pieces along places, each at one contact position."""
+        cell, points = self._cell, self._points
+        counts = np.array([len(grid) - 1 for grid in grids])
+        middle = np.concatenate([(grid[:-1] + grid[1:]) / 2.0 for grid in grids])
+        radius = np.concatenate([np.diff(grid) / 2.0 for grid in grids])
+        Ts_base_contact = np.repeat(
+            cell.wheel.T_base_contact(np.array(contact_positions)), counts, axis=0
         )
-        q = inverse_kinematics(arm, self._cell.Ts_base_flange(t, self._points.frames_at(grid)))
-        cells = self._enclosed(q, flange, radius, [grid], np.empty((1, 4, 4)))
-        yield from self._pieces(cells, 0, t)
+        flange = path_jets(points, Ts_base_contact, cell.T_flange_workpiece, middle, radius)
+        t = np.repeat(contact_positions, counts + 1)
+        Ts = points.frames_at(np.concatenate(grids))
+        q = inverse_kinematics(cell.robot.arm, cell.Ts_base_flange(t, Ts))
+        none = [np.zeros(count, dtype=bool) for count in counts]
+        cells = self._enclosed(q, flange, radius, grids, none, np.empty((len(grids), 4, 4)))
+        return [list(self._pieces(cells, k, t)) for k, t in enumerate(contact_positions)]
 
     def _pieces(self, cells: _Cells, wall: int, row: float | None = None) -> Iterator[Piece]:
         """Yield the pieces of one of several walls."""
         t = cells.grids[wall]
         first, corner = cells.first[wall], cells.first[wall] + wall
         now, at = slice(first, first + len(t) - 1), slice(corner, corner + len(t))
-        cut = np.zeros(len(t) - 1, dtype=bool)
-        if row is None:
-            cut = self._surely_cuts(cells.Ts_workpiece_cutter[wall], t)[0]
         line = Line(cells.Ts_workpiece_cutter[wall]) if row is None else Line(None, row)
         for family in self.images.families:
             known = cells.known[family][:, now]
             q = cells.q[at, family]
             # 0 nothing is allowed, 1 all is known, 2 not all is
             kind = np.where(known.all(axis=0), 1, 2)
-            kind[cut | cells.none[family][now]] = 0
+            kind[cells.cuts[wall] | cells.none[family][now]] = 0
             for low, high in _runs(kind):
                 if kind[low] == 0:
                     continue
@@ -167,44 +185,9 @@ class ColumnWalls:
             if allowed[low]:
                 yield piece.part(low, high)
 
-    def _borders(self, T_workpiece_cutter: Array) -> Array:
-        """Return the ends of cells at one place, closer where the part begins to cut."""
-        wheel = self._cell.wheel
-        t = np.array([-wheel.last_position])
-        for end in (-wheel.flat_end, wheel.flat_end, wheel.last_position):
-            if end > t[-1]:
-                count = int(np.ceil((end - t[-1]) / CELL))
-                t = np.concatenate([t[:-1], np.linspace(t[-1], end, count + 1)])
-        for _ in range(MOST_HALVINGS):
-            cuts, deep = self._surely_cuts(T_workpiece_cutter, t)
-            unsure = deep & ~cuts
-            unsure[:-1] |= ~deep[:-1] & deep[1:]
-            unsure[1:] |= ~deep[1:] & deep[:-1]
-            if not unsure.any():
-                break
-            t = _cut_finer(t, np.where(unsure, 2, 1))
-        return t
-
-    def _surely_cuts(self, T_workpiece_cutter: Array, t: Array) -> tuple[np.ndarray, np.ndarray]:
-        """Return in which cells the part cuts into the wheel all over, and at the middle."""
-        cell, wheel = self._cell, self._cell.wheel
-        middle, radius = (t[:-1] + t[1:]) / 2.0, np.diff(t) / 2.0
-        T_cutter_workpiece = frames.inverse(T_workpiece_cutter)
-        p = frames.transform(T_cutter_workpiece, self._part.triangles.reshape(-1, 3))
-        # about the edge; and a point in the wheel is not farther from it than the wheel is large
-        lever = min(
-            float(np.hypot(p[:, 0], p[:, 2]).max()),
-            float(np.hypot(wheel.width, 2.0 * wheel.radius)),
-        )
-        rolled = np.abs(middle) > wheel.flat_end
-        moved = np.where(rolled, 2.0 * np.sin(np.deg2rad(radius) / 2.0) * lever, radius / MM_PER_M)
-        Ts_contact0_workpiece = wheel.T_contact0_contact(middle) @ T_cutter_workpiece
-        allowed = -cell.planned_penetration
-        clearance = signed_wheel_distance(self._part, wheel, Ts_contact0_workpiece, allowed)
-        deep = np.asarray(clearance < allowed)
-        return np.asarray(clearance + moved + TOLERANCE < allowed), deep
-
-    def _cells(self, Ts_workpiece_cutter: Array, grids: list[Array]) -> _Cells:
+    def _cells(
+        self, Ts_workpiece_cutter: Array, grids: list[Array], cuts: list[np.ndarray]
+    ) -> _Cells:
         """Enclose the postures over all cells of some places."""
         arm = self._cell.robot.arm
         corners = np.concatenate(
@@ -220,7 +203,7 @@ class ColumnWalls:
         flange = contact_jets(
             self._cell.wheel, np.repeat(Ts_cutter_flange, counts, axis=0), middle, radius
         )
-        return self._enclosed(corners, flange, radius, grids, Ts_workpiece_cutter)
+        return self._enclosed(corners, flange, radius, grids, cuts, Ts_workpiece_cutter)
 
     def _enclosed(
         self,
@@ -228,6 +211,7 @@ class ColumnWalls:
         flange: FlangeJets,
         radius: Array,
         grids: list[Array],
+        cuts: list[np.ndarray],
         Ts_workpiece_cutter: Array,
     ) -> _Cells:
         """Return cells, the motion of the flange over each of them enclosed."""
@@ -240,7 +224,7 @@ class ColumnWalls:
         known &= 2.0 * radius * found.first < np.pi / 2.0
         first = np.concatenate([[0], np.cumsum(counts)[:-1]])
         return _Cells(
-            Ts_workpiece_cutter, grids, first, corners, pad_low, pad_high, known, found.none,
+            Ts_workpiece_cutter, grids, cuts, first, corners, pad_low, pad_high, known, found.none,
             np.array(self.images.families),
         )  # fmt: skip
 
@@ -252,6 +236,7 @@ class _Cells:
     Attributes:
         Ts_workpiece_cutter: The places, shape (k, 4, 4).
         grids: Ends of the cells of each.
+        cuts: In which cells of each the part surely cuts into the wheel.
         first: First cell of each, shape (k,).
         q: Postures at the ends, principal angles in [rad], shape (n + k, 8, 6).
         pad_low: As in `Piece`, shape (8, 6, n).
@@ -263,6 +248,7 @@ class _Cells:
 
     Ts_workpiece_cutter: Array
     grids: list[Array]
+    cuts: list[np.ndarray]
     first: np.ndarray
     q: Array
     pad_low: Array
@@ -271,21 +257,14 @@ class _Cells:
     none: np.ndarray
     families: np.ndarray
 
-    def parts(self) -> np.ndarray:
-        """Return into how many parts each cell should be cut, shape (n,)."""
+    def parts(self) -> list[np.ndarray]:
+        """Return into how many parts each cell of each place should be cut."""
         pads = (self.pad_high - self.pad_low)[self.families].sum(axis=1)
         wanted = np.ceil(np.sqrt(pads / COARSE))  # pads fall with the square
         wanted = np.where(self.known[self.families].all(axis=1), wanted, MOST_PARTS)
         wanted = np.where(self.none[self.families], 1, wanted)
-        return np.asarray(np.minimum(wanted.max(axis=0), MOST_PARTS), dtype=int)
-
-
-def _cut_finer(t: Array, parts: np.ndarray) -> Array:
-    """Return the ends of cells after each is cut into some parts."""
-    cell = np.repeat(np.arange(len(parts)), parts)
-    part = np.arange(len(cell)) - np.repeat(np.cumsum(parts) - parts, parts)
-    fine = t[cell] + (t[cell + 1] - t[cell]) * (part / parts[cell])
-    return np.append(fine, t[-1])
+        parts = np.minimum(wanted.max(axis=0), MOST_PARTS).astype(int)
+        return np.split(parts, self.first[1:])
 
 
 def _runs(kind: np.ndarray) -> list[tuple[int, int]]:

@@ -8,13 +8,14 @@ could be smaller than the best motion by more than the gap.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.box_track import BoxTracks, Bulges
-from opl.planning.columns import ColumnWalls
+from opl.planning.columns import ColumnWalls, Sweep
 from opl.planning.costs import CostWeights
 from opl.planning.families import Families, Fit, Placement, grown
 from opl.planning.images import Images, seams_of
@@ -29,6 +30,7 @@ ROOM_SHARE = 0.4  # of the widening: how much larger than its box the path may b
 MISSED = 0.05  # of the widening: what a box may miss a cutter point by and still hold it
 RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for next
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
+SWEEP_MISSED = 0.2  # of the widening: what it may miss a contact position by between them
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
 
@@ -80,7 +82,7 @@ class OptimalSearch:
         gap = PROOF_SHARE * settings.widen
         self.proof = BoxProof(self._walls.images.of, self._walls.finer, found, gap)
         self._places: set[float] = set()
-        self._sweeps: set[tuple[int, int, bool]] = set()
+        self._sweeps: set[Sweep] = set()
         self._columns = np.arange(len(problem.points), dtype=float)
         self._hope(self._families.smallest_grown())
         n = len(problem.points)
@@ -169,20 +171,25 @@ class OptimalSearch:
             self.proof.add(wall)
             self._places.add(wall.place)
 
-    def _add_sweep(
-        self, columns: Columns, box: JointBox, place: float, t: float, upwards: bool
+    def _add_sweeps(
+        self, columns: Columns, box: JointBox, sweeps: Sequence[tuple[float, float, bool]]
     ) -> bool:
-        """Add the wall at a contact position that a motion in a box must pass near a place."""
-        key = round(place), round(t), upwards
-        if key in self._sweeps:
-            return False
-        before = columns.without(box, place, t, back=True, above=upwards)
-        after = columns.without(box, place, t, back=False, above=not upwards)
-        if before is None or after is None:
-            return False
-        self._sweeps.add(key)
-        self.proof.add(self._walls.sweep(before, after, t, upwards))
-        return True
+        """Add walls at contact positions that motions in a box must pass, if the box misses any."""
+        missed = []
+        allowed = SWEEP_MISSED * self._settings.widen * self.proof.threshold
+        for place, t, upwards in sweeps:
+            before = columns.without(box, place, t, back=True, above=upwards)
+            after = columns.without(box, place, t, back=False, above=not upwards)
+            if before is None or after is None:
+                continue
+            sweep = Sweep(before, after, t, upwards)
+            if sweep in self._sweeps or self._sampler.misses(box, columns, sweep) <= allowed:
+                continue
+            self._sweeps.add(sweep)
+            missed.append(sweep)
+        for wall in self._walls.sweeps(missed) if missed else ():
+            self.proof.add(wall)
+        return bool(missed)
 
     def _hold(self, candidate: Candidate) -> tuple[list[Placement], list[float]]:
         """Return the image of each pass that fits into the box, and the cutter points it misses."""
@@ -220,8 +227,7 @@ class OptimalSearch:
             nonlocal learnt
             more = np.setdiff1d(bulges.places, self._columns)
             self._columns = np.union1d(self._columns, more)
-            added = [self._add_sweep(columns, box, *sweep) for sweep in bulges.sweeps]
-            learnt = bool(len(more)) or any(added)
+            learnt = self._add_sweeps(columns, box, bulges.sweeps) or bool(len(more))
             return learnt
 
         room = ROOM_SHARE * self._settings.widen * box.size

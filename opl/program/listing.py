@@ -13,7 +13,14 @@ from opl.errors import InputError
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, roll_pitch_yaw
 from opl.program.digits import Rounding
-from opl.program.played import Corners, Reading, ReadMove, WrittenSpeed, play
+from opl.program.played import (
+    Corners,
+    Reading,
+    ReadMove,
+    WrittenSpeed,
+    other_tools,
+    play,
+)
 from opl.program.posts import Reader
 from opl.program.settings import ProgramSettings
 from opl.program.statements import Listing
@@ -50,15 +57,15 @@ def listing_reader(
         if len(files) != 1:
             raise InputError("program", f"is one file in this language, got {len(files)}")
         listing = parsed(*next(iter(files.items())))
-        doubts = [*listing.doubts, *_other_tools(listing.moves, tool_name(settings))]
+        doubts = [*listing.doubts, *other_tools(listing.moves, tool_name(settings))]
         for called, place in listing.calls:
             if called not in settings.actions.calls:
                 message = f"calls {called}, which the job does not call"
                 doubts.append(Finding(Level.ERROR, "program", place, message))
-        playback, faults = play(listing.moves, robot, settings.T_flange_tool)
+        playback, faults = play(listing.moves, listing.events, robot, settings.T_flange_tool)
         doubts += faults
         foreign = tuple(dict.fromkeys(called for called, _ in listing.calls))
-        return Reading(None if doubts else playback, foreign, tuple(doubts))
+        return Reading(listing.name, None if doubts else playback, foreign, tuple(doubts))
 
     def describe(name: str, content: bytes, robot: Robot) -> list[str]:
         return _described(parsed(name, content), robot)
@@ -137,13 +144,3 @@ def pose_text(values: tuple[float, ...]) -> str:
     """Return x, y, z in [mm] and rx, ry, rz in [deg] for people."""
     x, y, z, rx, ry, rz = values
     return f"x {x:.3f} y {y:.3f} z {z:.3f} rx {rx:.4f} ry {ry:.4f} rz {rz:.4f}"
-
-
-def _other_tools(moves: tuple[ReadMove, ...], tool: str) -> Iterator[Finding]:
-    """Look for moves with another tool than the job's; of several in a row the first is named."""
-    before = tool
-    for move in moves:
-        if move.tool not in (tool, before):
-            message = f"moves with tool {move.tool}; the job's is {tool}"
-            yield Finding(Level.ERROR, "program", move.place, message)
-        before = move.tool

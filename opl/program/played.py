@@ -21,6 +21,7 @@ from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, inverse, rotation_angle
+from opl.program.events import Event
 from opl.program.lines import straight_configurations
 from opl.program.moves import Purpose
 
@@ -104,7 +105,8 @@ class ReadMove:
         quarters: Quarter turns of axes 1, 4 and 6 that the file states beside a pose; none where
             it states none.
         starts: Whether a program begins with it, so that nobody knows from where it comes.
-        waits: What the robot stands still for at its end, as written.
+        ramps: What it says of speeding up and slowing down, as written; empty where it leaves both
+            to the controller.
     """
 
     target: Array
@@ -117,7 +119,7 @@ class ReadMove:
     last_digit: float = 0.0
     quarters: tuple[int, ...] = ()
     starts: bool = False
-    waits: tuple[str, ...] = ()
+    ramps: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,12 +133,14 @@ class Playback:
         stations: Indices of the configurations that are written, in order; the others lie on lines
             between them, shape (m,).
         moves: The move to each of these, m items.
+        events: What is done besides moving, in order; each after one of these moves.
     """
 
     q: Array
     duration: Array
     stations: NDArray[np.intp]
     moves: tuple[ReadMove, ...]
+    events: tuple[Event, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,23 +148,26 @@ class Reading:
     """What was read from the files of a program.
 
     Attributes:
+        name: Of the program on the controller, of several the one to start with.
         playback: What the controller does, None where that is in doubt.
         foreign: Names of the user's own programs that are called and were not looked at.
         findings: What a controller would refuse, and what cannot be followed without doubt.
     """
 
+    name: str
     playback: Playback | None
     foreign: tuple[str, ...]
     findings: tuple[Finding, ...]
 
 
 def play(
-    moves: Sequence[ReadMove], robot: Robot, T_flange_tool: Array
+    moves: Sequence[ReadMove], events: Sequence[Event], robot: Robot, T_flange_tool: Array
 ) -> tuple[Playback | None, list[Finding]]:
     """Return what a controller does with moves, and what is in doubt; None if something is.
 
     Args:
         moves: In the order the controller makes them.
+        events: What it does besides.
         robot: Whose moves.
         T_flange_tool: The tool whose point runs straight, shape (4, 4).
     """
@@ -190,7 +197,8 @@ def play(
     if found:
         return None, found
     stations = np.cumsum([len(leg) for leg in legs]) - 1
-    return Playback(np.concatenate(legs), np.concatenate(times), stations, tuple(moves)), []
+    q_all, times_all = np.concatenate(legs), np.concatenate(times)
+    return Playback(q_all, times_all, stations, tuple(moves), tuple(events)), []
 
 
 def _end(move: ReadMove, q: Array | None, robot: Robot, T_flange_tool: Array) -> Array | None:
@@ -240,3 +248,12 @@ def move_time(
 
 def _fault(move: ReadMove, message: str) -> Finding:
     return Finding(Level.ERROR, "program", move.place, message)
+
+
+def other_tools(moves: Sequence[ReadMove], tool: str) -> Iterator[Finding]:
+    """Look for moves with another tool than the job's; of several in a row the first is named."""
+    before = tool
+    for move in moves:
+        if move.tool not in (tool, before):
+            yield _fault(move, f"moves with tool {move.tool}; the job's is {tool}")
+        before = move.tool

@@ -22,7 +22,7 @@ from pathlib import Path
 from opl.cell.robot import Robot
 from opl.errors import InputError, PassTimeError, SettingError
 from opl.geometry.frames import Array
-from opl.program.moves import PassTime, Program
+from opl.program.moves import PassTime, Program, Purpose
 from opl.program.played import Corners, Reading, WrittenSpeed
 from opl.program.settings import ProgramSettings
 
@@ -65,6 +65,7 @@ class Reader:
         describe: Says in lines what a file does, given its name, content and robot.
         differences: Says in lines what one file does and another does not, ``-`` and ``+``, given
             the name and content of both.
+        ramps: What a kind of move says of speeding up and slowing down, see `ReadMove`.
     """
 
     suffix: str
@@ -74,6 +75,7 @@ class Reader:
     corners: Callable[[ProgramSettings], Corners]
     describe: Callable[[str, bytes, Robot], list[str]]
     differences: Callable[[tuple[str, bytes], tuple[str, bytes]], list[str]]
+    ramps: Callable[[Purpose, ProgramSettings], str] = lambda kind, settings: ""
 
 
 @dataclass(frozen=True)

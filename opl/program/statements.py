@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 
 from opl.errors import InputError
 from opl.findings import Finding, Level
+from opl.program.events import Event, same_number
 from opl.program.played import ReadMove
 
 NUMBER = r"[-+]?(?:[0-9]{1,9}(?:\.[0-9]{0,15})?|\.[0-9]{1,15})(?:[eE][-+]?[0-9]{1,2})?"
-_DECIMAL = re.compile(r"(?<![\w.])([-+]?[0-9]+)\.([0-9]+)(?![\w.])")
 
 
 @dataclass(frozen=True)
@@ -43,18 +43,20 @@ class Listing:
     Attributes:
         name: Its name on the controller.
         statements: In order, comments left out.
+        events: What it does besides moving, in order.
         calls: Names of the programs it calls, with the place of the call.
         doubts: What cannot be followed.
     """
 
     name: str
     statements: tuple[Statement, ...]
+    events: tuple[Event, ...]
     calls: tuple[tuple[str, str], ...]
     doubts: tuple[Finding, ...]
 
     @property
     def moves(self) -> tuple[ReadMove, ...]:
-        """The moves in order, each with what the robot stands still for after it."""
+        """The moves in order."""
         return tuple(one.move for one in self.statements if one.move is not None)
 
 
@@ -91,10 +93,11 @@ class Notes:
     words: Words
     name: str = ""
     _statements: list[Statement] = field(default_factory=list)
+    _events: list[Event] = field(default_factory=list)
     _calls: list[tuple[str, str]] = field(default_factory=list)
     _doubts: list[Finding] = field(default_factory=list)
     _depth: int = 0
-    _last_move: int | None = None  # index in the statements
+    _last_move: int = -1  # counted from 0
 
     def place(self, line: int) -> str:
         """Return file and line, for people."""
@@ -114,11 +117,18 @@ class Notes:
         """Note a move."""
         if self._depth:
             self.doubt(line, "moves in a block that may be left out or repeated")
-        self._note(line, code, replace(move, starts=not self.begun), meaning or code)
+        move = replace(move, starts=not self.begun)
+        self._last_move += 1
+        self._note(line, code, move, meaning or code)
+
+    def event(self, line: int, code: str, waits: bool = False) -> None:
+        """Note what the program does besides moving, and whether the robot stands still for it."""
+        self._events.append(Event(self._last_move, code, self.place(line), waits))
+        self._note(line, code, None, code)
 
     def other(self, line: int, code: str) -> None:
         """Note a statement that is none of a language's moves and settings."""
-        words = self.words
+        words, waits = self.words, False
         if words.opens.fullmatch(code):
             self._depth += 1
         elif words.closes.fullmatch(code):
@@ -126,17 +136,17 @@ class Notes:
             if self._depth < 0:
                 self.doubt(line, f"{code} closes nothing")
         elif words.waits.fullmatch(code):
-            self._wait(code)
+            waits = True
         elif words.passing.fullmatch(code):
             pass
         elif called := words.call.fullmatch(code):
             if self._depth:
                 self.doubt(line, "calls in a block that may be left out or repeated")
-            self._wait(code)
+            waits = True
             self._calls.append((called[1], self.place(line)))
         else:
             self.doubt(line, f"nobody can tell from the file what {code} leads to")
-        self._note(line, code, None, code)
+        self.event(line, code, waits)
 
     @property
     def inside_block(self) -> bool:
@@ -146,7 +156,7 @@ class Notes:
     @property
     def begun(self) -> bool:
         """Whether there was a move."""
-        return self._last_move is not None
+        return self._last_move >= 0
 
     def listing(self, line: int) -> Listing:
         """Return the listing, the last line given for what is missing at the end."""
@@ -154,21 +164,16 @@ class Notes:
             self.doubt(line, "a block is not closed")
         if not self.name:
             raise InputError(self.source, "is no program: it has no name")
-        return Listing(self.name, tuple(self._statements), tuple(self._calls), tuple(self._doubts))
+        return Listing(
+            self.name,
+            tuple(self._statements),
+            tuple(self._events),
+            tuple(self._calls),
+            tuple(self._doubts),
+        )
 
     def _note(self, line: int, code: str, move: ReadMove | None, meaning: str) -> None:
-        if move is not None:
-            self._last_move = len(self._statements)
         self._statements.append(Statement(line, code, move, same_number(meaning)))
-
-    def _wait(self, code: str) -> None:
-        """Note at the last move that the robot stands still at its end."""
-        if self._last_move is None:
-            return
-        one = self._statements[self._last_move]
-        assert one.move is not None
-        waiting = replace(one.move, waits=(*one.move.waits, code))
-        self._statements[self._last_move] = replace(one, move=waiting)
 
 
 def code_lines(text: str, comment: str) -> Iterator[tuple[int, str]]:
@@ -220,8 +225,3 @@ def read_enclosed(
     if not ended:
         notes.doubt(line, "the program does not end")
     return notes.listing(line)
-
-
-def same_number(text: str) -> str:
-    """Return a text with its decimal numbers as short as they can be."""
-    return _DECIMAL.sub(lambda m: f"{m[1]}.{m[2]}".rstrip("0").rstrip("."), text)

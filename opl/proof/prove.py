@@ -15,6 +15,7 @@ from opl.job import keys
 from opl.job.load import Job
 from opl.motion.motion import TimedMotion
 from opl.program.posts import Reader, find_post, readers
+from opl.proof.events import name_findings
 from opl.proof.written import written_findings
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import Verification, replay
@@ -90,6 +91,7 @@ def prove(
         *replayed.findings,
         *found.findings,
         *written_findings(job, points, found.timed.take(rows), playback, reader),
+        *name_findings(job, reading.name),
     )
     moves = len(playback.moves)
     return Proof(tuple(files), reading.foreign, moves, found.timed, replayed, findings)

@@ -23,6 +23,7 @@ from opl.motion.motion import Motion, TimedMotion, VerifiedMotion
 from opl.program.moves import SAME_CONFIGURATION, Program
 from opl.program.played import Playback
 from opl.program.posts import find_post
+from opl.proof.events import name_findings
 from opl.proof.prove import prove
 from opl.proof.written import written_findings
 from opl.verification.kinematic_checks import limit_findings
@@ -119,6 +120,7 @@ def read_back(
             *findings,
             *limit_findings(job.cell, written),
             *written_findings(job, points, written, kept, reader),
+            *name_findings(job, reading.name),
         )
     apart = _apart(job, q, proven) if difference > EXACT else 0.0
     return FileProof(tuple(files), len(q), rounding, apart, bool(other_paths), findings)
@@ -132,11 +134,17 @@ def _without_repeats(playback: Playback) -> Playback:
     # such a move is one configuration of no duration, wherever it stands
     gone = np.delete(playback.stations, kept)
     all_but = np.delete(np.arange(len(playback.q)), gone)
+    # of several moves that end at one place the first is kept
+    own = np.searchsorted(kept, np.arange(len(playback.moves)), side="right") - 1
     return Playback(
         playback.q[all_but],
         playback.duration[all_but],
         np.searchsorted(all_but, playback.stations[kept]),
         tuple(playback.moves[k] for k in kept),
+        tuple(
+            replace(event, after=int(own[event.after]) if event.after >= 0 else event.after)
+            for event in playback.events
+        ),
     )
 
 

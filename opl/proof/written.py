@@ -1,4 +1,4 @@
-"""Speeds, stops and ends of a written program against those of its job."""
+"""Speeds, stops, events and ends of a written program against those of its job."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from opl.program.moves import Purpose
 from opl.program.played import Playback
 from opl.program.posts import PASS_TIME_TOLERANCE, Reader
 from opl.program.speeds import MOST_CORRECTION
+from opl.proof.events import event_findings
 
 # Fastest that one move may be, as a multiple of the requested speed. On the wheel a move makes up
 # for the rounding of those before it; elsewhere only its own last digit counts. Where a language
@@ -29,7 +30,7 @@ ROUND_OFF = 1e-9  # of a number that was read from a file, as a fraction
 def written_findings(
     job: Job, points: CutterPoints, written: TimedMotion, playback: Playback, reader: Reader
 ) -> list[Finding]:
-    """Return what is wrong with speeds, stops, and the configurations at both ends.
+    """Return what is wrong with speeds, stops, events, and the configurations at both ends.
 
     Args:
         job: What is requested.
@@ -45,7 +46,8 @@ def written_findings(
         *_fast_moves(written, requested, playback),
         *_pass_times(written, requested),
         *_rounded_ends(job, motion, playback, reader),
-        *_waits_on_wheel(motion, playback),
+        *_ramps(job, motion, playback, reader),
+        *event_findings(job, motion, playback),
         *_ends_away_from_home(job, motion),
     ]
 
@@ -100,12 +102,13 @@ def _rounded_ends(
             yield _error("level", f"{motion.place(k)} ({move.place})", message)
 
 
-def _waits_on_wheel(motion: Motion, playback: Playback) -> Iterator[Finding]:
-    """Look for places where the program lets the robot stand still while the belt grinds."""
+def _ramps(job: Job, motion: Motion, playback: Playback, reader: Reader) -> Iterator[Finding]:
+    """Look at how the moves speed up and slow down."""
     for k, move in enumerate(playback.moves):
-        if move.waits and motion.kind[k].on_wheel:
-            message = f"stands still on the wheel: {', '.join(move.waits)}"
-            yield _error("wait", f"{motion.place(k)} ({move.place})", message)
+        wanted = reader.ramps(Purpose.of(motion.phase[k]), job.program)
+        if move.ramps != wanted:
+            message = f"must have {wanted or 'no ramps of its own'}, has {move.ramps or 'none'}"
+            yield _error("ramp", f"{motion.place(k)} ({move.place})", message)
 
 
 def _ends_away_from_home(job: Job, motion: Motion) -> Iterator[Finding]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
+from opl.search.outside import outside
 
 JUMP = 0.5  # [rad] between neighbouring contact positions; more is no motion
 BEND = 2.0  # times the sagitta that second differences tell: how far postures stand off a chord
@@ -55,6 +56,20 @@ def missing(q: Array, box: JointBox) -> Array:
     """Return by how much a box must grow to hold postures, infinite for none, shape (...)."""
     away = np.maximum(q - box.upper, 0.0) + np.maximum(box.lower - q, 0.0)
     return np.asarray(np.nan_to_num(away.sum(axis=-1), nan=np.inf))
+
+
+def missing_chords(q: Array, free: np.ndarray, box: JointBox) -> Array:
+    """Return by how much a box must grow to hold a point of each column, chords included.
+
+    Args:
+        q: Postures in [rad], shape (n, m, 6).
+        free: Which may be used, shape (n, m).
+        box: The box.
+    """
+    missing, row = np.empty(len(q)), np.empty(len(q))
+    by_joint = np.ascontiguousarray(np.moveaxis(q, 1, 2))
+    outside(by_joint, np.ascontiguousarray(free), box.lower, box.upper, JUMP, missing, row)
+    return missing
 
 
 def nearest(q: Array, free: np.ndarray, box: JointBox) -> np.ndarray:

@@ -148,9 +148,9 @@ class _Body:
             notes.setting(line, code)
         elif label := _LABEL.fullmatch(code):
             self.labels.setdefault(label[1], []).append(index)
-            notes.setting(line, code)
+            notes.event(line, code)
         elif jump and code.startswith("JMP "):
-            notes.setting(line, code)
+            notes.event(line, code)
         else:
             if code.startswith("CALL "):
                 self.moves.append(index)  # no jump may pass it either

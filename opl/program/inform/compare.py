@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from opl.program.events import same_number
 from opl.program.inform.job import InformJob, Instruction
 from opl.program.listing import changed_lines
-from opl.program.statements import same_number
 
 _TAUGHT = ("C", "BC", "EC")  # their numbers only tie a move to its position
 

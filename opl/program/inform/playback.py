@@ -8,20 +8,29 @@ import numpy as np
 
 from opl.cell.robot import Robot
 from opl.errors import InputError
-from opl.findings import Finding, Level
+from opl.findings import Finding
 from opl.geometry.frames import Array
+from opl.program.events import Event
+from opl.program.inform.heads import head_findings
 from opl.program.inform.job import InformJob
-from opl.program.inform.sequence import Visit, first_job, visits
+from opl.program.inform.sequence import Doing, Visit, first_job, visits
 from opl.program.inform.times import job_configurations, written_speed
 from opl.program.moves import SAME_CONFIGURATION, START_SPEED
-from opl.program.played import Corner, Corners, Playback, ReadMove, SpeedUnit, WrittenSpeed, play
+from opl.program.played import (
+    Corner,
+    Corners,
+    Playback,
+    ReadMove,
+    SpeedUnit,
+    WrittenSpeed,
+    other_tools,
+    play,
+)
 from opl.program.pulses import PulseScale
 from opl.program.settings import ProgramSettings
 
 # The fastest first move of a job.
 START = WrittenSpeed(SpeedUnit.TOP_SPEED, START_SPEED, f"VJ={100.0 * START_SPEED:.2f}")
-# Instructions at which the robot stands still.
-_WAITS = ("TIMER", "WAIT", "PAUSE", "CALL")
 
 
 def play_jobs(
@@ -35,30 +44,25 @@ def play_jobs(
         InputError: If the jobs are not those of one program, or of another robot.
     """
     order, found = visits(jobs, first_job(jobs), settings.actions.calls)
-    targets, waits = {}, {}
+    targets = {}
     for name, job in jobs.items():
         _require_robot(job, robot)
+        found += head_findings(job, settings)
         targets[name] = _targets(job, robot, settings)
-        waits[name] = _waits(job)
     half_pulse = 0.5 / PulseScale.of(robot).pulses_per_radian
     resolution = np.where(np.isnan(half_pulse), SAME_CONFIGURATION, half_pulse)
-    moves = []
+    moves: list[ReadMove] = []
+    events = []
     before = None
-    for visit in order:
-        if visit.step.word == "MOVL" and _tool(visit) != settings.tool:
-            message = f"moves tool {_tool(visit)} straight; the job knows tool {settings.tool} only"
-            found.append(Finding(Level.ERROR, "program", _place(visit), message))
-        moves.append(
-            _move(
-                visit,
-                targets[visit.job.name][visit.position],
-                resolution,
-                visit.job is not before,
-                waits[visit.job.name].get(visit.step.line, ()),
-            )
-        )
-        before = visit.job
-    playback, doubtful = play(moves, robot, settings.T_flange_tool)
+    for one in order:
+        if isinstance(one, Doing):
+            events.append(Event(len(moves) - 1, one.text, one.place, one.waits))
+            continue
+        target = targets[one.job.name][one.position]
+        moves.append(_move(one, target, resolution, one.job is not before))
+        before = one.job
+    found += other_tools(moves, str(settings.tool))
+    playback, doubtful = play(moves, events, robot, settings.T_flange_tool)
     if not found:
         return playback, doubtful
     return None, [*found, *(doubtful if moves else [])]
@@ -70,9 +74,7 @@ def corners(settings: ProgramSettings) -> Corners:
     return Corners(*(Corner(float(level or 0), f"PL={level or 0}") for level in levels))
 
 
-def _move(
-    visit: Visit, target: Array, resolution: Array, starts: bool, waits: tuple[str, ...]
-) -> ReadMove:
+def _move(visit: Visit, target: Array, resolution: Array, starts: bool) -> ReadMove:
     step = visit.step
     level = step.tag("PL")
     size = float(level) if level is not None and level.isdecimal() else np.inf
@@ -85,20 +87,8 @@ def _move(
         place=_place(visit),
         resolution=resolution,
         starts=starts,
-        waits=waits,
+        ramps=" ".join(f"{name}={value}" for name, value in step.tags if name in ("ACC", "DEC")),
     )
-
-
-def _waits(job: InformJob) -> dict[int, tuple[str, ...]]:
-    """Return the instructions at which the robot stands still, by the line of the move before."""
-    found: dict[int, tuple[str, ...]] = {}
-    line = 0
-    for step in job.instructions:
-        if step.moves:
-            line = step.line
-        elif step.word in _WAITS and not step.disabled:
-            found[line] = (*found.get(line, ()), job.lines[step.line - 1].strip())
-    return found
 
 
 def _targets(job: InformJob, robot: Robot, settings: ProgramSettings) -> Array:

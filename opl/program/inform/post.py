@@ -20,8 +20,10 @@ from opl.program.inform.parse import decode, parse, read_jobs, unparse
 from opl.program.inform.playback import START, corners, play_jobs
 from opl.program.inform.positions import rounded_to_job
 from opl.program.inform.render import FILE_SUFFIX, TEMPLATE, render, split_for
+from opl.program.inform.sequence import first_job
 from opl.program.inform.summary import describe
 from opl.program.inform.times import move_times, written_speed
+from opl.program.inform.words import ramps
 from opl.program.moves import Program
 from opl.program.played import Reading
 from opl.program.posts import Post, Reader, Written, pass_times
@@ -89,7 +91,7 @@ def _read(
             refused += [Finding(Level.ERROR, "file", source, fault) for fault in faults]
     playback, doubtful = play_jobs(jobs, robot, settings)
     foreign = sorted({name for job in jobs.values() for name in job.calls} - jobs.keys())
-    return Reading(playback, tuple(foreign), (*refused, *doubtful))
+    return Reading(first_job(jobs), playback, tuple(foreign), (*refused, *doubtful))
 
 
 def describe_file(name: str, content: bytes, robot: Robot) -> list[str]:
@@ -127,6 +129,7 @@ def post_of(profile: ControllerProfile) -> Post:
         corners,
         describe_file,
         file_differences,
+        lambda kind, settings: ramps(kind, settings).strip(),
     )
     return Post(
         f"Yaskawa {profile.name} (INFORM)",

@@ -16,12 +16,13 @@ from opl.errors import InputError, SettingError
 from opl.files import resources
 from opl.program.controller import ControllerProfile
 from opl.program.inform.faults import job_faults
+from opl.program.inform.heads import attributes, frame
 from opl.program.inform.job_layout import JobLayout, JobStep, differences
 from opl.program.inform.parse import parse
 from opl.program.inform.positions import write_positions, write_speeds
-from opl.program.inform.words import ACTIONS, require_accepted_action
+from opl.program.inform.words import ACTIONS, ramps, require_accepted_action
 from opl.program.layout import fill
-from opl.program.moves import Move, Program
+from opl.program.moves import Program
 from opl.program.settings import PositionForm, ProgramSettings
 from opl.program.split import short_name, split
 
@@ -78,8 +79,9 @@ def _layout(
     profile: ControllerProfile,
     date: datetime,
 ) -> JobLayout:
-    form, frame = settings.positions, settings.user_frame
-    user = str(frame.number) if form is PositionForm.USER and frame is not None else None
+    form, user_frame = settings.positions, settings.user_frame
+    in_user_frame = form is PositionForm.USER and user_frame is not None
+    user = str(user_frame.number) if in_user_frame and user_frame is not None else None
     pulses = form is PositionForm.PULSES
     postype = "PULSE" if pulses else form.value.upper()
     notes = _ratio_notes(robot, profile.comment_length) if pulses else []
@@ -89,8 +91,8 @@ def _layout(
         user=user,
         postype=postype,
         coordinates="PULSE" if pulses else "RECTAN",
-        attributes="SC,RW" if pulses or not part.moves else "SC,RW,RJ",
-        frame=None if pulses or not part.moves else f"USER {user}" if user else postype,
+        attributes=attributes(settings, bool(part.moves)),
+        frame=frame(settings, bool(part.moves)),
         date=f"{date:%Y/%m/%d %H:%M}",
         title=settings.title,
         comments=(*part.comments, *notes),
@@ -117,18 +119,12 @@ def _steps(
             word=speeds[number][0],
             speed=speeds[number][1],
             level=str(_STOP_LEVEL if move.exact_stop else settings.levels.of(move.kind)),
-            ramps=_ramps(move, settings),
+            ramps=ramps(move.kind, settings),
             comment=move.comment,
             actions=actions[number],
         )
         for number, move in enumerate(part.moves)
     )
-
-
-def _ramps(move: Move, settings: ProgramSettings) -> str:
-    pairs = (("ACC", settings.acceleration), ("DEC", settings.deceleration))
-    found = ((word, numbers.of(move.kind)) for word, numbers in pairs)
-    return "".join(f" {word}={percent}" for word, percent in found if percent is not None)
 
 
 def _ratio_notes(robot: Robot, width: int) -> list[str]:

@@ -14,8 +14,10 @@ from opl.errors import InputError
 from opl.findings import Finding, Level
 from opl.program.inform.job import InformJob, Instruction, read_label
 
-# Instructions that neither move the robot nor decide what it does next.
-_HARMLESS = frozenset(["'", "DOUT", "DIN", "WAIT", "PULSE", "AOUT", "TIMER", "PAUSE", "MSG", "CLS"])
+# Instructions that neither move the robot nor decide what it does next, and those of them at which
+# it stands still.
+_WAITS = frozenset(["TIMER", "WAIT", "PAUSE"])
+_PASSING = frozenset(["DOUT", "DIN", "PULSE", "AOUT", "MSG", "CLS"])
 _SPEEDS = {"MOVJ": ("VJ",), "MOVL": ("V", "VR")}
 _MOVE_TAGS = frozenset({"VJ", "V", "VR", "PL", "ACC", "DEC"})
 _NUMBER = re.compile(r"[0-9]{1,9}(?:\.[0-9]{1,9})?")
@@ -41,6 +43,33 @@ class Visit:
         return _place(self.job, self.step)
 
 
+@dataclass(frozen=True)
+class Doing:
+    """An instruction of a job that is no move.
+
+    Attributes:
+        job: The job.
+        step: The instruction.
+        waits: Whether the robot stands still for it.
+    """
+
+    job: InformJob
+    step: Instruction
+    waits: bool
+
+    @property
+    def place(self) -> str:
+        """Job and line, for people."""
+        return _place(self.job, self.step)
+
+    @property
+    def text(self) -> str:
+        """The instruction without the comment behind it."""
+        line = self.job.lines[self.step.line - 1].strip()
+        comment = self.step.comment
+        return line if comment is None else line.removesuffix(f"//{comment.rstrip()}").rstrip()
+
+
 def first_job(jobs: Mapping[str, InformJob]) -> str:
     """Return the name of the job that no other one calls.
 
@@ -57,8 +86,8 @@ def first_job(jobs: Mapping[str, InformJob]) -> str:
 
 def visits(
     jobs: Mapping[str, InformJob], start: str, foreign: Collection[str]
-) -> tuple[list[Visit], list[Finding]]:
-    """Return the moves in order, and what cannot be followed; foreign jobs are the user's own.
+) -> tuple[list[Visit | Doing], list[Finding]]:
+    """Return what is done in order, and what cannot be followed; foreign jobs are the user's own.
 
     Raises:
         InputError: If a job is called that is not there.
@@ -73,10 +102,10 @@ def _follow(
     foreign: Collection[str],
     callers: tuple[str, ...],
     found: list[Finding],
-) -> Iterator[Visit]:
+) -> Iterator[Visit | Doing]:
     places = {(p.kind, p.number): k for k, p in enumerate(job.positions)}
     for index, step in enumerate(job.instructions):
-        if step.disabled or not step.word or step.word in _HARMLESS or step.word[0] == "*":
+        if step.disabled or not step.word or step.word == "'":
             continue
         fault = None
         if step.word == "CALL":
@@ -87,12 +116,17 @@ def _follow(
                 fault = f"calls {name}, which is running"
             elif name in jobs:
                 yield from _follow(jobs, jobs[name], foreign, (*callers, job.name), found)
-            elif name not in foreign:
+            elif name in foreign:
+                yield Doing(job, step, waits=True)
+            else:
                 raise InputError(
                     _place(job, step), f"calls {name}, which is not there; have: {', '.join(jobs)}"
                 )
+        elif step.word in _PASSING or step.word in _WAITS or step.word[0] == "*":
+            yield Doing(job, step, step.word in _WAITS)
         elif step.word == "JUMP":
             fault = _jump_fault(job, index)
+            yield Doing(job, step, waits=False)
         elif step.word in _SPEEDS:
             fault = _move_fault(step, places)
             if fault is None:

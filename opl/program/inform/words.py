@@ -1,4 +1,4 @@
-"""Actions in INFORM."""
+"""Actions and ramps in INFORM."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from opl.errors import InputError
 from opl.program.actions import Action, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.controller import ControllerProfile
 from opl.program.dialect import ActionTexts
+from opl.program.moves import Purpose
+from opl.program.settings import ProgramSettings
 
 ACTIONS = ActionTexts(
     states=("OFF", "ON"),
@@ -21,6 +23,13 @@ ACTIONS = ActionTexts(
     call="CALL JOB:{name}",
     remark="'{text}",
 )
+
+
+def ramps(kind: Purpose, settings: ProgramSettings) -> str:
+    """Return the tags that set the ramps of a move, each after a space; "" where there are none."""
+    pairs = (("ACC", settings.acceleration), ("DEC", settings.deceleration))
+    found = ((word, numbers.of(kind)) for word, numbers in pairs)
+    return "".join(f" {word}={percent}" for word, percent in found if percent is not None)
 
 
 def require_accepted_action(action: Action, profile: ControllerProfile) -> None:

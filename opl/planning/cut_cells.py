@@ -1,0 +1,91 @@
+"""Cells of contact positions: small where the part begins to cut into the wheel.
+
+A cell counts as forbidden only if the part is deeper in the wheel at its middle than any point of
+it can move within the cell.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from opl.cell.wheel_distance import TOLERANCE, PartTree, signed_wheel_distance
+from opl.cell.workcell import WorkCell
+from opl.geometry import frames
+from opl.geometry.frames import Array
+from opl.geometry.wheel import MM_PER_M
+
+CELL = 1.0  # belt units that a cell covers at first
+MOST_HALVINGS = 8  # of a cell where the part begins to cut into the wheel
+
+
+def cells_of(
+    cell: WorkCell, part: PartTree, Ts_workpiece_cutter: Array
+) -> tuple[list[Array], list[np.ndarray]]:
+    """Return the ends of cells at each place, and in which the part surely cuts into the wheel.
+
+    Args:
+        cell: The cell.
+        part: The triangles of the part.
+        Ts_workpiece_cutter: The places, shape (k, 4, 4).
+    """
+    wheel = cell.wheel
+    t = np.array([-wheel.last_position])
+    for end in (-wheel.flat_end, wheel.flat_end, wheel.last_position):
+        if end > t[-1]:
+            count = int(np.ceil((end - t[-1]) / CELL))
+            t = np.concatenate([t[:-1], np.linspace(t[-1], end, count + 1)])
+    k = len(Ts_workpiece_cutter)
+    place = np.repeat(np.arange(k), len(t) - 1)
+    low, high = np.tile(t[:-1], k), np.tile(t[1:], k)
+    cuts, deep = _surely_cuts(cell, part, Ts_workpiece_cutter[place], low, high)
+    for _ in range(MOST_HALVINGS):
+        unsure = deep & ~cuts
+        begins = (deep[:-1] != deep[1:]) & (place[:-1] == place[1:])
+        unsure[:-1] |= begins & ~deep[:-1]
+        unsure[1:] |= begins & ~deep[1:]
+        if not unsure.any():
+            break
+        parts = np.where(unsure, 2, 1)
+        middle = (low + high) / 2.0
+        fresh, second = np.repeat(unsure, parts), np.zeros(parts.sum(), dtype=bool)
+        second[(np.cumsum(parts) - 1)[unsure]] = True
+        first = fresh & ~second
+        place, low, high, middle, cuts, deep = (
+            np.repeat(values, parts) for values in (place, low, high, middle, cuts, deep)
+        )
+        low[second], high[first] = middle[second], middle[first]
+        found = _surely_cuts(cell, part, Ts_workpiece_cutter[place[fresh]], low[fresh], high[fresh])
+        cuts[fresh], deep[fresh] = found
+    ends = np.searchsorted(place, np.arange(k + 1))
+    runs = [slice(a, b) for a, b in pairwise(ends)]
+    return [np.append(low[run], high[run][-1:]) for run in runs], [cuts[run] for run in runs]
+
+
+def _surely_cuts(
+    cell: WorkCell, part: PartTree, Ts_workpiece_cutter: Array, low: Array, high: Array
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return in which cells the part cuts into the wheel all over, and at the middle."""
+    wheel = cell.wheel
+    middle, radius = (low + high) / 2.0, (high - low) / 2.0
+    Ts_cutter_workpiece = frames.inverse(Ts_workpiece_cutter)
+    x, _, z = np.moveaxis(frames.transform(Ts_cutter_workpiece, part.spheres[0, :3]), -1, 0)
+    # about the edge; and a point in the wheel is not farther from it than the wheel is large
+    lever = np.minimum(
+        np.hypot(x, z) + part.spheres[0, 3], np.hypot(wheel.width, 2.0 * wheel.radius)
+    )
+    rolled = np.abs(middle) > wheel.flat_end
+    moved = np.where(rolled, 2.0 * np.sin(np.deg2rad(radius) / 2.0) * lever, radius / MM_PER_M)
+    Ts_contact0_workpiece = wheel.T_contact0_contact(middle) @ Ts_cutter_workpiece
+    allowed = -cell.planned_penetration
+    clearance = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, allowed)
+    return (clearance + moved + TOLERANCE < allowed), clearance < allowed
+
+
+def cut_finer(t: Array, parts: np.ndarray) -> Array:
+    """Return the ends of cells after each is cut into some parts."""
+    cell = np.repeat(np.arange(len(parts)), parts)
+    part = np.arange(len(cell)) - np.repeat(np.cumsum(parts) - parts, parts)
+    fine = t[cell] + (t[cell + 1] - t[cell]) * (part / parts[cell])
+    return np.append(fine, t[-1])
