@@ -90,10 +90,7 @@ def survey_nodes(problem: GrindingProblem, ik_branch: int, near: Array) -> NodeS
     for i, j in zip(column[struck], position[struck], strict=True):
         first = collision.colliding_pairs(q[i, j])[0]
         states[i, j], hit[i, j] = CODES[NodeState.COLLISION], pairs.setdefault(first, len(pairs))
-    columns, positions = (
-        np.unique(np.linspace(0, count - 1, most).round().astype(int))
-        for count, most in zip(states.shape, (_COLUMNS, _POSITIONS), strict=True)
-    )
+    columns, positions = _some(len(states), _COLUMNS), _some(states.shape[1], _POSITIONS)
     grid = np.ix_(columns, positions)
     measured = states[grid] == CODES[NodeState.FREE]
     return NodeSurvey(
@@ -136,3 +133,8 @@ def _turned(q: Array, near: Array, robot: Robot) -> Array:
     least, most = np.ceil((robot.lower - q) / _TURN), np.floor((robot.upper - q) / _TURN)
     turns = np.where(least <= most, np.clip(wanted, least, most), wanted)
     return np.asarray(q + _TURN * turns)
+
+
+def _some(count: int, most: int) -> np.ndarray:
+    """Return so many of ``count`` indices at the most, evenly, the first and the last among them."""
+    return np.unique(np.linspace(0, count - 1, most).round().astype(int))
