@@ -136,5 +136,5 @@ def _turned(q: Array, near: Array, robot: Robot) -> Array:
 
 
 def _some(count: int, most: int) -> np.ndarray:
-    """Return so many of ``count`` indices at the most, evenly, the first and the last among them."""
+    """Return so many of ``count`` indices at the most, evenly from the first to the last."""
     return np.unique(np.linspace(0, count - 1, most).round().astype(int))
