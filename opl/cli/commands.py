@@ -52,7 +52,12 @@ def main() -> None:
     help="Search; default as in the job.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
-@click.option("-v", "--verbose", is_flag=True, help="Print the time of each stage too.")
+@click.option(
+    "-v",
+    "--verbose",
+    is_flag=True,
+    help="Print the time of each part of the cycle and of each stage too.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print result.json instead of tables.")
 @click.option("--open", "opened", is_flag=True, help="Open report.html when the run has ended.")
 def run_job(

@@ -135,12 +135,15 @@ def describe_program(file: Path, robot: Robot) -> list[str]:
     return [*reader_for(file).describe(str(file), _content(file), robot)]
 
 
-def compare_programs(file: Path, other: Path) -> list[str]:
+def compare_programs(file: Path, other: Path, robot: Robot) -> list[str]:
     """Return how two programs differ in what they do, one line each; empty if they do not.
+
+    What changed everywhere comes first, then what differs move by move, in degrees and mm.
 
     Args:
         file: The one; its suffix names the language.
         other: The other, of the same language.
+        robot: Whose programs they are taken for.
 
     Raises:
         InputError: If a file cannot be read, is no program, or they are of two languages.
@@ -148,4 +151,5 @@ def compare_programs(file: Path, other: Path) -> list[str]:
     reader = reader_for(file)
     if reader_for(other) is not reader:
         raise InputError(str(other), f"is not of the language of {file}")
-    return [*reader.differences((str(file), _content(file)), (str(other), _content(other)))]
+    first, second = ((str(path), _content(path)) for path in (file, other))
+    return [*reader.differences(first, second, robot)]
