@@ -76,7 +76,7 @@ def survey_nodes(problem: GrindingProblem, ik_branch: int, near: Array) -> NodeS
     solutions = problem.field.q[:, :, ik_branch]
     q = _turned(solutions, near, robot)
     reached = ~np.isnan(solutions[..., 0])
-    states = np.full(problem.cuts.shape, CODES[NodeState.LIMITS], dtype=np.uint8)
+    states: np.ndarray = np.full(problem.cuts.shape, CODES[NodeState.LIMITS], dtype=np.uint8)
     for nodes in problem.field.matrices:
         if nodes.ik_branch == ik_branch:
             column, row = np.nonzero(nodes.exists)
@@ -90,7 +90,8 @@ def survey_nodes(problem: GrindingProblem, ik_branch: int, near: Array) -> NodeS
     for i, j in zip(column[struck], position[struck], strict=True):
         first = collision.colliding_pairs(q[i, j])[0]
         states[i, j], hit[i, j] = CODES[NodeState.COLLISION], pairs.setdefault(first, len(pairs))
-    columns, positions = _some(len(states), _COLUMNS), _some(states.shape[1], _POSITIONS)
+    n_columns, n_positions = problem.cuts.shape
+    columns, positions = _some(n_columns, _COLUMNS), _some(n_positions, _POSITIONS)
     grid = np.ix_(columns, positions)
     measured = states[grid] == CODES[NodeState.FREE]
     return NodeSurvey(
