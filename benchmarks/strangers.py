@@ -27,6 +27,8 @@ from typing import Any
 import opl
 from benchmarks.stranger_jobs import Stranger, draw_job
 from opl.cell.wheel_distance import use_threads
+from opl.run.preparing import prepare
+from opl.run.searches import search_path
 
 CLOSED = 0.002  # gap that counts as closed
 LONGEST = 120.0  # [s] that a job may take as a whole
@@ -100,25 +102,35 @@ class Processor:
             self.seconds[stage.value] += now - self._start[stage.value]
 
 
-def _run(job: opl.Job, out: Path, whole: bool, watch: opl.Watch) -> Facts:
-    """Run a job to its path, or to the files of its program; return the facts of an outcome."""
-    run: opl.Planned | opl.Run = opl.plan_path(opl.cut_surface(job, watch), watch)
-    if whole and isinstance(run, opl.Planned):
-        proven = opl.verify_motion(run, watch)
-        run = proven if isinstance(proven, opl.Refused) else opl.write_program(proven, watch)
-    points = run.surfaced.points
-    facts: Facts = {"status": "ok", "points": len(points), "passes": points.n_passes}
-    reached: object = run
-    if not isinstance(run, opl.Planned):
-        opl.deliver(run, out)
-        facts["status"] = run.status
-        reached = run.proven if isinstance(run, opl.Written) else run.reached
-    if isinstance(run, opl.Refused):
-        facts["cause"] = "; ".join(opl.make_report(run).reasons)
-    planned = reached.planned if isinstance(reached, opl.Proven) else reached
-    if isinstance(planned, opl.Planned):
-        facts["sum_rad"] = planned.plan.path.joint_range_sum
-        facts["bound_rad"] = planned.plan.lower_bound
+def _path(job: opl.Job, watch: opl.Watch) -> Facts:
+    """Search the path of a job; return the facts of an outcome."""
+    surfaced = opl.cut_surface(job, watch)
+    points = surfaced.points
+    facts: Facts = {"points": len(points), "passes": points.n_passes}
+    prepared = prepare(surfaced, watch)
+    try:
+        with watch.stage(opl.Stage.SEARCH):
+            plan = search_path(job.search, prepared.problem).plan
+    except opl.NoPathError as error:
+        return {**facts, "status": "no_path", "cause": str(error)}
+    facts.update(sum_rad=plan.path.joint_range_sum, bound_rad=plan.lower_bound)
+    return {**facts, "status": "ok"}
+
+
+def _program(job: opl.Job, out: Path, watch: opl.Watch) -> Facts:
+    """Run a job to its end; return the facts of an outcome."""
+    run = opl.run_job(job, watch)
+    opl.deliver(run, out)
+    report = opl.make_report(run)
+    facts: Facts = {
+        "status": run.status,
+        "points": report.cutter_points,
+        "passes": report.passes,
+        "cause": "; ".join(report.reasons),
+    }
+    if report.path is not None:
+        facts["sum_rad"] = report.path.joint_range_sum_rad
+        facts["bound_rad"] = report.path.lower_bound_rad
     return facts
 
 
@@ -129,7 +141,8 @@ def _serve(pipe: Connection, whole: bool) -> None:
         processor = Processor()
         facts: Facts
         try:
-            facts = _run(opl.load_job(path), path.parent / "out", whole, opl.Watch(processor))
+            job, watch = opl.load_job(path), opl.Watch(processor)
+            facts = _program(job, path.parent / "out", watch) if whole else _path(job, watch)
         except opl.InputError as error:
             facts = {"status": "bad input", "cause": str(error)}
         except Exception as error:  # what breaks here is a case, not the end of the benchmark

@@ -38,6 +38,7 @@ def show_run(report: opl.Report, job: opl.Job, written: Sequence[Path], verbose:
     if report.path is not None:
         lines += _facts(report, job)
     if verbose:
+        lines += _parts(report)
         for stage, label in STAGES.items():
             if stage in report.seconds:
                 lines.append(f"  {label}: {report.seconds[stage]:.3f} s")
@@ -166,6 +167,22 @@ def _times(report: opl.Report, robot: str) -> Iterator[str]:
             f"joint accelerations of {robot} are assumed, and these times with them; "
             f"{opl.keys.PROCESS_MAX_ACCELERATION} knows better"
         )
+
+
+_PARTS = {
+    "from_home": "from home to pass {}",
+    "approach": "approach of pass {}",
+    "pass": "pass {}",
+    "retract": "retract of pass {}",
+    "link": "link to pass {}",
+    "to_home": "to home",
+}
+
+
+def _parts(report: opl.Report) -> Iterator[str]:
+    """Yield how long each part of the cycle takes."""
+    for one in () if report.cycle is None else report.cycle.parts:
+        yield f"  {_PARTS[one.part].format(one.pass_)}: {one.seconds:.2f} s of the cycle"
 
 
 def show_proof(report: Mapping[str, Any], robot: str) -> None:

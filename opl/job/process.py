@@ -11,8 +11,9 @@ from pydantic import ConfigDict, Field
 
 from opl.cell.robot import Robot
 from opl.files.documents import Document
+from opl.files.quantities import Positive, between
 from opl.geometry.frames import Array
-from opl.job.bodies import MM, Positive, Six
+from opl.job.bodies import MM, Six
 from opl.motion.process_settings import ProcessSettings
 
 SixPositive = Annotated[list[Positive], Field(min_length=6, max_length=6)]
@@ -27,7 +28,7 @@ class ProcessSection(Document):
         "contact_speed": "max_contact_speed",
     }
 
-    feed_mm_s: Positive = Field(
+    feed_mm_s: Annotated[float, between(0.01, 10_000.0)] = Field(
         description="Speed of the ground point along the surface of the part."
     )
     home_deg: Six | None = Field(
@@ -35,15 +36,19 @@ class ProcessSection(Document):
         description="Joint positions at the start and the end of the program; given here or in the "
         "cell file.",
     )
-    approach_mm: Positive = Field(
-        default=50.0, description="Length of approach and retract off the wheel."
+    approach_mm: Annotated[float, between(0.01, 2000.0)] = Field(
+        default=50.0,
+        description="Longest that approach and retract lead off the wheel; they end where the "
+        "straight free move from there is proven free.",
     )
     approach_turn_deg: Annotated[float, Field(ge=0.0, le=90.0)] = Field(
         default=0.0,
         description="0 for an approach straight along the contact normal; else the angle of an arc "
         "along the belt, from -y to +y of the contact frame.",
     )
-    approach_mm_s: Positive = Field(default=50.0, description="Speed of approach and retract.")
+    approach_mm_s: Annotated[float, between(0.01, 10_000.0)] = Field(
+        default=50.0, description="Speed of approach and retract."
+    )
     free_move_speed_percent: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
         default=10.0,
         description="Speed of free moves, from and to home and between passes: part of each "

@@ -8,6 +8,7 @@ moves, now at rest at both ends of each run between two stops.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from opl.cell.robot import Robot
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, fastest_law
 from opl.program.actions import Call, Dwell, WaitInput
-from opl.program.moves import CycleTime, Move, Program, Purpose
+from opl.program.moves import CycleTime, Move, PartTime, Program, Purpose
 from opl.program.settings import ProgramSettings
 
 
@@ -34,20 +35,24 @@ def cycle_time(
     Raises:
         UnsafeError: If the time law does not keep the joints' limits.
     """
-    spent = dict.fromkeys(Purpose, 0.0)
+    seconds: list[tuple[Move, float]] = []  # of each move but the first, ramps included
     ramps = 0.0
     for moves in _runs(program.moves):
         limits = JointLimits(robot.max_speed, _acceleration(moves[1:], robot, settings))
         wanted = np.array([move.duration or 0.0 for move in moves[1:]])
         q = np.array([move.q for move in moves])
-        longer = 0.0
+        longer = np.zeros(len(wanted))
         if wanted.min(initial=np.inf) > 0.0:
             law = fastest_law(rounded_line(q, wanted), limits, at_rest=True)
-            longer = float(law.time[-1] - wanted.sum())
-        ramps += longer
-        spent[moves[1].kind] += longer
-        for move, time in zip(moves[1:], wanted, strict=True):
-            spent[move.kind] += times.get(move.motion_index, float(time))
+            longer = np.diff(law.node_times) - wanted
+        ramps += float(longer.sum())
+        for move, time, more in zip(moves[1:], wanted, longer, strict=True):
+            seconds.append((move, times.get(move.motion_index, float(time)) + float(more)))
+    spent = dict.fromkeys(Purpose, 0.0)
+    for move, time in seconds:
+        spent[move.kind] += time
+    runs = groupby(seconds, key=lambda one: one[0].part)
+    parts = [PartTime(part, index, sum(time for _, time in run)) for (part, index), run in runs]
     actions = [action for move in program.moves for action in move.actions]
     return CycleTime(
         passes=spent[Purpose.WHEEL],
@@ -56,6 +61,7 @@ def cycle_time(
         waits=sum((one.seconds for one in actions if isinstance(one, Dwell)), 0.0),
         ramps=ramps,
         open_ended=any(isinstance(one, (WaitInput, Call)) for one in actions),
+        parts=tuple(parts),
     )
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from opl.errors import UnsafeError
 from opl.geometry.frames import Array
-from opl.motion.motion import Motion, Phase, TimedMotion, VerifiedMotion
+from opl.motion.motion import Motion, MoveKind, Phase, TimedMotion, VerifiedMotion
 from opl.program.actions import NO_ACTIONS, Action, Actions
 from opl.program.stops import actions_at, stops_at
 
@@ -45,6 +45,27 @@ class Purpose(str, Enum):
         return {Phase.GRINDING: cls.WHEEL, Phase.FREE: cls.AIR}.get(phase, cls.LEAD)
 
 
+class Part(str, Enum):
+    """What part of a cycle a move belongs to."""
+
+    FROM_HOME = "from_home"
+    APPROACH = "approach"
+    PASS = "pass"
+    RETRACT = "retract"
+    LINK = "link"  # to the pass it is counted with
+    TO_HOME = "to_home"
+
+    @classmethod
+    def of(cls, phase: Phase, kind: MoveKind, pass_index: int) -> Part:
+        """Return the part of a move by what happens during it; a pass of -1 is none."""
+        if phase is not Phase.FREE:
+            parts = {Phase.APPROACHING: cls.APPROACH, Phase.RETRACTING: cls.RETRACT}
+            return parts.get(phase, cls.PASS)
+        if kind is MoveKind.LINK:
+            return cls.LINK
+        return cls.FROM_HOME if pass_index >= 0 else cls.TO_HOME
+
+
 @dataclass(frozen=True, eq=False)
 class Move:
     """A move.
@@ -59,6 +80,7 @@ class Move:
         motion_index: Index of that configuration in the motion.
         kind: What it is for.
         ground_pass: The pass ground during the whole move, counted from 0, None off the wheel.
+        part: The part of the cycle it belongs to, and its pass, counted from 0; -1 for none.
         straight: Whether the tool point runs on a straight line instead of the joints.
         comment: What a person reads before the move.
         actions: What is done once the robot has come to rest there.
@@ -72,6 +94,7 @@ class Move:
     duration: float | None = None
     kind: Purpose = Purpose.AIR
     ground_pass: int | None = None
+    part: tuple[Part, int] = (Part.FROM_HOME, -1)
     straight: bool = False
     comment: str | None = None
     actions: tuple[Action, ...] = ()
@@ -101,6 +124,21 @@ class PassTime:
 
 
 @dataclass(frozen=True)
+class PartTime:
+    """How long a part of a cycle takes.
+
+    Attributes:
+        part: The part.
+        pass_index: The pass that it grinds, or leads to or from, counted from 0; -1 to home.
+        seconds: Its time in [s], ramps included, waits not.
+    """
+
+    part: Part
+    pass_index: int
+    seconds: float
+
+
+@dataclass(frozen=True)
 class CycleTime:
     """How long a program runs, from its first configuration to its last.
 
@@ -111,6 +149,7 @@ class CycleTime:
         waits: Standing still because the program says so in [s].
         ramps: What of all this is beyond the written speeds, coming up to them and to rest, in [s].
         open_ended: Whether it also waits for inputs or runs other programs, for times unknown.
+        parts: Its parts in order, each between two changes of what is done.
     """
 
     passes: float
@@ -119,6 +158,7 @@ class CycleTime:
     waits: float
     ramps: float
     open_ended: bool
+    parts: tuple[PartTime, ...] = ()
 
     @property
     def total(self) -> float:
@@ -209,6 +249,7 @@ def plan_moves(
                 duration=times[m] if m else None,
                 kind=Purpose.of(phase),
                 ground_pass=pass_here if phase is Phase.GRINDING else None,
+                part=(Part.of(phase, motion.kind[m], pass_here), pass_here),
                 comment=comment if pass_here != pass_before else None,
                 actions=done_there.get(m, ()),
             )

@@ -151,6 +151,14 @@ def _cycle(cycle: CycleTime | None, robot: Robot) -> result.CycleReport | None:
         ramps_s=round(cycle.ramps, 3),
         open_ended=cycle.open_ended,
         accelerations_assumed=robot.acceleration_assumed,
+        parts=[
+            result.PartReport(
+                one.part.value,
+                one.pass_index + 1 if one.pass_index >= 0 else None,
+                round(one.seconds, 3),
+            )
+            for one in cycle.parts
+        ],
     )
 
 

@@ -106,6 +106,15 @@ class FeedReport:
 
 
 @dataclass(frozen=True)
+class PartReport:
+    """How long a part of the program runs, ramps included, waits not; passes count from 1."""
+
+    part: str  # from_home, approach, pass, retract, link, to_home
+    pass_: int | None  # the pass it grinds, or leads to or from; None for to_home
+    seconds: float
+
+
+@dataclass(frozen=True)
 class CycleReport:
     """How long the program runs, ramps included."""
 
@@ -117,6 +126,7 @@ class CycleReport:
     ramps_s: float  # of all this, coming up to speed and to rest
     open_ended: bool  # it also waits for inputs or runs other programs
     accelerations_assumed: bool
+    parts: Sequence[PartReport]  # in the order of the program
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from opl.job.search import Method, Objective, Search
 from opl.motion.figures import Figures, figures_of_path, figures_of_points
+from opl.motion.short_ways import shortened
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import ObjectiveWeights
 from opl.planning.equals import quickest_of_equals
@@ -27,6 +28,7 @@ class FoundPaths:
 
     Attributes:
         plan: The path by the method and for the objective of the job, the quickest of its equals.
+            Its approaches and retracts are no longer than they need be.
         recursive: That of the paper's search; the same if the job wants nothing better.
     """
 
@@ -48,7 +50,9 @@ def search_path(search: Search, problem: GrindingProblem) -> FoundPaths:
     plan = recursive
     if search.method is Method.OPTIMAL:
         plan = _search_best(search, problem, recursive)
-    return FoundPaths(quickest_of_equals(problem, plan, search.counts_ranges), recursive)
+    quickest = quickest_of_equals(problem, plan, search.counts_ranges)
+    motion = shortened(quickest.motion, problem.scene.free_moves.joined)
+    return FoundPaths(replace(quickest, motion=motion), recursive)
 
 
 def _search_best(search: Search, problem: GrindingProblem, recursive: Plan) -> Plan:

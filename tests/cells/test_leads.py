@@ -119,10 +119,11 @@ def test_a_program_comes_and_goes_on_arcs(planned):
         if kind == "approach":  # from the contact away; the free move ends at the far end
             lead = [lead[0] - 1, *lead][::-1]
         touch = lead[0] - int(side)
-        assert len(lead) == 12 and rows[touch]["kind"] == "grind"
+        # cut short where the straight free move from there is free
+        assert 1 < len(lead) <= 12 and rows[touch]["kind"] == "grind"
         R = wheel.T_base_contact(float(rows[touch]["t"]))[:3, :3]
         x, y, z = ((flange[lead] - flange[touch]) @ R).T
-        angle = np.deg2rad(5.0) * np.arange(1, 13)
+        angle = np.deg2rad(5.0) * np.arange(1, len(lead) + 1)
         np.testing.assert_allclose(x, 0.0, atol=0.02)  # pulses and printed digits
         np.testing.assert_allclose(y, side * radius * np.sin(angle), atol=0.02)
         np.testing.assert_allclose(z, -radius * (1.0 - np.cos(angle)), atol=0.02)

@@ -75,3 +75,21 @@ def test_the_parts_of_a_grinding_program_add_up_to_its_written_times_and_ramps()
     # the quicker the joints, the nearer to the written speeds
     quick = replace(ROBOT, max_acceleration=100.0 * ROBOT.max_acceleration)
     assert cycle_time(planned, written.times, quick, settings).ramps < 0.05 * found.ramps
+
+
+def test_the_time_of_every_part_is_told_in_order():
+    planned = plan_moves(verified_motion(), "A", MAX_SPEED)
+    written = write_jobs(planned, ROBOT, PLAIN, DX200, DATE)
+    found = cycle_time(planned, written.times, ROBOT, PLAIN)
+    names = [part.part.value for part in found.parts]
+    one = ["approach", "pass", "retract"]
+    assert names == ["from_home", *one, "link", *one, "to_home"]
+    assert [part.pass_index for part in found.parts] == [0, 0, 0, 0, 1, 1, 1, 1, -1]
+    assert all(part.seconds > 0.0 for part in found.parts)
+    for purpose, members in (
+        (found.passes, {"pass"}),
+        (found.leads, {"approach", "retract"}),
+        (found.air, {"from_home", "link", "to_home"}),
+    ):
+        total = sum(part.seconds for part in found.parts if part.part.value in members)
+        assert total == pytest.approx(purpose)
