@@ -9,13 +9,14 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.families import GROWN, Placement, grown
+from opl.planning.families import GROWN, Placement
 from opl.planning.images import Seams
 from opl.planning.nodes import inverse_solutions
 from opl.planning.problem import GrindingProblem, wheel_distances
+from opl.planning.rows import Row
 from opl.search.box import JointBox
-from opl.search.in_box import clipped, missing_chords, sampled
 from opl.search.in_box import missing as missing_of
+from opl.search.in_box import missing_chords, sampled
 
 FINE = 33  # contact positions of a place at which a box is held against it
 ROW_SAMPLES = 8  # between two cutter points at one contact position
@@ -71,41 +72,6 @@ class Columns:
     def missing(self, box: JointBox) -> Array:
         """Return by how much a box must grow for each place, in [rad], shape (n,)."""
         return missing_chords(self.q, self.free, box)
-
-
-@dataclass(frozen=True)
-class Row:
-    """Places of a pass at one contact position.
-
-    Attributes:
-        places: Increasing, shape (m,).
-        contact_position: Theirs.
-        must: Whether motions in the box have to pass it there.
-        q: Placed postures in [rad], NaN where there are none, shape (m, 6).
-    """
-
-    places: Array
-    contact_position: float
-    must: bool
-    q: Array
-
-    def missing(self, box: JointBox) -> float:
-        """Return by how much a box must grow to hold one of them."""
-        return float(missing_chords(self.q[None], ~np.isnan(self.q[None, :, 0]), box)[0])
-
-    def grown(self, box: JointBox) -> JointBox:
-        """Return the box grown until it holds one of them, if there is any."""
-        return grown(self.q[None], ~np.isnan(self.q[None, :, 0]), box) or box
-
-    def inside(self, box: JointBox) -> Array:
-        """Return where the box holds them: first and last place of every stretch, shape (k, 2)."""
-        enter, leave = (share[0] for share in clipped(self.q[None], box))
-        hit = np.flatnonzero(leave >= enter)
-        step = np.diff(self.places)[hit]
-        first = self.places[hit] + enter[hit] * step
-        last = self.places[hit] + leave[hit] * step
-        starts = np.append(True, first[1:] > last[:-1] + 1e-9)[: len(hit)]
-        return np.stack([first[starts], np.append(last[:-1][starts[1:]], last[-1:])], axis=1)
 
 
 class ColumnSampler:

@@ -15,7 +15,7 @@ import numpy as np
 
 from opl.cell.collision import CollisionScene
 from opl.geometry.frames import Array
-from opl.planning.box_columns import Columns, ColumnSampler, Row
+from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.costs import CostWeights, track_cost
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.images import wrist_flips
@@ -23,6 +23,7 @@ from opl.planning.nodes import NodeField, NodeMatrix
 from opl.planning.open_matrix import Track, open_matrices
 from opl.planning.plan import Found, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem
+from opl.planning.rows import Row, levels, shut_edges
 from opl.planning.symmetry import twins
 from opl.search.box import JointBox
 from opl.search.in_box import missing as missing_of
@@ -34,7 +35,6 @@ SAMPLES = 17  # contact positions of a place
 ROUNDS = 3  # of sampling closer around a track
 MOST_PARTS = 8  # into which an edge that bulges is cut at once
 FINE_SHARE = 3e-5  # of the box: what an edge may bulge
-SAME = 1e-5  # cutter points that two places are apart at the least
 LEVELS = 4  # contact positions of a sweep that are looked at
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
@@ -98,7 +98,7 @@ class BoxTracks:
         """
         inner = box.widened(room / 2.0)
         t, spacing = samples_in(columns.t, columns.q, columns.free, inner, SAMPLES)
-        t = np.concatenate([t, _levels(columns.places, rows, inner, t[:, :1])], axis=1)
+        t = np.concatenate([t, levels(columns.places, rows, inner, t[:, :1])], axis=1)
         at = self._sampler.at(columns.places, columns.points, columns.placements, t)
         coarse = sampled = _Sampled(self, at, rows, inner)
         track = sampled.smoothest()
@@ -138,24 +138,6 @@ class Bulges:
     sweeps: tuple[tuple[float, float, bool], ...]
 
 
-def _levels(places: Array, rows: Sequence[Row], box: JointBox, otherwise: Array) -> Array:
-    """Return the contact positions of the rows that a box holds at each place, shape (n, k).
-
-    Where there are fewer than at another place, ``otherwise``, shape (n, 1), is repeated.
-    """
-    found: list[list[float]] = [[] for _ in places]
-    for row in rows:
-        for first, last in row.inside(box):
-            low, high = np.searchsorted(places, [first - SAME, last + SAME])
-            for k in range(low, high):
-                found[k].append(row.contact_position)
-    most = max(len(levels) for levels in found)
-    levels = np.repeat(otherwise, most, axis=1)
-    for k, own in enumerate(found):
-        levels[k, : len(own)] = own
-    return levels
-
-
 class _Sampled:
     """The nodes of some places at contact positions of their own."""
 
@@ -177,26 +159,9 @@ class _Sampled:
             wheel_distance=np.zeros(columns.t.shape),
         )
         self.matrices = open_matrices(self.problem)
-        shut = self._shut_edges()
+        shut = shut_edges(columns.places, columns.t, rows, box)
         for matrix in self.matrices:
             matrix.blocked.update(shut)
-
-    def _shut_edges(self) -> list[int]:
-        """Return the keys of the edges that pass a row where it lies outside of the box."""
-        places, t = self._columns.places, self._columns.t
-        n_rows, found = t.shape[1], []
-        for row in self._rows:
-            first, last = row.inside(self._box).T
-            on = np.flatnonzero((places[:-1] >= row.places[0]) & (places[1:] <= row.places[-1]))
-            # a stretch of the row that begins before the end of the edge ends after its start
-            begun = np.searchsorted(first, places[on + 1] + SAME)
-            over = np.searchsorted(last, places[on] - SAME)
-            edge = on[begun <= over]
-            below = t < row.contact_position
-            passed = below[edge][:, :, None] != below[edge + 1][:, None, :]
-            k, here, there = np.nonzero(passed)
-            found += ((edge[k] * n_rows + here) * n_rows + there).tolist()
-        return found
 
     def sweep(self) -> None:
         """Close every node that collides."""
