@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.box_columns import Columns, ColumnSampler, Row
+from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.box_track import BoxTracks, Bulges
 from opl.planning.columns import ColumnWalls, Sweep
 from opl.planning.costs import CostWeights
@@ -21,6 +21,7 @@ from opl.planning.families import Families, Fit, Placement, grown
 from opl.planning.images import Images, seams_of
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
+from opl.planning.rows import Row
 from opl.search.box import JointBox
 from opl.search.least_box import BoxProof, Candidate
 from opl.search.smooth import Travel
