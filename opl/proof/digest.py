@@ -44,6 +44,15 @@ def other_inputs(
     return [] if marks == {inputs_mark(inputs).split()[1]} else ["unknown which"]
 
 
+def read_result(content: bytes) -> dict[str, object]:
+    """Return what a result.json says, nothing if it is none."""
+    try:
+        result = json.loads(content)
+    except (ValueError, RecursionError):
+        return {}
+    return result if isinstance(result, dict) else {}
+
+
 def digests_in(result: Mapping[str, object]) -> dict[str, str]:
     """Return the digests of files in a result.json, by their names; none if it has none."""
     program = result.get("program")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -13,7 +12,7 @@ from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.job.refusals import keys_named
-from opl.proof.digest import changed_since, digests_in, other_inputs
+from opl.proof.digest import changed_since, digests_in, other_inputs, read_result
 from opl.proof.prove import Proof, prove
 from opl.run.delivery import RESULT
 from opl.run.listings import read_program
@@ -77,7 +76,7 @@ def prove_program(job: Job, files: Sequence[Path], watch: Watch | None = None) -
     findings, as_written = _compared_with_results(content, results)
     proof = replace(found, findings=(*found.findings, *findings))
     kept = [keeps_stamp(data) for data in content.values()]
-    changed = None if None in kept else not all(kept)
+    changed = True if False in kept else None if None in kept else False
     differing = [other_inputs(data, job.inputs, results[path]) for path, data in content.items()]
     others = (
         None
@@ -117,11 +116,10 @@ def _report(job: Job, points: CutterPoints, proof: Proof) -> dict[str, Any]:
 def _result_beside(path: Path, job: Job) -> Mapping[str, object] | None:
     """Return the result.json beside a file, None if there is none of this job with a program."""
     try:
-        result = json.loads((path.parent / RESULT).read_bytes())
-    except (OSError, ValueError, RecursionError):
+        result = read_result((path.parent / RESULT).read_bytes())
+    except OSError:
         return None
-    ours = isinstance(result, dict) and result.get("job") == job.name
-    return result if ours and digests_in(result) else None
+    return result if result.get("job") == job.name and digests_in(result) else None
 
 
 def _compared_with_results(
