@@ -112,7 +112,8 @@ def test_the_stages_one_by_one_make_the_program_of_the_whole_run(job, watched, m
     assert isinstance(run, opl.Written)
     assert run.proven is proven and proven.planned is planned and planned.surfaced is surfaced
     whole = watched[0]
-    assert list(run.files) == list(whole.files) == ["V_SHAPE.JBI", "V_SHAPE.csv"]
+    names = ["V_SHAPE.JBI", "V_SHAPE.csv", "V_SHAPE_motion.json"]
+    assert list(run.files) == list(whole.files) == names
     assert run.files["V_SHAPE.csv"] == whole.files["V_SHAPE.csv"]
 
 
