@@ -261,6 +261,58 @@ def least_box(cells, spans, low, high, box_low, box_high, x, lost, missed, price
     return bound - ROUND_OFF
 
 
+@njit("float64(float64[:,::1],int64,float64[:,::1],float64[::1],float64[::1])", cache=True)
+def _pressed(cells, cell, prices, low, high):  # type: ignore[no-untyped-def]
+    """Return how far a cell presses the faces of a core outwards at the least, at their prices."""
+    start, end = 0.0, 0.0
+    for j in range(6):
+        up, down = prices[j, 0], prices[j, 1]
+        out = up * (cells[cell, 12 + j] - high[j]) + down * (low[j] - cells[cell, 18 + j])
+        start += out + (up - down) * cells[cell, j]
+        end += out + (up - down) * cells[cell, 6 + j]
+    return min(start, end)
+
+
+@njit(
+    "float64(float64[:,::1],int64[:,::1],float64[:,:,::1],float64[::1],float64[::1],float64)",
+    cache=True,
+)
+def trim(cells, spans, prices, low, high, closing):  # type: ignore[no-untyped-def]
+    """Cut cells off the ends of spans that no box below a size can hold; return a bound in [rad].
+
+    At the prices of a linear program each wall adds to the bound what its cheapest cell does, and
+    whoever takes another cell of it pays the difference. Infinite if a wall has no cell left.
+
+    Args:
+        cells: The table of `Cells`.
+        spans: One of each wall, shape (k, 5); they become shorter.
+        prices: As of `least_box`.
+        low: The lower faces of the box are not above these, in [rad], shape (6,).
+        high: The upper faces are not below these.
+        closing: The size in [rad].
+    """
+    k = len(spans)
+    least = np.full(k, np.inf)
+    total = 0.0
+    for j in range(6):
+        total += high[j] - low[j]
+    for w in range(k):
+        for cell in range(spans[w, 3], spans[w, 4]):
+            least[w] = min(least[w], _pressed(cells, cell, prices[w], low, high))
+        total += least[w]
+    for w in range(k):
+        most = closing - (total - least[w]) + ROUND_OFF
+        first, end = spans[w, 3], spans[w, 4]
+        while first < end and _pressed(cells, first, prices[w], low, high) >= most:
+            first += 1
+        while first < end and _pressed(cells, end - 1, prices[w], low, high) >= most:
+            end -= 1
+        if first == end:
+            return np.inf
+        spans[w, 3], spans[w, 4] = first, end
+    return total - ROUND_OFF
+
+
 @njit("float64(float64[:,::1],int64,int64,float64[::1],float64[::1])", cache=True)
 def distance(cells, first, end, low, high):  # type: ignore[no-untyped-def]
     """Return by how much a box misses the chords of a span, in [rad]; 0 if a pad is not known."""
