@@ -21,7 +21,7 @@ def digests_in(result: bytes) -> dict[str, str]:
     """Return the digests in a result.json, by file name; none if it is not one."""
     try:
         digests = json.loads(result)["program"]["sha256"]
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         return {}
     return dict(digests) if isinstance(digests, dict) else {}
 

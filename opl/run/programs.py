@@ -9,6 +9,7 @@ from typing import Any
 
 from opl.cell.robot import Robot
 from opl.errors import InputError
+from opl.files.reading import MB, read_bytes
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
@@ -16,11 +17,13 @@ from opl.job.refusals import keys_named
 from opl.program.posts import reader_for
 from opl.proof.digest import changed_since, digests_in
 from opl.proof.prove import Proof, prove
-from opl.run.delivery import RESULT
+from opl.run.delivery import MOST_RESULT, RESULT
 from opl.run.reporting import replay_report
 from opl.run.result import VerificationReport
 from opl.run.surfacing import cut_surface
 from opl.run.watch import Stage, Watch
+
+MOST_PROGRAM = 20 * MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +108,8 @@ def _compared_with_results(files: Mapping[Path, bytes]) -> tuple[list[Finding], 
     findings, known = [], True
     for path, content in files.items():
         try:
-            digests = digests_in((path.parent / RESULT).read_bytes())
-        except OSError:
+            digests = digests_in(read_bytes(path.parent / RESULT, MOST_RESULT))
+        except InputError:
             digests = {}
         if path.name in digests:
             findings += changed_since(str(path), content, digests[path.name])
@@ -116,10 +119,7 @@ def _compared_with_results(files: Mapping[Path, bytes]) -> tuple[list[Finding], 
 
 
 def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}") from error
+    return read_bytes(path, MOST_PROGRAM)
 
 
 def describe_program(file: Path, robot: Robot) -> list[str]:
