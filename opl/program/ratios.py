@@ -26,6 +26,7 @@ from opl.program.parameters import AxisParameters, read_parameters
 
 # Readings nearer than this in [deg] give a ratio of too few digits: the pendant shows hundredths.
 LEAST_SPAN = 20.0
+MOST_PARAMETERS = 20 * MB
 # Farthest from zero pulses [deg] that two readings may meet zero degrees.
 ZERO_TOLERANCE = 0.1
 
