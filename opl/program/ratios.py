@@ -19,7 +19,7 @@ from opl.cell.robot import Robot
 from opl.errors import InputError
 from opl.files.documents import Document, read
 from opl.files.quantities import Number, Positive, Pulses
-from opl.files.reading import read_bytes
+from opl.files.reading import MB, read_bytes
 from opl.files.writing import write_file
 from opl.program.parameter_fit import choose_group
 from opl.program.parameters import AxisParameters, read_parameters
