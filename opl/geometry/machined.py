@@ -17,7 +17,7 @@ from pydantic import Field
 from opl.errors import InputError
 from opl.files import documents
 from opl.files.apart import apart
-from opl.files.quantities import Number, between
+from opl.files.quantities import between
 from opl.geometry.frames import Array
 from opl.geometry.mesh_surface import load_mesh_surface
 from opl.geometry.nurbs import NurbsSurface
@@ -110,7 +110,7 @@ _Parameter = Annotated[float, between(-1e9, 1e9)]
 _Knots = list[_Parameter]
 _Weight = Annotated[float, between(-1e6, 1e6)]
 _Degree = Annotated[int, between(-1, 20)]
-_Point = Annotated[list[Number], Field(min_length=3, max_length=3)]
+_Point = Annotated[list[_Parameter], Field(min_length=3, max_length=3)]
 _Parameters = Annotated[list[_Parameter], Field(min_length=2, max_length=2)]
 _Row = Annotated[list[_Point], Field(min_length=1)]
 _Loop = Annotated[list[_Parameters], Field(min_length=3)]
