@@ -15,8 +15,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.search.bounding import distance, least_box, tighten, trim
+from opl.search.bounding import distance, tighten, trim
 from opl.search.cells import END, FIRST, WALL, Cells
+from opl.search.relaxation import least_box
 from opl.search.walls import Image, Piece, Wall
 
 SETTLED = 0.1  # of the gap wanted: what the bend of the spans may lose where none is split further
