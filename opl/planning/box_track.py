@@ -177,7 +177,7 @@ class _Sampled:
             ladder = matrix.ladder_within(search._max_contact_change)
             asked = np.zeros_like(matrix.free)
             columns = np.arange(len(matrix.free))
-            for _ in range(MOST_ROUNDS):
+            for asking in range(MOST_ROUNDS + 1):
                 edges = matrix.blocked_edges
                 found = smoothest_within(ladder, edges, matrix.free, cost, search._most)
                 if found is None:
@@ -188,12 +188,10 @@ class _Sampled:
                 now = np.zeros_like(asked)
                 now[columns[new][charge > 0.0]] = True
                 now &= matrix.free & ~asked
-                if not now.any():
+                if asking == MOST_ROUNDS or not now.any():
                     return Track(index, found.rows)
                 cost.node_cost[now] += search.push_charge(matrix.nodes.q[now])
                 asked |= now
-            else:
-                return Track(index, found.rows)
         return None
 
     def closer(self, track: Track, spacing: Array) -> _Sampled:
