@@ -6,7 +6,7 @@ flipped. Which image a pass uses is its placement.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -160,7 +160,7 @@ class Families:
             box = larger
         return box
 
-    def fits(self, index: int, low: Array, high: Array, reference: bool) -> list[Fit]:
+    def _fits(self, index: int, low: Array, high: Array, reference: bool) -> list[Fit]:
         """Return how every image of every family of a pass fits into a box.
 
         Args:
@@ -187,3 +187,39 @@ class Families:
                 outside(q, np.ascontiguousarray(open_now), low, high, JUMP, missing, row)
                 found.append(Fit(placement, missing, row))
         return found
+
+    def hold(
+        self, box: JointBox, reference: int, known: Collection[float], allowed: float
+    ) -> tuple[list[Placement], list[float]]:
+        """Return the image of each pass that fits a box best, and where passes miss it most.
+
+        Args:
+            box: The box.
+            reference: The pass of which only the families themselves count, not their images.
+            known: Cutter points that are held against the box already.
+            allowed: What it may miss in [rad].
+
+        Returns:
+            The images, and the worst cutter point of each pass, the worst of all first.
+        """
+        placements, missed = [], []
+        for index in range(int(self._pass_index[-1]) + 1):
+            fits = self._fits(index, box.lower, box.upper, index == reference)
+            first = int(np.argmax(self._pass_index == index))
+            columns = range(first, first + len(fits[0].missing))
+            there = np.array([float(column) in known for column in columns])
+            # the image that the proof has in mind: the walls of the pass fit into the box
+            best = min(fits, key=lambda fit: _misfit(fit, there))
+            placements.append(best.placement)
+            missing = np.where(there, -1.0, best.missing)
+            worst = int(np.argmax(missing))
+            if missing[worst] > allowed:
+                missed.append((float(missing[worst]), float(first + worst)))
+        missed.sort(reverse=True)
+        return placements, list(dict.fromkeys(place for _, place in missed))
+
+
+def _misfit(fit: Fit, known: np.ndarray) -> tuple[float, float]:
+    """Return what a box misses of the walls of a pass, and of all its columns."""
+    at_walls = float(fit.missing[known].max(initial=0.0))
+    return round(at_walls, 2), float(fit.missing.max())

@@ -47,6 +47,7 @@ class Plan:
         checks: How many motions were checked, this one included.
         lower_bound: No motion through the cutter points has a smaller joint range sum, whatever the
             contact positions, in [rad]; None if no bound was wanted.
+        open_because: Why the bound is further off than wanted, in words; None if it is not.
         weighted: The weighted sum that was kept small, if one was.
     """
 
@@ -54,6 +55,7 @@ class Plan:
     motion: Motion
     checks: int
     lower_bound: float | None = None
+    open_because: str | None = None
     weighted: WeightedValue | None = None
 
     @property

@@ -101,6 +101,7 @@ def _path(planned: Planned) -> result.PathReport:
         intermediate_nodes=path.n_intermediate,
         lower_bound_rad=_rounded(plan.lower_bound),
         gap=_rounded(plan.gap),
+        open_because=plan.open_because,
         weighted=None
         if weighted is None
         else result.WeightedReport(
