@@ -92,10 +92,20 @@ def section(name: str, heading: str, *content: str) -> str:
     )
 
 
-def bullets(lines: Iterable[str], kind: str = "") -> str:
-    """Return lines as a list; nothing if there are none."""
-    items = "\n".join(f"<li>{text(line)}</li>" for line in lines)
-    return f'<ul class="{kind}">\n{items}\n</ul>' if items else ""
+def bullets(lines: Iterable[str], marks: Sequence[str | None] = ()) -> str:
+    """Return lines as a list, nothing if there are none; marks as of `table`."""
+    items = "\n".join(
+        f"<li>{marked(line, marks[k] if k < len(marks) else None)}</li>"
+        for k, line in enumerate(lines)
+    )
+    return f"<ul>\n{items}\n</ul>" if items else ""
+
+
+def marked(said: object, mark: str | None) -> str:
+    """Return text, as a button if it leads to a place in the viewer."""
+    if mark is None:
+        return text(said)
+    return f'<button type="button" data-mark="{text(mark)}">{text(said)}</button>'
 
 
 def table(
@@ -118,10 +128,7 @@ def table(
         return ""
     lines = []
     for k, row in enumerate(rows):
-        mark = marks[k] if k < len(marks) else None
-        first = text(row[0])
-        if mark is not None:
-            first = f'<button type="button" data-mark="{text(mark)}">{first}</button>'
+        first = marked(row[0], marks[k] if k < len(marks) else None)
         cells = "".join(f"<td>{text(cell)}</td>" for cell in row[1:])
         lines.append(f'<tr><th scope="row">{first}</th>{cells}</tr>')
     head = "".join(f'<th scope="col">{text(one)}</th>' for one in heads)

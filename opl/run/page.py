@@ -51,7 +51,7 @@ def run_page(run: Written | Refused, report: Report) -> str:
     motion = None if found is None else found.timing.timed.motion
     body = "\n".join(
         [
-            page_text.verdict(report, job),
+            page_text.verdict(report, job, data["marks"]),
             view_frame("The cell", data["views"], data["paints"], BOXES, found is not None),
             bullets(
                 f"{name} is drawn with fewer triangles than it is proven with"
@@ -147,16 +147,15 @@ def _marks(
             findings = run.cause.findings
             moves = moves_at(motion, [finding.where for finding in findings])
             for k, (finding, move) in enumerate(zip(findings, moves, strict=True)):
-                if move is None:
-                    continue
-                hit = finding.message.split(": ")[0].split(" and ")
-                marks[f"finding-{k}"] = {"move": move, "text": str(finding), "hit": hit}
-            first = next((mark for name, mark in marks.items() if "finding" in name), None)
-            if first is not None:
-                marks["start"] = first
+                if move is not None:
+                    hit = finding.message.split(": ")[0].split(" and ")
+                    marks[f"reason-{k}"] = {"move": move, "text": str(finding), "hit": hit}
     else:
-        place = blocked_place(report.reasons, prepared.survey, prepared.problem.wheel_distance)
-        if place is not None:
-            t = float(prepared.problem.field.contact_positions[place.pop("position")])
-            marks["start"] = {**place, "t": t}
-    return marks
+        t = prepared.problem.field.contact_positions
+        for k, reason in enumerate(report.reasons):
+            place = blocked_place(reason, prepared.survey, prepared.problem.wheel_distance)
+            if place is not None:
+                point, position = place
+                marks[f"reason-{k}"] = {"point": point, "t": float(t[position]), "text": reason}
+    first = next((mark for name, mark in marks.items() if name.startswith("reason-")), None)
+    return marks if first is None else {**marks, "start": first}

@@ -15,7 +15,7 @@ from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.scallop import ridge_height
 from opl.motion.motion import Motion, MoveKind, TimedMotion
-from opl.planning.survey import CODES, NodeState, NodeSurvey
+from opl.planning.survey import NodeState, NodeSurvey
 from opl.report import curves
 from opl.report.chart import chart_cells
 from opl.report.drawn import drawn_cell, drawn_passes, drawn_wheel, painted, views
@@ -39,6 +39,13 @@ EMPTY: dict[str, Any] = {
 }
 MOST_LOOKS = 600  # at the nearest pair along the motion, evenly in time, beside those on the wheel
 KINDS = tuple(MoveKind)
+NEARLY_FREE = (
+    NodeState.FREE,
+    NodeState.COLLISION,
+    NodeState.WHEEL,
+    NodeState.LIMITS,
+    NodeState.REACH,
+)
 
 Data = dict[str, Any]
 
@@ -104,39 +111,25 @@ def run_data(prepared: Prepared, planned: Planned | None, packer: Packer) -> Dat
     return data
 
 
-def blocked_place(reasons: Sequence[str], survey: NodeSurvey, distance: Array) -> Data | None:
-    """Return the place that the first reason names, as a mark; None if it names no cutter point.
+def blocked_place(reason: str, survey: NodeSurvey, distance: Array) -> tuple[int, int] | None:
+    """Return the cutter point that a reason begins with, and a contact position of it.
 
-    Of its contact positions the one that comes nearest to being free.
+    It is the middle one of a run of cutter points, at the contact position that comes nearest to
+    being free; None if the reason begins with no cutter point.
 
     Args:
-        reasons: Why there is no path, one line each.
+        reason: Why there is no path.
         survey: The nodes.
         distance: Of part and wheel at each node in [m], shape (N, M).
     """
-    for reason in reasons:
-        found = re.match(r"cutter points? (\d+)(?: to (\d+))?", reason)
-        if found is not None:
-            first, last = int(found[1]), int(found[2] or found[1])
-            return blocked_mark((first + last) // 2, survey, distance)
-    return None
-
-
-def blocked_mark(point: int, survey: NodeSurvey, distance: Array) -> Data:
-    """Return the cell of a cutter point that comes nearest to being free, as a mark."""
-    states = survey.states[point]
-    for state in (
-        NodeState.FREE,
-        NodeState.COLLISION,
-        NodeState.WHEEL,
-        NodeState.LIMITS,
-        NodeState.REACH,
-    ):
-        rows = np.flatnonzero(states == CODES[state])
-        if len(rows):
-            row = int(rows[distance[point, rows].argmax()])
-            return {"point": point, "position": row, "text": f"cutter point {point}"}
-    raise ValueError(f"cutter point {point} has no nodes")
+    found = re.match(r"cutter points? (\d+)(?: to (\d+))?", reason)
+    if found is None:
+        return None
+    point = (int(found[1]) + int(found[2] or found[1])) // 2
+    ranks = [NEARLY_FREE.index(state) for state in NodeState]
+    rank = np.array(ranks)[survey.states[point]]
+    rows = np.flatnonzero(rank == rank.min())
+    return point, int(rows[distance[point, rows].argmax()])
 
 
 def moves_at(motion: Motion, wheres: Sequence[str]) -> list[int | None]:

@@ -103,7 +103,7 @@ def test_a_motion_that_the_replay_refuses_begins_at_its_first_finding(tmp_path, 
     motion, first = run.reached.timing.timed.motion, run.cause.findings[0]
     assert motion.place(marks["start"]["move"]) == first.where
     assert set(marks["start"]["hit"]) == set(first.message.split(":")[0].split(" and "))
-    assert 'data-mark="finding-0"' in page
+    assert 'data-mark="reason-0"' in page
 
 
 def test_hostile_names_stay_text(tmp_path):
