@@ -79,6 +79,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from opl.version import VERSION
+
 if TYPE_CHECKING:
     from opl.cell.robot import Robot as Robot
     from opl.cell.robot import known_robots as known_robots
@@ -122,14 +124,14 @@ if TYPE_CHECKING:
     from opl.run.descriptions import cell_figures as cell_figures
     from opl.run.descriptions import describe_cell as describe_cell
     from opl.run.descriptions import describe_job as describe_job
+    from opl.run.listings import compare_programs as compare_programs
+    from opl.run.listings import describe_program as describe_program
     from opl.run.other_pages import batch_page as batch_page
     from opl.run.other_pages import cell_page as cell_page
     from opl.run.page import run_page as run_page
     from opl.run.points import points_files as points_files
     from opl.run.points import report_points as report_points
     from opl.run.programs import ProgramProof as ProgramProof
-    from opl.run.programs import compare_programs as compare_programs
-    from opl.run.programs import describe_program as describe_program
     from opl.run.programs import prove_program as prove_program
     from opl.run.reporting import make_report as make_report
     from opl.run.result import Report as Report
@@ -150,7 +152,7 @@ if TYPE_CHECKING:
     from opl.run.watch import Stage as Stage
     from opl.run.watch import Watch as Watch
 
-__version__ = "0.1.0"
+__version__ = VERSION
 
 # where each name is defined
 _HOMES = {
@@ -178,7 +180,8 @@ _HOMES = {
     "opl.run.other_pages": "batch_page cell_page",
     "opl.run.page": "run_page",
     "opl.run.points": "points_files report_points",
-    "opl.run.programs": "ProgramProof compare_programs describe_program prove_program",
+    "opl.run.listings": "compare_programs describe_program",
+    "opl.run.programs": "ProgramProof prove_program",
     "opl.run.reporting": "make_report",
     "opl.run.result": "Report to_json",
     "opl.run.stages": "plan_path run_job verify_motion write_program",
