@@ -106,7 +106,7 @@ def chart_image(
     across, up = (-(-least // n) for least, n in zip(LEAST_PIXELS, states.shape, strict=True))
 
     def pixels(cells: np.ndarray) -> np.ndarray:
-        return cells.repeat(across, axis=0).repeat(up, axis=1).swapaxes(0, 1)[::-1]
+        return np.asarray(cells.repeat(across, axis=0).repeat(up, axis=1).swapaxes(0, 1)[::-1])
 
     image, code = pixels(colours), pixels(states)
     y, x = np.ogrid[: code.shape[0], : code.shape[1]]
@@ -114,7 +114,9 @@ def chart_image(
         image[(code == state) & hatch(x, y)] *= 0.45
     image[pixels(singular & (states == 0)) & ((x % 9 - 4) ** 2 + (y % 9 - 4) ** 2 == 4)] *= 0.3
     file = io.BytesIO()
-    imsave(file, np.clip(image, 0.0, 1.0), format="png", metadata={"Software": None})
+    # no version in it
+    metadata: dict[str, Any] = {"Software": None}
+    imsave(file, np.clip(image, 0.0, 1.0), format="png", metadata=metadata)
     return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode("ascii")
 
 
