@@ -6,8 +6,9 @@ from pathlib import Path
 
 from opl.errors import InputError
 from opl.files import documents
+from opl.files.digests import digest
 from opl.job import keys
-from opl.proof.digest import digest, digests_in
+from opl.proof.digest import digests_in, read_result
 from opl.run.delivery import PAGE, RESULT
 
 JOBS = (".yaml", ".yml")
@@ -34,8 +35,8 @@ def find_page(target: Path, out: Path) -> Path:
         return _page_in(out / name, f"opl run {target}")
     page = _page_in(target.parent, "opl run on its job")
     result = target.parent / RESULT
-    known = digests_in(result.read_bytes()) if result.is_file() else {}
-    if known.get(target.name) != digest(target.read_bytes()):
+    known = digests_in(read_result(result.read_bytes())) if result.is_file() else {}
+    if digest(target.read_bytes()) not in known.values():
         raise InputError(
             str(target), f"is not the program that {page} shows, says the {RESULT} beside it"
         )
