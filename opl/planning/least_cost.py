@@ -166,7 +166,7 @@ def _cut(problem: GrindingProblem, places: np.ndarray, cells: _Cells) -> _Cells:
     The second derivative over a part lies within that over the whole, and pads fall with the
     square of the length. Cells whose pads are not known stay as they are.
     """
-    known = (cells.pad_high < UNKNOWN).all(axis=1)
+    known = np.asarray((cells.pad_high < UNKNOWN).all(axis=1))
     parts = np.where(known, PARTS, 1)
     source = np.repeat(np.arange(len(parts)), parts)
     number = np.arange(len(source)) - np.repeat(np.cumsum(parts) - parts, parts)
