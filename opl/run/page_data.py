@@ -75,7 +75,7 @@ def passes_data(surfaced: Surfaced, packer: Packer) -> tuple[Data, Data]:
     ridge = MICRONS * ridge_height(across, job.passes.pitch, job.cell.wheel.radius)
     paints = {
         "ridge": painted(ridge, "micrometres of ridge", packer),
-        "pass": painted(points.pass_index + 1.0, "pass", packer),
+        "pass": painted(points.pass_index.astype(np.float64) + 1.0, "pass", packer),
     }
     missed = surfaced.inspection.uncovered.points
     return drawn_passes(points, job.passes.pitch, missed, packer), paints
