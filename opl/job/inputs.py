@@ -16,11 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from opl.cell.robot import Robot
-from opl.errors import InputError
 from opl.files.digests import digest
 from opl.files.documents import content_of
+from opl.files.reading import MB, read_bytes
 from opl.job.source import Source
 
+MOST_BYTES = 100 * MB  # of a file that a job names
 _FILES = ("surface", "mesh", "pulse_ratios", "template")  # keys that name a file
 _SHAPE = re.compile(r"""filename\s*=\s*["']([^"']+)["']""")
 
@@ -78,7 +79,7 @@ def _robot_files(robot: Robot) -> Iterator[tuple[str, Path]]:
     folder = robot.urdf.parent
     yield "robot.yaml", folder / "robot.yaml"
     yield robot.urdf.name, robot.urdf
-    names = _SHAPE.findall(robot.urdf.read_text(encoding="utf-8", errors="replace"))
+    names = _SHAPE.findall(read_bytes(robot.urdf, MOST_BYTES).decode("utf-8", "replace"))
     for name in sorted(set(names)):
         path = folder / name.split("://")[-1]
         if path.is_file():
@@ -86,10 +87,7 @@ def _robot_files(robot: Robot) -> Iterator[tuple[str, Path]]:
 
 
 def _of_file(path: Path) -> str:
-    try:
-        return digest(path.read_bytes())
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}") from error
+    return digest(read_bytes(path, MOST_BYTES))
 
 
 def _numbers(value: object) -> Iterator[str]:

@@ -7,14 +7,16 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from opl.errors import InputError
 from opl.files.digests import keeps_stamp
+from opl.files.reading import read_bytes
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.job.refusals import keys_named
 from opl.proof.digest import changed_since, digests_in, other_inputs, read_result
 from opl.proof.prove import Proof, prove
-from opl.run.delivery import RESULT
+from opl.run.delivery import MOST_RESULT, RESULT
 from opl.run.listings import read_program
 from opl.run.reporting import replay_report
 from opl.run.result import VerificationReport
@@ -116,8 +118,8 @@ def _report(job: Job, points: CutterPoints, proof: Proof) -> dict[str, Any]:
 def _result_beside(path: Path, job: Job) -> Mapping[str, object] | None:
     """Return the result.json beside a file, None if there is none of this job with a program."""
     try:
-        result = read_result((path.parent / RESULT).read_bytes())
-    except OSError:
+        result = read_result(read_bytes(path.parent / RESULT, MOST_RESULT))
+    except InputError:
         return None
     return result if result.get("job") == job.name and digests_in(result) else None
 

@@ -9,6 +9,7 @@ import numpy as np
 from opl.cell.inverse_kinematics import ik_branch_name
 from opl.cell.robot import Robot
 from opl.files.digests import digest
+from opl.job.search import Objective
 from opl.motion.feed import SlowStretch
 from opl.program.moves import CycleTime
 from opl.proof.read_back import FileProof
@@ -89,7 +90,12 @@ def _compared(planned: Planned) -> dict[str, result.FiguresReport]:
 
 def _path(planned: Planned) -> result.PathReport:
     plan, search = planned.plan, planned.surfaced.job.search
-    path, weighted = plan.path, plan.weighted
+    path, known = plan.path, plan.objective
+    objective = None
+    if known is not None:
+        objective = result.ObjectiveReport(
+            *map(_rounded, (known.value, known.lower_bound, known.gap))
+        )
     return result.PathReport(
         method=search.method.value,
         objective=search.objective.value,
@@ -102,11 +108,8 @@ def _path(planned: Planned) -> result.PathReport:
         intermediate_nodes=path.n_intermediate,
         lower_bound_rad=_rounded(plan.lower_bound),
         gap=_rounded(plan.gap),
-        weighted=None
-        if weighted is None
-        else result.WeightedReport(
-            *map(_rounded, (weighted.value, weighted.lower_bound, weighted.gap))
-        ),
+        weighted=objective if search.objective is Objective.WEIGHTED else None,
+        objective_value=objective,
     )
 
 

@@ -33,8 +33,8 @@ class FixedReport:
 
 
 @dataclass(frozen=True)
-class WeightedReport:
-    """The weighted sum of the path, and its lower bound."""
+class ObjectiveReport:
+    """Travel in rad, time in s or weighted sum of the path, and its lower bound."""
 
     value: float
     lower_bound: float
@@ -68,7 +68,8 @@ class PathReport:
     intermediate_nodes: int
     lower_bound_rad: float | None  # no path has a smaller sum, whatever its contact positions
     gap: float | None  # fraction by which the sum may be above the least there is
-    weighted: WeightedReport | None
+    weighted: ObjectiveReport | None
+    objective_value: ObjectiveReport | None  # of travel, time or weighted sum
 
 
 @dataclass(frozen=True)
