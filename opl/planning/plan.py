@@ -20,12 +20,12 @@ from opl.planning.track_check import Free, check_track
 
 
 @dataclass(frozen=True)
-class WeightedValue:
-    """What is known of the least weighted sum.
+class ObjectiveValue:
+    """What is known of the least travel, time or weighted sum.
 
     Attributes:
         value: Of the path found.
-        lower_bound: No path through the cutter points at the field's contact positions has less.
+        lower_bound: No motion along the passes has less, whatever its contact positions.
     """
 
     value: float
@@ -48,7 +48,7 @@ class Plan:
         lower_bound: No motion through the cutter points has a smaller joint range sum, whatever the
             contact positions, in [rad]; None if no bound was wanted.
         open_because: Why the bound is further off than wanted, in words; None if it is not.
-        weighted: The weighted sum that was kept small, if one was.
+        objective: What was kept small, where that is not the joint range sum alone.
     """
 
     path: GrindingPath
@@ -56,7 +56,7 @@ class Plan:
     checks: int
     lower_bound: float | None = None
     open_because: str | None = None
-    weighted: WeightedValue | None = None
+    objective: ObjectiveValue | None = None
 
     @property
     def gap(self) -> float | None:
