@@ -18,7 +18,7 @@ from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.box_track import BoxTracks
 from opl.planning.columns import ColumnWalls, Sweep
 from opl.planning.costs import CostWeights
-from opl.planning.families import Families, grown
+from opl.planning.families import Families, few_columns, grown
 from opl.planning.images import Images, seams_of
 from opl.planning.obstructed import Obstructions
 from opl.planning.plan import Plan
@@ -74,7 +74,7 @@ class OptimalSearch:
         self._problem = problem
         self._points = problem.points
         self._settings = settings
-        seams = seams_of(problem.field.q)
+        seams = seams_of(problem.field.q[few_columns(problem.points.pass_index)])
         robot = problem.cell.robot
         largest, most = float((robot.upper - robot.lower).sum()), Travel(np.inf, np.inf)
         if fallback is not None:
