@@ -63,7 +63,7 @@ class SlowStretch:
 def slow_stretches(timing: Timing, process: ProcessSettings) -> tuple[SlowStretch, ...]:
     """Return the parts of the passes that are slower than the feed by a hundredth or more.
 
-    The ramps at both ends of a pass are not among them: the robot has to rest there.
+    The approaches and retracts are not among them.
     """
     slow = np.array([cause is not Cause.NONE for cause in timing.cause])
     index = timing.timed.motion.pass_index
@@ -79,8 +79,8 @@ def _runs(wanted: np.ndarray, index: np.ndarray) -> Iterator[np.ndarray]:
 
 def _stretch(timing: Timing, process: ProcessSettings, moves: np.ndarray) -> SlowStretch:
     motion, duration = timing.timed.motion, timing.timed.duration
-    speed = timing.surface_distance / np.maximum(duration, 1e-12)
-    longer = duration - timing.surface_distance / process.feed
+    speed = timing.distance / np.maximum(duration, 1e-12)
+    longer = duration - timing.distance / process.feed
     shares: dict[tuple[Cause, int], float] = {}
     for move in moves:
         key = (timing.cause[move], int(timing.joint[move]))

@@ -8,16 +8,18 @@ controller adds them. `opl.program.cycle` counts them.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.cell.robot import Robot
+from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.leads import lead_count
+from opl.motion.gradual import gradual, largest_ratio
 from opl.motion.motion import Motion, Phase, TimedMotion
 from opl.motion.process_settings import ProcessSettings
 from opl.motion.rounded import rounded_line
@@ -26,6 +28,7 @@ from opl.motion.time_law import JointLimits, TimeLaw, fastest_law
 # Wanted time of a move in [s] below which its end is no configuration of its own for the time law.
 SHORTEST = 1e-6
 FOLLOWED = 1.01  # a move that takes no longer than this times what is wanted keeps it
+SHORTEST_FREE = 0.05  # [s] of a free move: a shorter one is over before a robot is at its speed
 
 
 class Cause(str, Enum):
@@ -35,6 +38,7 @@ class Cause(str, Enum):
     PIVOTING = "pivoting"  # the contact moves over the wheel, which has a speed limit of its own
     SPEED = "speed"  # a joint turns at its top speed
     ACCELERATION = "acceleration"  # a joint speeds up or slows down as fast as it can
+    NEIGHBOUR = "neighbour"  # a move near by is slow, and speeds change gradually
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,16 +47,19 @@ class Timing:
 
     Attributes:
         timed: The motion with the time of every move.
-        surface_distance: What the ground point moves along the surface in [m], shape (n,); NaN
-            where the move does not stay on the wheel.
+        distance: What the ground point moves along the surface in [m], shape (n,); where the move
+            does not stay on the wheel, what the flange moves.
         cause: Why it is slower than the feed on each move, n items.
         joint: The joint that limits it, shape (n,); -1 where none does.
+        speed_ratio: Largest ratio of the speeds of neighbouring moves of a pass and its leads, as
+            `opl.motion.gradual` counts them.
     """
 
     timed: TimedMotion
-    surface_distance: Array
+    distance: Array
     cause: tuple[Cause, ...]
     joint: NDArray[np.int64]
+    speed_ratio: float
 
 
 def time_motion(
@@ -61,9 +68,10 @@ def time_motion(
     """Return how long the moves of a motion take, and why.
 
     The ground point passes along the surface at the feed, or slower where the contact position
-    moves fast over the wheel; approach and retract run at their speed; on free moves the joint that
-    takes longest runs at its share of its largest speed. Where a joint cannot follow, moves take as
-    long as it needs.
+    moves fast over the wheel. The moves onto the wheel and off it run at the feed, the others of
+    approach and retract at theirs; on free moves the joint that takes longest runs at its share of
+    its largest speed. Where a joint cannot follow, moves take as long as it needs. From approach to
+    retract the robot does not rest, and the speed changes gradually (`opl.motion.gradual`).
 
     Raises:
         UnsafeError: If the time law does not keep the limits it was given.
@@ -72,35 +80,79 @@ def time_motion(
     turned = np.abs(np.diff(motion.q, axis=0, prepend=motion.q[:1]))
     fastest = (turned / robot.max_speed).max(axis=1)
     arc = np.interp(motion.cutter_point, np.arange(len(points)), points.arc_length)
-    distance = np.where(grinding, np.abs(np.diff(arc, prepend=np.nan)), np.nan)
+    on_surface = np.where(grinding, np.abs(np.diff(arc, prepend=np.nan)), np.nan)
     over_wheel = np.abs(np.diff(motion.contact_position, prepend=np.nan)) / process.contact_speed
-    count = lead_count(process.approach_length, process.approach_turn)
-    lead = process.approach_length / count / process.approach_speed
-    wanted = np.where(motion.free, fastest / process.air_speed, lead)
-    wanted[grinding] = np.maximum(distance / process.feed, over_wheel)[grinding]
+    # the part is only moved on a lead, so every point of it moves as the flange does
+    p_flange = forward_kinematics(robot, motion.q)[:, :3, 3]
+    moved = np.linalg.norm(np.diff(p_flange, axis=0, prepend=p_flange[:1]), axis=1)
+    distance = np.where(grinding, on_surface, moved)
+    wanted = np.maximum(fastest / process.air_speed, np.where(motion.free, SHORTEST_FREE, 0.0))
+    wanted[grinding] = np.maximum(on_surface / process.feed, over_wheel)[grinding]
 
     duration = np.maximum(wanted, fastest)
     duration[0] = 0.0
     joint = np.where(fastest > wanted, (turned / robot.max_speed).argmax(axis=1), -1)
     by_acceleration = np.zeros(len(motion), dtype=bool)
-    for phase, moves in motion.runs():  # between two of them the robot rests
+    by_neighbour = np.zeros(len(motion), dtype=bool)
+    speed_ratio = 1.0
+    for moves in _without_rest(motion):
+        on_lead = ~grinding[moves]
+        way = np.where(on_lead, moved[moves], 0.0)
+        slowest = way / _lead_speed(way, on_lead, process)
+        duration[moves] = np.maximum(duration[moves], slowest)
         kept = moves[duration[moves] > SHORTEST]
-        if phase is Phase.FREE or not len(kept):
+        if not len(kept):
             continue
         rows = np.concatenate([[moves[0] - 1], kept])
-        law = _law(motion.q[rows], duration[kept], robot)
+        even = gradual(distance[kept], duration[kept], process.feed)
+        law = _law(motion.q[rows], even, robot)
         needed = np.diff(law.node_times)
-        slowed = needed > FOLLOWED * duration[kept]
+        slowed = needed > FOLLOWED * even
         limiting, accelerating = _limiting_joint(law)
         joint[kept[slowed]] = limiting[slowed]
         by_acceleration[kept[slowed]] = accelerating[slowed]
-        duration[kept] = np.maximum(needed, duration[kept])
+        followed_there = np.maximum(needed, even)
+        # what joints slow down, slows its neighbours
+        found = gradual(distance[kept], followed_there, process.feed)
+        by_neighbour[kept] = (even > FOLLOWED * duration[kept]) | (
+            found > FOLLOWED * followed_there
+        )
+        duration[kept] = found
+        speed_ratio = max(speed_ratio, largest_ratio(distance[kept], found, process.feed))
     cause = [Cause.NONE] * len(motion)
     for move in np.flatnonzero(grinding):
         if duration[move] * process.feed > FOLLOWED * distance[move]:
             slow = Cause.ACCELERATION if by_acceleration[move] else Cause.SPEED
-            cause[move] = Cause.PIVOTING if joint[move] < 0 else slow
-    return Timing(TimedMotion(motion, duration), distance, tuple(cause), joint)
+            other = Cause.NEIGHBOUR if by_neighbour[move] else Cause.PIVOTING
+            cause[move] = other if joint[move] < 0 else slow
+    return Timing(TimedMotion(motion, duration), distance, tuple(cause), joint, speed_ratio)
+
+
+def _without_rest(motion: Motion) -> Iterator[NDArray[np.intp]]:
+    """Yield the moves of each pass and its leads, from rest to rest."""
+    for free, runs in groupby(motion.runs(), key=lambda run: run[0] is Phase.FREE):
+        if not free:
+            by_pass = groupby(runs, key=lambda run: int(motion.pass_index[run[1][0]]))
+            for _, of_pass in by_pass:
+                yield np.concatenate([moves for _, moves in of_pass])
+
+
+def _lead_speed(way: Array, on_lead: NDArray[np.bool_], process: ProcessSettings) -> Array:
+    """Return how fast the moves of a pass and its leads may be for being near the wheel, in [m/s].
+
+    `way` is that of each move of a lead in [m], 0 of the others, shape (n,).
+    """
+    # how far from the contact the nearer end of each move is
+    ground = np.flatnonzero(~on_lead)
+    begins, ends = (ground[0], ground[-1]) if len(ground) else (len(way), len(way))
+    from_start = np.concatenate([np.cumsum(way[:begins][::-1])[::-1][1:], [0.0]])[:begins]
+    from_end = np.concatenate([[0.0], np.cumsum(way[ends + 1 :])[:-1]])[: len(way) - ends - 1]
+    near = np.zeros(len(way))
+    near[:begins], near[ends + 1 :] = from_start, from_end
+    speed = np.full(len(way), np.inf)
+    speed[near < process.approach_slow] = max(process.approach_speed, process.feed)
+    speed[near == 0.0] = process.feed
+    return speed
 
 
 def air_seconds(motion: Motion, robot: Robot, process: ProcessSettings) -> float:

@@ -94,7 +94,7 @@ def _rounded_ends(
     job: Job, motion: Motion, playback: Playback, reader: Reader
 ) -> Iterator[Finding]:
     """Look at how far corners may be rounded; the proof goes through them."""
-    corners, stops = reader.corners(job.program), motion.ends_phase
+    corners, stops = reader.corners(job.program), motion.ends_phase & ~motion.on_wheel
     for k, move in enumerate(playback.moves):
         limit = corners.stop if stops[k] else corners.of(Purpose.of(motion.phase[k]))
         if move.corner.size > limit.size * (1.0 + ROUND_OFF):
