@@ -40,7 +40,8 @@ Runs
 
 Results
     `make_report`       `Run` -> `Report`: the content of ``result.json``
-    `deliver`           `Run` -> program, table, pictures and ``result.json`` in a folder
+    `deliver`           `Run` -> program, table, pictures, page and ``result.json`` in a folder
+    `run_page`          `Run` -> its page: HTML that opens from disk; `find_page` finds one
     `claim_folder`      keeps a folder for the run of one job, from before its work
     `report_points`     `Surfaced` -> figures of its cutter points
     `points_files`      `Surfaced` -> table and picture of its cutter points, as texts
@@ -120,11 +121,12 @@ if TYPE_CHECKING:
     from opl.run.descriptions import cell_figures as cell_figures
     from opl.run.descriptions import describe_cell as describe_cell
     from opl.run.descriptions import describe_job as describe_job
+    from opl.run.listings import compare_programs as compare_programs
+    from opl.run.listings import describe_program as describe_program
+    from opl.run.page import run_page as run_page
     from opl.run.points import points_files as points_files
     from opl.run.points import report_points as report_points
     from opl.run.programs import ProgramProof as ProgramProof
-    from opl.run.programs import compare_programs as compare_programs
-    from opl.run.programs import describe_program as describe_program
     from opl.run.programs import prove_program as prove_program
     from opl.run.reporting import make_report as make_report
     from opl.run.result import Report as Report
@@ -141,6 +143,7 @@ if TYPE_CHECKING:
     from opl.run.values import Run as Run
     from opl.run.values import Surfaced as Surfaced
     from opl.run.values import Written as Written
+    from opl.run.viewing import find_page as find_page
     from opl.run.watch import Stage as Stage
     from opl.run.watch import Watch as Watch
 
@@ -169,13 +172,16 @@ _HOMES = {
     "opl.run.batch": "BatchRow find_jobs run_batch",
     "opl.run.delivery": "claim_folder deliver",
     "opl.run.descriptions": "cell_figures describe_cell describe_job",
+    "opl.run.page": "run_page",
     "opl.run.points": "points_files report_points",
-    "opl.run.programs": "ProgramProof compare_programs describe_program prove_program",
+    "opl.run.listings": "compare_programs describe_program",
+    "opl.run.programs": "ProgramProof prove_program",
     "opl.run.reporting": "make_report",
     "opl.run.result": "Report to_json",
     "opl.run.stages": "plan_path run_job verify_motion write_program",
     "opl.run.surfacing": "cut_surface",
     "opl.run.values": "Planned Prepared Proven Refused Run Surfaced Written",
+    "opl.run.viewing": "find_page",
     "opl.run.watch": "Stage Watch",
 }
 __all__ = sorted(name for names in _HOMES.values() for name in names.split())

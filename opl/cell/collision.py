@@ -48,8 +48,8 @@ class CollisionScene:
         self._n_links = self._geometry.ngeoms
         self._add_bodies(cell)
         self._pairs: list[BodyPair] = []
-        margins = self._choose_pairs(cell)
-        self._margins = np.array(margins)
+        self._needed = np.array(self._choose_pairs(cell))
+        self._margins = self._needed
         self._prepare(self._margins, range(0))
 
     def _prepare(self, margins: Array, unchecked: Iterable[int]) -> None:
@@ -137,6 +137,31 @@ class CollisionScene:
         hits = [pair for pair, hit in zip(self._pairs, results, strict=True) if hit.isCollision()]
         return list(dict.fromkeys(hits))
 
+    @property
+    def kept_apart(self) -> np.ndarray:
+        """Indices of the pairs that have to keep a distance, not only not to touch."""
+        return np.flatnonzero(self._needed > 0.0)
+
+    def pair(self, index: int) -> BodyPair:
+        """Return the names of a pair."""
+        return self._pairs[index]
+
+    def place(self, q: Array) -> None:
+        """Bring the solids to where they are at one configuration in [rad], shape (6,)."""
+        pin.updateGeometryPlacements(
+            self._model, self._data, self._geometry, self._geometry_data, q
+        )
+
+    def distance(self, index: int) -> tuple[float, Array]:
+        """Return how far a pair is apart as placed in [m], and where it is nearest, shape (2, 3).
+
+        The places are in the base frame; the distance is 0 or less in collision.
+        """
+        pin.computeDistance(self._geometry, self._geometry_data, index)
+        found = self._geometry_data.distanceResults[index]
+        places = np.array([found.getNearestPoint1(), found.getNearestPoint2()])
+        return float(found.min_distance), transform(self._T_base_world, places)
+
     def _compute(self, q: Array, stop_at_first: bool) -> bool:
         return bool(pin.computeCollisions(self._model, self._data, self._manager, q, stop_at_first))
 
@@ -144,6 +169,7 @@ class CollisionScene:
         """Add held bodies at the flange, wheel and obstacles at the base frame."""
         flange = self._model.frames[self._model.getFrameId("tool0")]
         base = self._model.frames[self._model.getFrameId("base")]
+        self._T_base_world = base.placement.inverse().homogeneous  # base does not move
         self._add(PART, _mesh(cell.part), flange, cell.T_flange_workpiece)
         for body in cell.fixture:
             self._add(body.name, _solid(body), flange, body.T_parent_body)

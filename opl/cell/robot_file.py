@@ -8,11 +8,10 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from opl.files.documents import Document, read
+from opl.files.quantities import Number, Positive
 
 N_JOINTS = 6
 FROM_URDF = "from the URDF"
-
-_Positive = Annotated[float, Field(gt=0)]
 
 
 class Sourced(Document):
@@ -33,24 +32,24 @@ class Base(Sourced):
     see ``controller_height_mm`` and ``controller_turn_deg``.
     """
 
-    height_mm: float
-    controller_height_mm: float | None = None
-    controller_turn_deg: float = 0.0
+    height_mm: Number
+    controller_height_mm: Number | None = None
+    controller_turn_deg: Number = 0.0
 
 
 class ArmNumbers(Sourced):
     """Link lengths, zero offsets and signs, as in `opl.cell.spherical_wrist` or `parallel_axes`."""
 
     family: Literal["spherical wrist", "parallel axes"] = "spherical wrist"
-    a1_mm: float
-    a2_mm: float | None = None  # spherical wrist only
-    b_mm: float
-    c1_mm: float
-    c2_mm: _Positive
-    c3_mm: float
-    c4_mm: float
-    c5_mm: float | None = None  # parallel axes only
-    offsets_deg: Annotated[list[float], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
+    a1_mm: Number
+    a2_mm: Number | None = None  # spherical wrist only
+    b_mm: Number
+    c1_mm: Number
+    c2_mm: Positive
+    c3_mm: Number
+    c4_mm: Number
+    c5_mm: Number | None = None  # parallel axes only
+    offsets_deg: Annotated[list[Number], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
     signs: Annotated[list[Literal[1, -1]], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
 
     @model_validator(mode="after")
@@ -78,14 +77,14 @@ class ArmNumbers(Sourced):
 class Payload(Sourced):
     """What the flange may carry."""
 
-    max_kg: _Positive
+    max_kg: Positive
 
 
 class Limits(Sourced):
     """Travel of a joint."""
 
-    lower_deg: float
-    upper_deg: float
+    lower_deg: Number
+    upper_deg: Number
 
     @model_validator(mode="after")
     def _in_order(self) -> Limits:
@@ -97,19 +96,19 @@ class Limits(Sourced):
 class TopSpeed(Sourced):
     """Top speed of a joint."""
 
-    max_deg_s: _Positive
+    max_deg_s: Positive
 
 
 class Acceleration(Sourced):
     """Largest acceleration of each joint, base first; makers hardly ever publish it."""
 
-    max_deg_s2: Annotated[list[_Positive], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
+    max_deg_s2: Annotated[list[Positive], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
 
 
 class PulseCounts(Sourced):
     """Encoder counts of a joint, as Yaskawa programs give them."""
 
-    per_degree: _Positive
+    per_degree: Positive
     verified: bool
 
 

@@ -11,6 +11,7 @@ import click
 
 import opl
 from opl.cli.inputs import FILE, cell, faces, points
+from opl.cli.pages import show_page, view
 from opl.cli.programs import show, templates, verify
 from opl.cli.progress import progress_bar
 from opl.cli.robots import robots
@@ -58,8 +59,15 @@ def main() -> None:
     help="Print the time of each part of the cycle and of each stage too.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print result.json instead of tables.")
+@click.option("--open", "opened", is_flag=True, help="Open report.html when the run has ended.")
 def run_job(
-    job: Path, out: Path | None, method: str | None, quiet: bool, verbose: bool, as_json: bool
+    job: Path,
+    out: Path | None,
+    method: str | None,
+    quiet: bool,
+    verbose: bool,
+    as_json: bool,
+    opened: bool,
 ) -> None:
     """Plan, prove and write the program of one job.
 
@@ -76,6 +84,8 @@ def run_job(
         click.echo(opl.to_json(report))
     elif not quiet:
         show_run(report, loaded, written, verbose)
+    if opened:
+        show_page(opl.find_page(folder, folder))
     if isinstance(run, opl.Refused):
         raise run.error
 
@@ -160,5 +170,5 @@ def schema(of_cells: bool, markdown: bool) -> None:
         click.echo(opl.to_json(opl.json_schema("cell" if of_cells else "job")))
 
 
-for _command in (cell, robots, show, templates, faces, points, verify):
+for _command in (cell, robots, show, templates, faces, points, verify, view):
     main.add_command(_command)

@@ -24,17 +24,22 @@ def show(program: Path, other: Path | None, robot: str, pulses: Path | None) -> 
 
     The suffix of the file names its language: .JBI, .mod, .src, .LS or .script.
 
-    With --diff, ends with status 0 if both programs do the same, with 1 if not.
+    What a controller would not take as it stands is said before the instructions, with the code
+    page of the text where it is not ASCII.
+
+    With --diff, what changed everywhere comes first, then what differs move by move, in degrees
+    and mm; comments, dates, labels and layout do not count. Ends with status 0 if both programs do
+    the same, with 1 if not.
 
     Example: opl show programs/V_SHAPE.JBI --diff programs/V_SHAPE_OLD.JBI
     """
-    if other is not None:
-        lines = opl.compare_programs(program, other)
-        click.echo("\n".join(lines) or "both do the same")
-        sys.exit(1 if lines else 0)
     owner = opl.load_robot(robot)
     if pulses is not None:
         owner = opl.with_ratios(owner, pulses)
+    if other is not None:
+        lines = opl.compare_programs(program, other, owner)
+        click.echo("\n".join(lines) or "both do the same")
+        sys.exit(1 if lines else 0)
     click.echo("\n".join(opl.describe_program(program, owner)))
 
 

@@ -15,6 +15,7 @@ from pydantic import Field
 
 from opl.errors import InputError
 from opl.files import documents
+from opl.files.quantities import Number, between
 from opl.geometry.frames import Array
 from opl.geometry.mesh_surface import load_mesh_surface
 from opl.geometry.nurbs import NurbsSurface
@@ -80,8 +81,13 @@ def load_machined(
     return Patchwork(faces)
 
 
-_Point = Annotated[list[float], Field(min_length=3, max_length=3)]
-_Parameters = Annotated[list[float], Field(min_length=2, max_length=2)]
+# of the net as of the knots; sizes of files bound how many there are
+_Parameter = Annotated[float, between(-1e9, 1e9)]
+_Knots = list[_Parameter]
+_Weight = Annotated[float, between(-1e6, 1e6)]
+_Degree = Annotated[int, between(-1, 20)]
+_Point = Annotated[list[Number], Field(min_length=3, max_length=3)]
+_Parameters = Annotated[list[_Parameter], Field(min_length=2, max_length=2)]
 _Row = Annotated[list[_Point], Field(min_length=1)]
 _Loop = Annotated[list[_Parameters], Field(min_length=3)]
 
@@ -89,12 +95,12 @@ _Loop = Annotated[list[_Parameters], Field(min_length=3)]
 class _SurfaceFile(documents.Document):
     """A face as it is written in a file."""
 
-    degree_u: int
-    degree_v: int
-    knots_u: list[float]
-    knots_v: list[float]
+    degree_u: _Degree
+    degree_v: _Degree
+    knots_u: _Knots
+    knots_v: _Knots
     control_points_mm: Annotated[list[_Row], Field(min_length=1)]
-    weights: list[list[float]]
+    weights: list[list[_Weight]]
     periodic_u: bool = False
     periodic_v: bool = False
     trim_loops: Annotated[list[_Loop], Field(min_length=1)] | None = None

@@ -19,8 +19,10 @@ from opl.geometry.frames import Array
 from opl.geometry.iso_lines import iso_curves
 from opl.geometry.order import shortest_links
 from opl.geometry.patchwork import Patchwork
-from opl.geometry.steps import balanced_steps
+from opl.geometry.steps import TooManyStepsError, steps_of
 from opl.geometry.toolpath import CutterPoints
+
+MOST_ROWS = 2000
 
 # error of the interpolated curve as a fraction of the bow height
 _CURVE_ERROR = 1e-3
@@ -162,7 +164,12 @@ def lay_passes(surface: MachinedSurface, passes: Passes) -> LaidPasses:
             inside = low + passes.margin - rounding <= offset <= high - passes.margin + rounding
             if repeat == 0 or inside:
                 rows.append(_row(curves_at(float(offset)), row, float(offset), passes))
-    laid = [_Laid(curve, passes) for row in rows for curve in row]
+    curves = [curve for row in rows for curve in row]
+    try:
+        nodes = steps_of(curves, passes.max_bow_height, passes.largest_step)
+    except TooManyStepsError as error:
+        raise PassesError(error.limit, str(error)) from error
+    laid = [_Laid(*one) for one in zip(curves, nodes, strict=True)]
     order = list(_ordered(rows, laid, passes.order))
     return LaidPasses(
         CutterPoints(
@@ -222,6 +229,12 @@ def _row_offsets(low: float, high: float, passes: Passes) -> Array:
             f"{1e3 * margin:g} mm on {1e3 * (high - low):.6g} mm there is room for {n_fitting}",
         )
     n = n_fitting if rows is None else rows
+    if n * passes.repeats > MOST_ROWS:
+        raise PassesError(
+            "pitch",
+            f"makes {n * passes.repeats} rows with their repeats, at most {MOST_ROWS} are laid; "
+            f"got {1e3 * pitch:g} mm",
+        )
     return 0.5 * (low + high) + pitch * (np.arange(n, dtype=np.float64) - 0.5 * (n - 1))
 
 
@@ -247,8 +260,8 @@ def _row(
 class _Laid:
     """A curve with its steps."""
 
-    def __init__(self, curve: SurfaceCurve, passes: Passes) -> None:
-        self.nodes = balanced_steps(curve, passes.max_bow_height, passes.largest_step)
+    def __init__(self, curve: SurfaceCurve, nodes: Array) -> None:
+        self.nodes = nodes
         self.frames = curve.frames(self.nodes)
         self.bending = curve.bending(self.nodes)
 

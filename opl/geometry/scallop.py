@@ -42,6 +42,29 @@ def scallop_pitch(curvature: Array, height: float, wheel_radius: float) -> Array
     return np.where(flat, straight, np.where(filled, np.inf, bent))
 
 
+def ridge_height(curvature: Array, pitch: float, wheel_radius: float) -> Array:
+    """Return how high the ridge stands that rows leave between them, `scallop_pitch` turned round.
+
+    Args:
+        curvature: Of the surface across the rows in [1/m], positive where it is round, shape (...).
+        pitch: Distance of two rows along the surface in [m].
+        wheel_radius: In [m].
+
+    Returns:
+        In [m], shape (...); 0 in a hollow that the wheel fills, NaN where the rows are farther
+        apart than two wheels that meet.
+    """
+    curvature = np.asarray(curvature, dtype=np.float64)
+    flat = np.abs(curvature) < 1e-6
+    r = 1.0 / np.where(flat, 1.0, curvature)
+    half, centres = pitch / np.abs(r) / 2.0, wheel_radius + r
+    with np.errstate(invalid="ignore"):
+        bent = centres * np.cos(half) - np.sqrt(wheel_radius**2 - (centres * np.sin(half)) ** 2) - r
+        straight = wheel_radius - np.sqrt(wheel_radius**2 - pitch**2 / 4.0)
+    filled = curvature <= -1.0 / wheel_radius
+    return np.where(flat, straight, np.where(filled, 0.0, bent))
+
+
 def row_pitch(
     surface: MachinedSurface, plane_normal: Array, height: float, wheel_radius: float
 ) -> float:

@@ -7,6 +7,7 @@ changes within a step.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -40,6 +41,46 @@ _SEARCHED = 1e-5
 
 # fraction of a step that is not worth a step of its own
 _ROUNDING = 1e-9
+
+
+# points of all passes together: more than anybody plans
+MOST_POINTS = 20_000
+
+
+class TooManyStepsError(ValueError):
+    """Steps so short that there would be more points than can be planned.
+
+    Attributes:
+        limit: Which limit makes them so short, ``largest_step`` or ``max_bow_height``.
+    """
+
+    def __init__(self, limit: str, value: float, count: float) -> None:
+        super().__init__(
+            f"{1e3 * value:g} mm makes about {count:.0f} cutter points; at most {MOST_POINTS} "
+            "are planned"
+        )
+        self.limit = limit
+
+
+def steps_of(
+    curves: Sequence[SurfaceCurve], max_bow_height: float, largest_step: float
+) -> list[Array]:
+    """Return the steps of all curves, each as of `balanced_steps`.
+
+    Raises:
+        TooManyStepsError: If they have more than `MOST_POINTS` points together.
+    """
+    length = sum(curve.length for curve in curves)
+    if length > MOST_POINTS * largest_step:
+        raise TooManyStepsError("largest_step", largest_step, length / largest_step)
+    steps: list[Array] = []
+    done, n = 0.0, 0
+    for curve in curves:
+        steps.append(balanced_steps(curve, max_bow_height, largest_step))
+        done, n = done + curve.length, n + len(steps[-1])
+        if n > MOST_POINTS:
+            raise TooManyStepsError("max_bow_height", max_bow_height, n * length / done)
+    return steps
 
 
 def balanced_steps(curve: SurfaceCurve, max_bow_height: float, largest_step: float) -> Array:

@@ -4,13 +4,24 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
 from opl.files.documents import Document
+from opl.files.quantities import between
 from opl.program.actions import Action, Call, Dwell, Remark, SetOutput, WaitInput
 
-_Signal = Annotated[int, Field(ge=0)]
-_Seconds = Annotated[float, Field(gt=0.0)]
+_Signal = Annotated[int, between(0, 99_999)]
+_Seconds = Annotated[float, Field(gt=0.0, le=86_400.0)]
+
+
+def _switched(value: object) -> object:
+    """Return the words for signals, which YAML 1.2 takes for text, as what they mean."""
+    return {"on": True, "off": False}.get(value, value) if isinstance(value, str) else value
+
+
+_State = Annotated[
+    bool, BeforeValidator(_switched), WithJsonSchema({"type": "string", "enum": ["on", "off"]})
+]
 
 
 class ActionSection(Document):
@@ -25,8 +36,8 @@ class ActionSection(Document):
     wait_input: _Signal | None = Field(
         default=None, description="Number of a digital input to wait for; with `state`."
     )
-    state: bool | None = Field(
-        default=None, description="`on` or `off`: of the output, or of the input to wait for."
+    state: _State | None = Field(
+        default=None, description="Of the output, or of the input to wait for."
     )
     timeout_s: _Seconds | None = Field(
         default=None,

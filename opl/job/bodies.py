@@ -10,6 +10,7 @@ from pydantic import AfterValidator, ConfigDict, Field, field_validator, model_v
 from opl.cell.workcell import PART, WHEEL
 from opl.errors import InputError
 from opl.files.documents import Document
+from opl.files.quantities import Number, Positive, at_most, between
 from opl.geometry.frames import Array, NotARotationError, from_roll_pitch_yaw, nearest_pose
 from opl.geometry.mesh import TriangleMesh, load_shell
 from opl.geometry.shapes import Body, Box, Cylinder
@@ -19,11 +20,10 @@ MM = 1e-3
 # [m] a body outside of this is one in the wrong unit
 SMALLEST, LARGEST = 1e-3, 100.0
 
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
-Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
-Six = Annotated[list[float], Field(min_length=6, max_length=6)]
-_Row = Annotated[list[float], Field(min_length=4, max_length=4)]
+Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Six = Annotated[list[Number], Field(min_length=6, max_length=6)]
+Clearance = Annotated[float, between(0.0, 1000.0)]  # [mm]
+_Row = Annotated[list[Number], Field(min_length=4, max_length=4)]
 
 
 def _proper(rows: list[list[float]]) -> list[list[float]]:
@@ -126,6 +126,9 @@ class BodySection(Document):
                 f"{self.mesh_unit} makes {self.name} {size / MM:g} mm long, which nothing is",
             )
         return mesh
+
+
+Bodies = Annotated[list[BodySection], at_most(500)]
 
 
 def bodies_in_si(source: Source, key: str, bodies: list[BodySection]) -> tuple[Body, ...]:

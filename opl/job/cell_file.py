@@ -8,7 +8,8 @@ from typing import Annotated, ClassVar
 from pydantic import ConfigDict, Field, model_validator
 
 from opl.files.documents import Document
-from opl.job.bodies import BodySection, NotNegative, Six, Triple
+from opl.files.quantities import Number, at_most
+from opl.job.bodies import Bodies, Clearance, Six, Triple
 from opl.job.wheel import CellWheelSection
 
 CLEARANCE_MM = 5.0
@@ -34,8 +35,8 @@ class MountingFace(Document):
 class Range(Document):
     """A range of a joint or of a sum of joints."""
 
-    lower_deg: float = Field(description="Lower limit, below upper_deg.")
-    upper_deg: float = Field(description="Upper limit, above lower_deg.")
+    lower_deg: Number = Field(description="Lower limit, below upper_deg.")
+    upper_deg: Number = Field(description="Upper limit, above lower_deg.")
 
     @model_validator(mode="after")
     def _in_order(self) -> Range:
@@ -60,7 +61,7 @@ class CoupledLimit(Range):
     name: Annotated[str, Field(min_length=1)] | None = Field(
         default=None, description="Name for messages; else the sum itself, such as R+T."
     )
-    coefficients: Annotated[dict[str, float], Field(min_length=1)] = Field(
+    coefficients: Annotated[dict[str, Number], Field(min_length=1)] = Field(
         description="Factor of each joint in the sum, by the name of the joint; not all zero."
     )
 
@@ -74,7 +75,7 @@ class PairClearance(Document):
         description="Names of two bodies or robot links; `robot` stands for all links, `part` for "
         "the part, `fixture` for the fixture of the job."
     )
-    clearance_mm: NotNegative = Field(description="Least distance between the two.")
+    clearance_mm: Clearance = Field(description="Least distance between the two.")
 
 
 class CellFile(Document):
@@ -97,32 +98,32 @@ class CellFile(Document):
         description="Where the robot's mounting face is in the frame of the cell; else the frame "
         "of the cell is the robot's base frame.",
     )
-    wheels: Annotated[list[CellWheelSection], Field(min_length=1)] = Field(
+    wheels: Annotated[list[CellWheelSection], Field(min_length=1, max_length=100)] = Field(
         description="The contact wheels; one or more."
     )
-    obstacles: list[BodySection] = Field(
+    obstacles: Bodies = Field(
         default=[], description="Solids that stand in the cell, in the frame of the cell."
     )
-    gripper: list[BodySection] = Field(
+    gripper: Bodies = Field(
         default=[], description="Solids fixed to the flange, in the flange frame."
     )
-    clearance_mm: NotNegative = Field(
+    clearance_mm: Clearance = Field(
         default=CLEARANCE_MM,
         description="Least distance of everything that moves from everything else, other than part "
         "and belt while grinding.",
     )
-    pair_clearances: list[PairClearance] = Field(
+    pair_clearances: Annotated[list[PairClearance], at_most(1000)] = Field(
         default=[], description="Clearances of single pairs, instead of clearance_mm."
     )
-    allowed_contacts: list[TwoNames] = Field(
+    allowed_contacts: Annotated[list[TwoNames], at_most(1000)] = Field(
         default=[],
         description="Pairs of bodies that may touch, such as gripper and part; names as in "
         "pair_clearances.",
     )
-    joint_limits: list[JointLimit] = Field(
+    joint_limits: Annotated[list[JointLimit], at_most(100)] = Field(
         default=[], description="Joint ranges that are narrower than the robot's own."
     )
-    coupled_limits: list[CoupledLimit] = Field(
+    coupled_limits: Annotated[list[CoupledLimit], at_most(100)] = Field(
         default=[], description="Ranges of weighted sums of joints, for the dress pack."
     )
     home_deg: Six | None = Field(

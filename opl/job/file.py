@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import AfterValidator, ConfigDict, Field
 
 from opl.files.documents import Document
-from opl.job.bodies import BodySection, Matrix, NotNegative
+from opl.job.bodies import Bodies, Clearance, Matrix
 from opl.job.cell_file import CLEARANCE_MM
 from opl.job.passes import PassesSection
 from opl.job.process import ProcessSection
@@ -34,7 +34,7 @@ class _Fixture(Document):
     T_flange_workpiece_mm: Matrix = Field(
         description="Pose of the workpiece frame in the flange frame, 4x4 with its origin in mm."
     )
-    bodies: list[BodySection] = Field(
+    bodies: Bodies = Field(
         default=[], description="Solids between flange and part, in the flange frame."
     )
 
@@ -68,10 +68,10 @@ class JobFile(Document):
     wheel_name: str | None = Field(
         default=None, description="Which wheel of the cell file, where it has several."
     )
-    obstacles: list[BodySection] = Field(
+    obstacles: Bodies = Field(
         default=[], description="Solids that stand in the cell, in the robot's base frame."
     )
-    clearance_mm: NotNegative = Field(
+    clearance_mm: Clearance = Field(
         default=CLEARANCE_MM,
         description="Least distance of everything that moves from everything else, other than part "
         "and belt while grinding.",

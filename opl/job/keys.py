@@ -31,6 +31,7 @@ OF_PASSES = {
     "repeats": "passes.repeats",
 }
 
+SEARCH_CONTACT_POSITIONS = "search.contact_positions"
 SEARCH_CONTACT_WEIGHT = "search.weights.contact"
 
 PROCESS_HOME = "process.home_deg"

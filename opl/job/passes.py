@@ -10,9 +10,10 @@ from pydantic import ConfigDict, Field, model_validator
 
 from opl.errors import InputError
 from opl.files.documents import Document
-from opl.geometry.passes import MachinedSurface, Order, Passes, PassKind
+from opl.files.quantities import NotNegative, between
+from opl.geometry.passes import MOST_ROWS, MachinedSurface, Order, Passes, PassKind
 from opl.geometry.scallop import row_pitch
-from opl.job.bodies import MM, NotNegative, Positive, Triple
+from opl.job.bodies import MM, Triple
 from opl.job.source import Source
 
 
@@ -39,8 +40,10 @@ class PassesSection(Document):
         description="Normal of the planes in the workpiece frame, of any length; needed for "
         "`kind: sections`, and only there. A pass runs along outward normal x plane normal.",
     )
-    pitch_mm: Positive | None = Field(default=None, description="Distance of neighbouring rows.")
-    scallop_height_mm: Positive | None = Field(
+    pitch_mm: Annotated[float, between(0.01, 1000.0)] | None = Field(
+        default=None, description="Distance of neighbouring rows."
+    )
+    scallop_height_mm: Annotated[float, between(1e-4, 10.0)] | None = Field(
         default=None,
         description="Or the height of the ridge that may be left between rows; for "
         "`kind: sections`.",
@@ -52,7 +55,7 @@ class PassesSection(Document):
     end_margin_mm: NotNegative = Field(
         default=0.0, description="What is left out at both ends of an open pass."
     )
-    rows: Annotated[int, Field(ge=1)] | None = Field(
+    rows: Annotated[int, between(1, MOST_ROWS)] | None = Field(
         default=None,
         description="Number of rows, in the middle of the surface; else as many as fit.",
     )
@@ -62,11 +65,11 @@ class PassesSection(Document):
     shift_mm: NotNegative = Field(
         default=0.0, description="How far each repeat is shifted across the rows."
     )
-    max_chord_error_mm: Positive = Field(
+    max_chord_error_mm: Annotated[float, between(1e-4, 10.0)] = Field(
         description="Largest distance of the surface curve from the chord between two cutter "
         "points (bow height)."
     )
-    max_step_mm: Positive = Field(
+    max_step_mm: Annotated[float, between(0.01, 1000.0)] = Field(
         description="Largest distance of neighbouring cutter points along a pass."
     )
     order: Literal["one_way", "zigzag", "both", "shortest"] = Field(

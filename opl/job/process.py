@@ -11,8 +11,9 @@ from pydantic import ConfigDict, Field
 
 from opl.cell.robot import Robot
 from opl.files.documents import Document
+from opl.files.quantities import Positive, between
 from opl.geometry.frames import Array
-from opl.job.bodies import MM, Positive, Six
+from opl.job.bodies import MM, Six
 from opl.motion.process_settings import ProcessSettings
 
 SixPositive = Annotated[list[Positive], Field(min_length=6, max_length=6)]
@@ -27,7 +28,7 @@ class ProcessSection(Document):
         "contact_speed": "max_contact_speed",
     }
 
-    feed_mm_s: Positive = Field(
+    feed_mm_s: Annotated[float, between(0.01, 10_000.0)] = Field(
         description="Speed of the ground point along the surface of the part."
     )
     home_deg: Six | None = Field(
@@ -35,7 +36,7 @@ class ProcessSection(Document):
         description="Joint positions at the start and the end of the program; given here or in the "
         "cell file.",
     )
-    approach_mm: Positive = Field(
+    approach_mm: Annotated[float, between(0.01, 2000.0)] = Field(
         default=50.0,
         description="Longest that approach and retract lead off the wheel; they end where the "
         "straight free move from there is proven free.",
@@ -45,18 +46,18 @@ class ProcessSection(Document):
         description="0 for an approach straight along the contact normal; else the angle of an arc "
         "along the belt, from -y to +y of the contact frame.",
     )
-    approach_run_mm: Annotated[float, Field(ge=1.0)] = Field(
+    approach_run_mm: Annotated[float, between(1.0, 1000.0)] = Field(
         default=5.0,
         description="How far the part moves on along the pass while it lifts off the wheel, in "
         "feed, on a quarter of a circle of this radius; likewise before it touches. Half or a "
         "quarter of it where that is not free. The belt never sees a stop.",
     )
-    approach_slow_mm: Positive = Field(
+    approach_slow_mm: Annotated[float, between(0.01, 2000.0)] = Field(
         default=10.0,
         description="Within this way of the contact approach_mm_s is kept; farther off the leads "
         "are as fast as free moves.",
     )
-    approach_mm_s: Positive = Field(
+    approach_mm_s: Annotated[float, between(0.01, 10_000.0)] = Field(
         default=50.0,
         description="Largest speed of approach and retract near the contact; the feed if that is "
         "more. The belt is met and left at the feed.",

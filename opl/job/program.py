@@ -12,6 +12,7 @@ from opl.cell.robot import Robot
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.errors import InputError, OplError, SettingError
 from opl.files.documents import Document
+from opl.files.quantities import at_most, between
 from opl.geometry.frames import Array
 from opl.job import keys
 from opl.job.actions import ActionSection
@@ -69,7 +70,7 @@ class _UserFrame(Document):
 
     model_config = ConfigDict(title="User frame")
 
-    number: Annotated[int, Field(ge=1)] = Field(description="Number of the user frame.")
+    number: Annotated[int, between(1, 999)] = Field(description="Number of the user frame.")
     T_base_user_mm: Matrix = Field(
         description="Pose of the user frame in the robot's base frame, 4x4 with its origin in mm."
     )
@@ -89,7 +90,7 @@ class ProgramSection(Document):
         description="A Yaskawa controller (NX100, DX100, DX200, YRC1000), another language (RAPID, "
         "KRL, FANUC, URSCRIPT), or a post of your own.",
     )
-    tool: Annotated[int, Field(ge=0)] = Field(
+    tool: Annotated[int, between(0, 999)] = Field(
         default=0, description="Number of the tool that positions are written for."
     )
     T_flange_tool_mm: Matrix | None = Field(
@@ -115,7 +116,7 @@ class ProgramSection(Document):
         description="File with the pulse ratios of your robot, from `opl robots import-params`; "
         "else those of the robot's data.",
     )
-    accept_unverified_pulses: list[str] = Field(
+    accept_unverified_pulses: Annotated[list[str], at_most(100)] = Field(
         default=[],
         description="Names of joints whose pulse ratios nobody has verified and you accept.",
     )
@@ -132,16 +133,18 @@ class ProgramSection(Document):
         description="Deceleration (DEC) of each kind of move. For Yaskawa controllers.",
     )
     comment: str | None = Field(default=None, description="A line about the program, in its head.")
-    at_start: list[ActionSection] = Field(
+    at_start: Annotated[list[ActionSection], at_most(500)] = Field(
         default=[], description="Actions at home, before anything else."
     )
-    before_pass: list[ActionSection] = Field(
+    before_pass: Annotated[list[ActionSection], at_most(500)] = Field(
         default=[], description="Actions in front of the wheel, before each approach."
     )
-    after_pass: list[ActionSection] = Field(
+    after_pass: Annotated[list[ActionSection], at_most(500)] = Field(
         default=[], description="Actions in front of the wheel, after each retract."
     )
-    at_end: list[ActionSection] = Field(default=[], description="Actions at home, at the end.")
+    at_end: Annotated[list[ActionSection], at_most(500)] = Field(
+        default=[], description="Actions at home, at the end."
+    )
     template: str | None = Field(
         default=None,
         description="A template of your own for the layout of the program, relative to this file.",

@@ -11,14 +11,15 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
 from opl.files.documents import Document
-from opl.job.bodies import MM, NotNegative, Positive
+from opl.files.quantities import NotNegative, between
+from opl.job.bodies import MM
 from opl.planning.costs import CostWeights, ObjectiveWeights
 from opl.planning.filling import Interpolation
 from opl.planning.multi_start import Start
 from opl.planning.optimal import OptimalSettings
 
 # contact positions are in mm on the wheel's flat and in degrees of roll about its edges
-_BeltUnits = Annotated[float, Field(gt=0.0, json_schema_extra={"unit": "mm or deg"})]
+_BeltUnits = Annotated[float, Field(ge=0.05, le=10_000.0, json_schema_extra={"unit": "mm or deg"})]
 MAX_JOINT_STEP = np.deg2rad(15.0)  # between adjacent nodes; more is a jump through a singularity
 
 SixNotNegative = Annotated[list[NotNegative], Field(min_length=6, max_length=6)]
@@ -127,7 +128,7 @@ class SearchSection(Document):
         description="Start node of the recursive method: the best of all, or the one nearest to "
         "home.",
     )
-    contact_positions: Annotated[int, Field(ge=2)] = Field(
+    contact_positions: Annotated[int, between(2, 2000)] = Field(
         description="Number of contact positions that each cutter point may have on the wheel, "
         "evenly spaced."
     )
@@ -135,7 +136,7 @@ class SearchSection(Document):
         description="Largest change of the contact position between neighbouring positions of the "
         "path; more positions are put in between to keep it.",
     )
-    max_contact_error_mm: Positive = Field(
+    max_contact_error_mm: Annotated[float, between(0.001, 10.0)] = Field(
         default=0.1,
         description="Largest distance of the ground point from where it touches the wheel, between "
         "two positions of the path as well; larger than passes.max_chord_error_mm, which is part "
@@ -150,7 +151,7 @@ class SearchSection(Document):
         description="How far the joint range sum may exceed its lower bound for the sake of a "
         "smoother path.",
     )
-    max_subproblems: Annotated[int, Field(ge=1)] = Field(
+    max_subproblems: Annotated[int, between(1, 10_000_000)] = Field(
         default=4000,
         description="Subproblems of the proof of the least joint range sum that are looked at, at "
         "the most.",

@@ -12,15 +12,16 @@ from pydantic import ConfigDict, Field, model_validator
 from opl.cell.robot import Robot
 from opl.errors import InputError
 from opl.files.documents import Document
+from opl.files.quantities import Positive, at_most, between
 from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, pose
 from opl.geometry.touched import KINDS, TouchedError, TouchedFit, fit_touched
 from opl.geometry.wheel import ContactWheel
-from opl.job.bodies import MM, Matrix, NotNegative, Positive, Triple, pose_of
+from opl.job.bodies import MM, Matrix, Triple, pose_of
 from opl.job.source import Source
 
 # robot: as its controller's pendant shows positions in the robot's own frame
 Frame = Literal["robot", "cell"]
-Points = list[Triple]
+Points = Annotated[list[Triple], at_most(1000)]
 
 
 def _points(where: str) -> Any:
@@ -99,12 +100,16 @@ class WheelSection(Document):
     touched: TouchedSection | None = Field(
         default=None, description="Or points touched on the wheel."
     )
-    width_mm: Positive = Field(description="Width of the wheel's flat, along its axle.")
-    radius_mm: Positive = Field(description="Radius of the wheel with the belt on.")
+    width_mm: Annotated[float, Field(gt=0.0, le=2000.0)] = Field(
+        description="Width of the wheel's flat, along its axle."
+    )
+    radius_mm: Annotated[float, Field(gt=0.0, le=5000.0)] = Field(
+        description="Radius of the wheel with the belt on."
+    )
     max_roll_deg: Annotated[float, Field(ge=0.0, le=90.0)] = Field(
         description="Largest roll of the part about either edge of the wheel; 0 for none."
     )
-    max_belt_penetration_mm: NotNegative = Field(
+    max_belt_penetration_mm: Annotated[float, between(0.0, 50.0)] = Field(
         default=0.5, description="How deep the part may sink into the belt."
     )
 

@@ -11,6 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from opl.errors import InputError
 from opl.files.documents import Document
+from opl.files.quantities import between
 from opl.geometry.machined import CAD, MESHES, load_machined
 from opl.geometry.mesh import TriangleMesh, load_mesh
 from opl.geometry.passes import MachinedSurface
@@ -20,7 +21,7 @@ from opl.job.source import Source
 # so much of a surface may look as if it faced into the solid before it is refused
 MOST_INWARD = 0.1
 
-_Id = Annotated[int, Field(ge=1)]
+_Id = Annotated[int, between(1, 1_000_000)]
 
 # key of the validation context: what a program gives as a value, ``surface`` or ``part`` or both
 GIVEN = "given"
@@ -42,7 +43,7 @@ class WorkpieceSection(Document):
     surface_unit: Literal["mm", "m"] | None = Field(
         default=None, description="Unit of a surface from a mesh; needed there, and only there."
     )
-    faces: Annotated[list[_Id], Field(min_length=1)] | None = Field(
+    faces: Annotated[list[_Id], Field(min_length=1, max_length=10_000)] | None = Field(
         default=None,
         description="Faces to be ground, by their numbers in `opl faces`; else all of the file.",
     )

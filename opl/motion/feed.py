@@ -79,8 +79,8 @@ def _runs(wanted: np.ndarray, index: np.ndarray) -> Iterator[np.ndarray]:
 
 def _stretch(timing: Timing, process: ProcessSettings, moves: np.ndarray) -> SlowStretch:
     motion, duration = timing.timed.motion, timing.timed.duration
-    speed = timing.distance / np.maximum(duration, 1e-12)
-    longer = duration - timing.distance / process.feed
+    speed = timing.surface_distance / np.maximum(duration, 1e-12)
+    longer = duration - timing.surface_distance / process.feed
     shares: dict[tuple[Cause, int], float] = {}
     for move in moves:
         key = (timing.cause[move], int(timing.joint[move]))

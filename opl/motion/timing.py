@@ -28,6 +28,7 @@ from opl.motion.time_law import JointLimits, TimeLaw, fastest_law
 # Wanted time of a move in [s] below which its end is no configuration of its own for the time law.
 SHORTEST = 1e-6
 FOLLOWED = 1.01  # a move that takes no longer than this times what is wanted keeps it
+AT_CONTACT = 1e-6  # [m] from the contact that a lead begins or ends at it
 SHORTEST_FREE = 0.05  # [s] of a free move: a shorter one is over before a robot is at its speed
 
 
@@ -47,8 +48,8 @@ class Timing:
 
     Attributes:
         timed: The motion with the time of every move.
-        distance: What the ground point moves along the surface in [m], shape (n,); where the move
-            does not stay on the wheel, what the flange moves.
+        surface_distance: What the ground point moves along the surface in [m], shape (n,); NaN
+            where the move does not stay on the wheel.
         cause: Why it is slower than the feed on each move, n items.
         joint: The joint that limits it, shape (n,); -1 where none does.
         speed_ratio: Largest ratio of the speeds of neighbouring moves of a pass and its leads, as
@@ -56,7 +57,7 @@ class Timing:
     """
 
     timed: TimedMotion
-    distance: Array
+    surface_distance: Array
     cause: tuple[Cause, ...]
     joint: NDArray[np.int64]
     speed_ratio: float
@@ -80,14 +81,14 @@ def time_motion(
     turned = np.abs(np.diff(motion.q, axis=0, prepend=motion.q[:1]))
     fastest = (turned / robot.max_speed).max(axis=1)
     arc = np.interp(motion.cutter_point, np.arange(len(points)), points.arc_length)
-    on_surface = np.where(grinding, np.abs(np.diff(arc, prepend=np.nan)), np.nan)
+    surface_distance = np.where(grinding, np.abs(np.diff(arc, prepend=np.nan)), np.nan)
     over_wheel = np.abs(np.diff(motion.contact_position, prepend=np.nan)) / process.contact_speed
     # the part is only moved on a lead, so every point of it moves as the flange does
     p_flange = forward_kinematics(robot, motion.q)[:, :3, 3]
     moved = np.linalg.norm(np.diff(p_flange, axis=0, prepend=p_flange[:1]), axis=1)
-    distance = np.where(grinding, on_surface, moved)
+    distance = np.where(grinding, surface_distance, moved)
     wanted = np.maximum(fastest / process.air_speed, np.where(motion.free, SHORTEST_FREE, 0.0))
-    wanted[grinding] = np.maximum(on_surface / process.feed, over_wheel)[grinding]
+    wanted[grinding] = np.maximum(surface_distance / process.feed, over_wheel)[grinding]
 
     duration = np.maximum(wanted, fastest)
     duration[0] = 0.0
@@ -96,10 +97,8 @@ def time_motion(
     by_neighbour = np.zeros(len(motion), dtype=bool)
     speed_ratio = 1.0
     for moves in _without_rest(motion):
-        on_lead = ~grinding[moves]
-        way = np.where(on_lead, moved[moves], 0.0)
-        slowest = way / _lead_speed(way, on_lead, process)
-        duration[moves] = np.maximum(duration[moves], slowest)
+        near_wheel = _near_wheel(moved[moves], [motion.phase[move] for move in moves], process)
+        duration[moves] = np.maximum(duration[moves], near_wheel)
         kept = moves[duration[moves] > SHORTEST]
         if not len(kept):
             continue
@@ -125,7 +124,7 @@ def time_motion(
             slow = Cause.ACCELERATION if by_acceleration[move] else Cause.SPEED
             other = Cause.NEIGHBOUR if by_neighbour[move] else Cause.PIVOTING
             cause[move] = other if joint[move] < 0 else slow
-    return Timing(TimedMotion(motion, duration), distance, tuple(cause), joint, speed_ratio)
+    return Timing(TimedMotion(motion, duration), surface_distance, tuple(cause), joint, speed_ratio)
 
 
 def _without_rest(motion: Motion) -> Iterator[NDArray[np.intp]]:
@@ -137,22 +136,21 @@ def _without_rest(motion: Motion) -> Iterator[NDArray[np.intp]]:
                 yield np.concatenate([moves for _, moves in of_pass])
 
 
-def _lead_speed(way: Array, on_lead: NDArray[np.bool_], process: ProcessSettings) -> Array:
-    """Return how fast the moves of a pass and its leads may be for being near the wheel, in [m/s].
+def _near_wheel(way: Array, phases: list[Phase], process: ProcessSettings) -> Array:
+    """Return the times that moves take at the least for being near the wheel, in [s], shape (n,).
 
-    `way` is that of each move of a lead in [m], 0 of the others, shape (n,).
+    `way` is what the part moves in each in [m], shape (n,); on the wheel nothing is asked for here.
     """
+    coming = np.array([phase is Phase.APPROACHING for phase in phases])
+    going = np.array([phase is Phase.RETRACTING for phase in phases])
+    ways_in, ways_out = np.where(coming, way, 0.0), np.where(going, way, 0.0)
     # how far from the contact the nearer end of each move is
-    ground = np.flatnonzero(~on_lead)
-    begins, ends = (ground[0], ground[-1]) if len(ground) else (len(way), len(way))
-    from_start = np.concatenate([np.cumsum(way[:begins][::-1])[::-1][1:], [0.0]])[:begins]
-    from_end = np.concatenate([[0.0], np.cumsum(way[ends + 1 :])[:-1]])[: len(way) - ends - 1]
-    near = np.zeros(len(way))
-    near[:begins], near[ends + 1 :] = from_start, from_end
-    speed = np.full(len(way), np.inf)
-    speed[near < process.approach_slow] = max(process.approach_speed, process.feed)
-    speed[near == 0.0] = process.feed
-    return speed
+    near = np.where(
+        coming, np.cumsum(ways_in[::-1])[::-1] - ways_in, np.cumsum(ways_out) - ways_out
+    )
+    speed = np.where(near < process.approach_slow, process.approach_speed, np.inf)
+    speed = np.where(near < AT_CONTACT, process.feed, np.maximum(speed, process.feed))
+    return np.where(coming | going, way / speed, 0.0)
 
 
 def air_seconds(motion: Motion, robot: Robot, process: ProcessSettings) -> float:

@@ -26,7 +26,8 @@ class ControllerProfile:
         step_limit: Most positions in one job; longer programs are split.
         line_limit: Most instructions in one job.
         label_digits: Digits of a position label in the list of positions.
-        rconf_fields: Numbers in ///RCONF.
+        rconf_fields: Numbers in ///RCONF as written.
+        least_rconf_fields: Fewest that are read.
         length_decimals: Decimals of x, y, z in [mm].
         angle_decimals: Decimals of rx, ry, rz in [deg].
         joint_speed: VJ in percent of the joints' own top speeds.
@@ -49,6 +50,7 @@ class ControllerProfile:
     line_limit: int
     label_digits: int
     rconf_fields: int
+    least_rconf_fields: int
     length_decimals: int
     angle_decimals: int
     joint_speed: SpeedRange

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import difflib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from opl.cell.robot import Robot, controller_poses
 from opl.errors import InputError
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, roll_pitch_yaw
+from opl.program.changes import Coordinate, Said, changed_lines
 from opl.program.digits import Rounding
 from opl.program.played import (
     Corners,
@@ -70,28 +70,10 @@ def listing_reader(
     def describe(name: str, content: bytes, robot: Robot) -> list[str]:
         return _described(parsed(name, content), robot)
 
-    def differences(first: tuple[str, bytes], second: tuple[str, bytes]) -> list[str]:
-        return changed_lines(_meaning(parsed(*first)), _meaning(parsed(*second)))
+    def differences(first: tuple[str, bytes], second: tuple[str, bytes], robot: Robot) -> list[str]:
+        return changed_lines(_meaning(parsed(*first), robot), _meaning(parsed(*second), robot))
 
     return Reader(suffix, read, rounded, start, lambda settings: corners, describe, differences)
-
-
-def changed_lines(before: list[tuple[str, str]], after: list[tuple[str, str]]) -> list[str]:
-    """Return what differs, one line each: ``-`` stands in the first only, ``+`` in the second.
-
-    Args:
-        before: Place and meaning of what the first program says, in order: dates, comments, spaces
-            and zeros at the end of a number do not count.
-        after: The same of the second.
-    """
-    lines = []
-    # no line is too common to matter: autojunk would skip them
-    texts = [text for _, text in before], [text for _, text in after]
-    for tag, a, b, c, d in difflib.SequenceMatcher(None, *texts, autojunk=False).get_opcodes():
-        if tag != "equal":
-            lines += [f"- {place}: {text}" for place, text in before[a:b]]
-            lines += [f"+ {place}: {text}" for place, text in after[c:d]]
-    return lines
 
 
 def _described(listing: Listing, robot: Robot) -> list[str]:
@@ -116,9 +98,37 @@ def _described(listing: Listing, robot: Robot) -> list[str]:
     return lines
 
 
-def _meaning(listing: Listing) -> list[tuple[str, str]]:
-    stated = [(f"line {one.line}", one.meaning) for one in listing.statements]
-    return [("name", listing.name), *stated]
+def _meaning(listing: Listing, robot: Robot) -> list[Said]:
+    """Return what a program says; dates, comments, spaces and zeros at the end do not count."""
+    said = [Said("", listing.name)]
+    for one in listing.statements:
+        move = one.move
+        if move is None:
+            said.append(Said(str(one.line), one.meaning))
+            continue
+        if move.target.shape == (4, 4):
+            target = pose_coordinates(pose_values(move.target))
+        else:
+            target = angle_coordinates(move.target, robot)
+        form = "straight" if move.straight else "joint"
+        settings = [("move", form), ("speed", move.speed.text), ("corner", move.corner.text)]
+        settings.append(("tool", move.tool))
+        said.append(Said(str(one.line), one.meaning, target, tuple(settings)))
+    return said
+
+
+def angle_coordinates(q: Array, robot: Robot) -> tuple[Coordinate, ...]:
+    """Return the angles of a configuration in [deg], by joint."""
+    named = zip(robot.joint_names, np.rad2deg(q), strict=True)
+    return tuple(Coordinate(name, float(angle), "deg") for name, angle in named)
+
+
+def pose_coordinates(values: Sequence[float]) -> tuple[Coordinate, ...]:
+    """Return x, y, z in [mm] and rx, ry, rz in [deg] by name."""
+    named = zip(("x", "y", "z", "rx", "ry", "rz"), values, strict=True)
+    return tuple(
+        Coordinate(name, float(value), "deg" if name[0] == "r" else "mm") for name, value in named
+    )
 
 
 def _where(move: ReadMove, robot: Robot) -> Iterator[str]:

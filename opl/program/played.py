@@ -47,11 +47,28 @@ class WrittenSpeed:
         unit: What the value counts.
         value: In SI.
         text: As in the file.
+        digit: What one more in its last digit counts, in SI.
     """
 
     unit: SpeedUnit
     value: float
     text: str
+    digit: float = 0.0
+
+    @classmethod
+    def of_number(
+        cls, unit: SpeedUnit, factor: float, number: str, decimals: int, text: str
+    ) -> WrittenSpeed:
+        """Return the speed of a number in a file.
+
+        Args:
+            unit: What it counts.
+            factor: One of it in SI.
+            number: As in the file.
+            decimals: How many the language writes.
+            text: Number and unit as in the file.
+        """
+        return cls(unit, factor * float(number), text, factor * 10.0**-decimals)
 
 
 @dataclass(frozen=True)
@@ -100,8 +117,6 @@ class ReadMove:
         tool: The tool it is written with, as the language names it.
         place: File and line, for people.
         resolution: Half of the last digit of the target in [rad], shape (6,).
-        last_digit: The last digit of the speed as a fraction of it, where the language is so coarse
-            that a single move may be faster by that much; 0 elsewhere.
         quarters: Quarter turns of axes 1, 4 and 6 that the file states beside a pose; none where
             it states none.
         starts: Whether a program begins with it, so that nobody knows from where it comes.
@@ -116,7 +131,6 @@ class ReadMove:
     tool: str
     place: str
     resolution: Array
-    last_digit: float = 0.0
     quarters: tuple[int, ...] = ()
     starts: bool = False
     ramps: str = ""

@@ -63,8 +63,8 @@ class Reader:
         start: The fastest first move of a program: nobody knows from where it comes.
         corners: The largest corners that a job allows.
         describe: Says in lines what a file does, given its name, content and robot.
-        differences: Says in lines what one file does and another does not, ``-`` and ``+``, given
-            the name and content of both.
+        differences: Says in lines what one file does and another does not, given the name and
+            content of both, and whose programs they are taken for.
         ramps: What a kind of move says of speeding up and slowing down, see `ReadMove`.
     """
 
@@ -74,7 +74,7 @@ class Reader:
     start: Callable[[Robot], WrittenSpeed]
     corners: Callable[[ProgramSettings], Corners]
     describe: Callable[[str, bytes, Robot], list[str]]
-    differences: Callable[[tuple[str, bytes], tuple[str, bytes]], list[str]]
+    differences: Callable[[tuple[str, bytes], tuple[str, bytes], Robot], list[str]]
     ramps: Callable[[Purpose, ProgramSettings], str] = lambda kind, settings: ""
 
 

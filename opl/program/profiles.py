@@ -31,7 +31,7 @@ _INFORM_II = _words(
 _INFORM_III = _INFORM_II | _words(
     "IFTHENEXP IFTHEN ELSEIFEXP ELSEIF ELSE ENDIF WHILEEXP WHILE ENDWHILE FOR NEXT "
     "SWITCH CASE DEFAULT ENDSWITCH SETTOOL GETPOS VAL ASC CHR$ MID$ LEN CAT$ "
-    "FORMCUT SETUALM DIALOG CLS"
+    "FORMCUT SETUALM DIALOG CLS TCPON TCPOF"
 )
 
 DX200 = ControllerProfile(
@@ -49,6 +49,7 @@ DX200 = ControllerProfile(
     label_digits=5,
     # DT of DX100: six settings and r1 to r18; 24 in every saved job
     rconf_fields=24,
+    least_rconf_fields=24,
     # every one of 745 saved positions
     length_decimals=3,
     angle_decimals=4,
@@ -85,8 +86,10 @@ NX100 = replace(
     name_length=8,
     # the remote commands count steps with three digits
     step_limit=999,
-    # DT of NX100 names 6 to 8 fields; the first six are the ones with a meaning
-    rconf_fields=6,
+    # DT of NX100 names 6 to 8 fields, jobs of that generation have 8; the first six are the ones
+    # with a meaning
+    rconf_fields=8,
+    least_rconf_fields=6,
     # jobs of that generation have two decimals of angles
     angle_decimals=2,
     # DT of NX100: 0 to 23; user frames 1 to 24

@@ -18,6 +18,7 @@ from pydantic import Field, model_validator
 from opl.cell.robot import Robot
 from opl.errors import InputError
 from opl.files.documents import Document, read
+from opl.files.quantities import Number, Positive, Pulses
 from opl.files.writing import write_file
 from opl.program.parameter_fit import choose_group
 from opl.program.parameters import AxisParameters, read_parameters
@@ -28,20 +29,20 @@ LEAST_SPAN = 20.0
 ZERO_TOLERANCE = 0.1
 
 
-_Zone = Annotated[float, Field(gt=0.0)]
+_Zone = Positive  # [mm]
 
 
 class _Reading(Document):
-    pulses: int
-    degrees: float
+    pulses: Pulses
+    degrees: Number
 
 
 class _Axis(Document):
     name: str
-    per_degree: Annotated[float, Field(gt=0.0)] | None = None
+    per_degree: Positive | None = None
     readings: Annotated[list[_Reading], Field(min_length=2, max_length=2)] | None = None
-    lower_pulses: int | None = None
-    upper_pulses: int | None = None
+    lower_pulses: Pulses | None = None
+    upper_pulses: Pulses | None = None
 
     @model_validator(mode="after")
     def _usable(self) -> _Axis:
@@ -74,7 +75,7 @@ class _Axis(Document):
 class _RatioFile(Document):
     robot: str
     source: str
-    axes: Annotated[list[_Axis], Field(min_length=1)]
+    axes: Annotated[list[_Axis], Field(min_length=1, max_length=100)]
     # of PL=1 to PL=8
     position_level_zones_mm: Annotated[list[_Zone], Field(min_length=8, max_length=8)] | None = None
 

@@ -85,8 +85,9 @@ def prove(
     )
     found = recognise(job.cell, points, playback.q, playback.duration, playback.stations, rule)
     replayed = replay(job.cell, points, found.timed, search.max_contact_error, progress)
-    # the written configurations; of one that grinds several cutter points, the last of its rows
-    rows = np.searchsorted(found.source, playback.stations, side="right") - 1
+    # the written configurations; of one that grinds several cutter points, the first of its rows:
+    # the time to the others goes to the move that follows
+    rows = np.searchsorted(found.source, playback.stations, side="left")
     findings = (
         *reading.findings,
         *replayed.findings,

@@ -10,19 +10,14 @@ from opl.findings import Finding, Level
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
-from opl.motion.motion import Motion, Phase, TimedMotion
+from opl.motion.motion import Motion, TimedMotion
 from opl.motion.timing import time_motion
 from opl.program.moves import Purpose
 from opl.program.played import Playback
-from opl.program.posts import PASS_TIME_TOLERANCE, Reader
-from opl.program.speeds import MOST_CORRECTION
+from opl.program.posts import Reader
 from opl.proof.events import event_findings
+from opl.proof.speeds import speed_findings
 
-# Fastest that one move may be, as a multiple of the requested speed. On the wheel a move makes up
-# for the rounding of those before it; elsewhere only its own last digit counts. Where a language
-# has whole percents only (`ReadMove.last_digit`), one of them comes on top.
-MOST_ON_WHEEL = 1.1 * MOST_CORRECTION
-MOST_ELSEWHERE = 1.05
 HOME_SLACK = 1e-4  # [rad] that the ends may be from home: a pulse or two
 ROUND_OFF = 1e-9  # of a number that was read from a file, as a fraction
 
@@ -40,11 +35,10 @@ def written_findings(
         reader: Of the language they are written in.
     """
     motion = written.motion
-    requested = time_motion(motion, points, job.process, job.cell.robot).timed
+    requested = time_motion(motion, points, job.process, job.cell.robot)
     return [
         *_first_moves(job, playback, reader),
-        *_fast_moves(written, requested, playback),
-        *_pass_times(written, requested),
+        *speed_findings(written, requested, playback, job.process.feed),
         *_rounded_ends(job, motion, playback, reader),
         *_ramps(job, motion, playback, reader),
         *event_findings(job, motion, playback),
@@ -63,42 +57,19 @@ def _first_moves(job: Job, playback: Playback, reader: Reader) -> Iterator[Findi
             yield _error("speed", move.place, message)
 
 
-def _fast_moves(
-    written: TimedMotion, requested: TimedMotion, playback: Playback
-) -> Iterator[Finding]:
-    motion = written.motion
-    grinding = motion.grinding
-    for k in range(1, len(motion)):
-        ground, move = grinding[k], playback.moves[k]
-        most = MOST_ON_WHEEL if ground else MOST_ELSEWHERE
-        # as if it were one last digit slower: the slowest that the language knows is never too fast
-        if written.duration[k] * most >= requested.duration[k] * (1.0 - move.last_digit):
-            continue
-        factor = requested.duration[k] / max(float(written.duration[k]), 1e-9)
-        speed = "the feed" if ground else "the speed"
-        place = f"{motion.place(k)} ({move.place})"
-        yield _error("speed", place, f"{factor:.1f} times {speed} that the job asks for")
-
-
-def _pass_times(written: TimedMotion, requested: TimedMotion) -> Iterator[Finding]:
-    for phase, moves in written.motion.runs():
-        if phase is not Phase.GRINDING:
-            continue
-        wanted, takes = requested.duration[moves].sum(), written.duration[moves].sum()
-        if abs(takes - wanted) > PASS_TIME_TOLERANCE * wanted:
-            message = f"takes {takes:.2f} s, {wanted:.2f} s at the feed that the job asks for"
-            yield _error("speed", f"pass {written.motion.pass_index[moves[0]] + 1}", message)
-
-
 def _rounded_ends(
     job: Job, motion: Motion, playback: Playback, reader: Reader
 ) -> Iterator[Finding]:
-    """Look at how far corners may be rounded; the proof goes through them."""
+    """Look at how far corners may be rounded, and for stops on the wheel: the belt digs in."""
     corners, stops = reader.corners(job.program), motion.ends_phase & ~motion.on_wheel
+    runs_on = corners.on_wheel.size > 0.0
     for k, move in enumerate(playback.moves):
         limit = corners.stop if stops[k] else corners.of(Purpose.of(motion.phase[k]))
         if move.corner.size > limit.size * (1.0 + ROUND_OFF):
             message = f"must be {limit.text} at most, got {move.corner.text}"
+            yield _error("level", f"{motion.place(k)} ({move.place})", message)
+        if move.corner.exact_stop and runs_on and motion.on_wheel[k]:
+            message = f"stops on the wheel: {move.corner.text}"
             yield _error("level", f"{motion.place(k)} ({move.place})", message)
 
 

@@ -10,11 +10,13 @@ from typing import Any
 
 from opl.errors import InputError
 from opl.files.claiming import Claim, claimed
+from opl.run.page import run_page
 from opl.run.reporting import make_report
 from opl.run.result import to_json
 from opl.run.values import Refused, Written
 
 RESULT = "result.json"
+PAGE = "report.html"
 
 
 @contextmanager
@@ -39,10 +41,10 @@ def claim_folder(folder: Path, job_name: str) -> Iterator[Claim]:
 
 
 def deliver(run: Written | Refused, folder: Path | Claim) -> list[Path]:
-    """Put the files of a run and its ``result.json`` into a folder, in one step.
+    """Put the files of a run, its page and its ``result.json`` into a folder, in one step.
 
     Program files that an earlier run of the job left there go in the same step: a folder never
-    holds a program that its ``result.json`` does not describe. A refused run leaves its
+    holds a program that its ``result.json`` does not describe. A refused run leaves its page and
     ``result.json`` only. All other files stay. What one step is, and where it can only be one file
     after the other with ``result.json`` last, `opl.files.switching` says.
 
@@ -62,8 +64,10 @@ def deliver(run: Written | Refused, folder: Path | Claim) -> list[Path]:
             return deliver(run, claim)
     files = run.files if isinstance(run, Written) else {}
     leaving = _files_of(_earlier_result(folder.folder)) - files.keys()
+    report = make_report(run)
     # the result last: it describes the others
-    return folder.switch({**files, RESULT: to_json(make_report(run)) + "\n"}, leaving)
+    whole = {**files, PAGE: run_page(run, report), RESULT: to_json(report) + "\n"}
+    return folder.switch(whole, leaving)
 
 
 def _earlier_result(folder: Path) -> dict[str, Any]:

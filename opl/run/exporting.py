@@ -9,23 +9,26 @@ from datetime import datetime, timezone
 from opl.errors import InputError
 from opl.geometry.frames import transform
 from opl.geometry.mesh import box_corners
-from opl.planning.reasons import NodeState, node_states
+from opl.planning.survey import NodeState
 from opl.program.export import StraightLimit, export_program
 from opl.program.moves import Program
 from opl.report.pictures import contact_chart, joint_chart
+from opl.report.trace import motion_trace
 from opl.run.values import Planned, Proven
 
 
 def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
-    """Return the program of a verified motion, and its files and table by file name."""
+    """Return the program of a verified motion; its files, table and trace by file name."""
     job = proven.surfaced.job
     vertices = transform(job.cell.T_flange_workpiece, job.cell.part.vertices)
     # what the proven path leaves of the allowed contact error
     left = job.search.max_contact_error - proven.verification.max_contact_error
     limit = StraightLimit(box_corners(vertices), left)
-    return export_program(
+    program, files = export_program(
         proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), ["OPL"]
     )
+    trace = motion_trace(proven.motion, job.name, job.cell.robot.joint_names)
+    return program, {**files, f"{job.name}_motion.json": trace}
 
 
 def draw_charts(planned: Planned) -> Mapping[str, str]:
@@ -35,7 +38,7 @@ def draw_charts(planned: Planned) -> Mapping[str, str]:
     contact = contact_chart(
         title=f"{job.name}: where the part touches the wheel",
         contact_positions=prepared.problem.field.contact_positions,
-        states=node_states(prepared.problem, path.ik_branch),
+        states=planned.survey.states,
         state_names=[state.value for state in NodeState],
         pass_index=pass_index,
         flat_end=job.cell.wheel.flat_end,

@@ -1,4 +1,4 @@
-"""Programs as they stand in their files: proven, described, compared."""
+"""Programs as they stand in their files, proven."""
 
 from __future__ import annotations
 
@@ -7,16 +7,14 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from opl.cell.robot import Robot
-from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.job.refusals import keys_named
-from opl.program.posts import reader_for
 from opl.proof.digest import changed_since, digests_in
 from opl.proof.prove import Proof, prove
 from opl.run.delivery import RESULT
+from opl.run.listings import read_program
 from opl.run.reporting import replay_report
 from opl.run.result import VerificationReport
 from opl.run.surfacing import cut_surface
@@ -63,7 +61,7 @@ def prove_program(job: Job, files: Sequence[Path], watch: Watch | None = None) -
         Cancelled: If the work was cancelled.
     """
     watch = watch or Watch()
-    content = {path: _content(path) for path in files}
+    content = {path: read_program(path) for path in files}
     points = cut_surface(job, watch).points
     with watch.stage(Stage.VERIFICATION) as progress, keys_named(job.source):
         found = prove(job, points, {str(path): data for path, data in content.items()}, progress)
@@ -113,39 +111,3 @@ def _compared_with_results(files: Mapping[Path, bytes]) -> tuple[list[Finding], 
         else:
             known = False
     return findings, False if findings else True if known else None
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}") from error
-
-
-def describe_program(file: Path, robot: Robot) -> list[str]:
-    """Return a program in words, one line each: positions, moves, speeds, signals.
-
-    Args:
-        file: The program; its suffix names the language.
-        robot: Whose program it is taken for.
-
-    Raises:
-        InputError: If the file cannot be read or is no program.
-    """
-    return [*reader_for(file).describe(str(file), _content(file), robot)]
-
-
-def compare_programs(file: Path, other: Path) -> list[str]:
-    """Return how two programs differ in what they do, one line each; empty if they do not.
-
-    Args:
-        file: The one; its suffix names the language.
-        other: The other, of the same language.
-
-    Raises:
-        InputError: If a file cannot be read, is no program, or they are of two languages.
-    """
-    reader = reader_for(file)
-    if reader_for(other) is not reader:
-        raise InputError(str(other), f"is not of the language of {file}")
-    return [*reader.differences((str(file), _content(file)), (str(other), _content(other)))]

@@ -11,6 +11,8 @@ from opl.job.load import Job
 from opl.run.values import Surfaced
 from opl.run.watch import Stage, Watch
 
+MOST_NODES = 400_000  # in a matrix of cutter points by contact positions: about a gigabyte
+
 
 def cut_surface(job: Job, watch: Watch | None = None) -> Surfaced:
     """Cut the surface of a job into passes of cutter points and inspect them.
@@ -29,6 +31,22 @@ def cut_surface(job: Job, watch: Watch | None = None) -> Surfaced:
             raise InputError(job.source.at(key), error.message) from error
         except ValueError as error:
             raise InputError(job.source.at(keys.PASSES), str(error)) from error
+        _check_count(job, len(laid.points))
         cell = job.cell
         found = inspect(job.surface, job.passes, laid, cell.wheel, cell.max_belt_penetration)
         return Surfaced(job, laid, found)
+
+
+def _check_count(job: Job, n_points: int) -> None:
+    """Refuse a matrix that is too large for what plans on it.
+
+    Raises:
+        InputError: If it is.
+    """
+    per_point = job.search.n_contact_positions
+    if n_points * per_point > MOST_NODES:
+        raise InputError(
+            job.source.at(keys.SEARCH_CONTACT_POSITIONS),
+            f"{per_point} at each of {n_points} cutter points make {n_points * per_point} nodes, "
+            f"at most {MOST_NODES} are searched: fewer of them, longer steps or fewer rows",
+        )

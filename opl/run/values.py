@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 from opl.errors import NoPathError, OplError, UnsafeError
@@ -24,6 +25,7 @@ from opl.motion.timing import Timing
 from opl.planning.fixed_contact import FixedContact
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
+from opl.planning.survey import NodeSurvey, survey_nodes, widest_branch
 from opl.program.moves import Program
 from opl.proof.read_back import FileProof
 from opl.run.watch import Stage
@@ -69,6 +71,12 @@ class Prepared:
     problem: GrindingProblem
     fixed: FixedContact
 
+    @cached_property
+    def survey(self) -> NodeSurvey:
+        """Every node of the IK branch that comes farthest, for pictures."""
+        problem = self.problem
+        return survey_nodes(problem, widest_branch(problem), problem.process.home)
+
 
 @dataclass(frozen=True, eq=False)
 class Planned:
@@ -88,6 +96,14 @@ class Planned:
     compared: Mapping[str, Figures]
     timing: Timing
     slow: tuple[SlowStretch, ...]
+
+    @cached_property
+    def survey(self) -> NodeSurvey:
+        """Every node of the path's IK branch, for pictures."""
+        path = self.plan.path
+        return survey_nodes(
+            self.prepared.problem, path.ik_branch, path.q[path.cutter_point % 1.0 == 0.0]
+        )
 
     @property
     def surfaced(self) -> Surfaced:

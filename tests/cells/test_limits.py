@@ -14,7 +14,8 @@ from opl.motion.whole_motion import UnreachableApproachError, whole_motion
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.multi_start import plan_recursive
 from opl.planning.nodes import build_nodes
-from opl.planning.reasons import NodeState, explain, node_states
+from opl.planning.reasons import explain
+from opl.planning.survey import NodeState, survey_nodes
 from tests.support.planned import (
     replay_tiny,
     small_problem,
@@ -136,7 +137,7 @@ def test_reasons_and_states_tell_the_limit():
     assert shut.field.matrices == ()
     (line,) = explain(shut, [])
     assert "beyond the limits of R+T" in line
-    states = node_states(shut, 0)
+    states = survey_nodes(shut, 0, np.zeros(6)).states
     reached = ~np.isnan(problem.field.q[:, :, 0, 0])
     cuts = problem.wheel_distance < -problem.cell.planned_penetration
     assert (states[reached & ~cuts] == list(NodeState).index(NodeState.LIMITS)).all()

@@ -16,7 +16,8 @@ from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.fixed_contact import keep_contact, runs_of
 from opl.planning.multi_start import Start, plan_recursive, try_recursive
 from opl.planning.plan import Exhausted, Found, OutOfBudget
-from opl.planning.reasons import NodeState, explain, node_states, unreachable_points
+from opl.planning.reasons import explain, unreachable_points
+from opl.planning.survey import NodeState, survey_nodes
 from tests.support.bare_cells import Ghosts, with_obstacle
 from tests.support.brute_force import printed_recursion
 from tests.support.fcl_scene import FclScene
@@ -331,7 +332,7 @@ def test_states_say_what_rules_a_node_out():
     column, row = np.argwhere(nodes.exists)[len(np.argwhere(nodes.exists)) // 2]
     haunted = with_scene(problem, collision=Ghosts(nodes.q[column, row], radius=1e-3))
     changed = replace(haunted, wheel_distance=layer, field=replace(problem.field, q=q))
-    states = node_states(changed, branch)
+    states = survey_nodes(changed, branch, np.zeros(6)).states
     assert states.shape == layer.shape
     assert states[5, 3] == codes[NodeState.WHEEL]
     assert states[6, 4] == codes[NodeState.REACH]

@@ -97,15 +97,23 @@ def test_every_job_has_its_row_in_the_order_of_the_files(mixed):
     assert ended.status == 3
 
 
-def test_the_good_job_has_its_files_and_the_impossible_one_its_result_only(mixed):
+def test_the_good_job_has_its_files_and_the_impossible_one_its_page_only(mixed):
     home, _, rows = mixed
     made = {
         path.name: sorted(file.name for file in path.iterdir())
         for path in (home / "made").iterdir()
     }
     assert made == {
-        "GOOD": ["GOOD.JBI", "GOOD.csv", "GOOD_contact.svg", "GOOD_joints.svg", "result.json"],
-        "TROUGH": ["result.json"],
+        "GOOD": [
+            "GOOD.JBI",
+            "GOOD.csv",
+            "GOOD_contact.svg",
+            "GOOD_joints.svg",
+            "GOOD_motion.json",
+            "report.html",
+            "result.json",
+        ],
+        "TROUGH": ["report.html", "result.json"],
     }
     told = {row["job"]: row for row in rows}["jobs/good/job.yaml"]
     assert told["folder"] == "made/GOOD" and told["message"] == ""

@@ -18,7 +18,13 @@ from tests.support.jobs import V_JOB, Ended, document, opl, write_job
 from tests.support.schema_check import schema_faults
 
 EPOCH = "1700000000"
-FILES = ["V_SHAPE.JBI", "V_SHAPE.csv", "V_SHAPE_contact.svg", "V_SHAPE_joints.svg"]
+FILES = [
+    "V_SHAPE.JBI",
+    "V_SHAPE.csv",
+    "V_SHAPE_contact.svg",
+    "V_SHAPE_joints.svg",
+    "V_SHAPE_motion.json",
+]
 JOINTS = "SLURBT"
 
 
@@ -66,7 +72,9 @@ def on_wheel(table):
 def test_the_v_job_ends_well_and_leaves_its_files(v_run):
     out, ended = v_run
     assert ended.returncode == 0, ended.stderr
-    assert sorted(path.name for path in out.iterdir()) == sorted([*FILES, "result.json"])
+    assert sorted(path.name for path in out.iterdir()) == sorted(
+        [*FILES, "report.html", "result.json"]
+    )
 
 
 def test_json_prints_the_result_and_nothing_else(v_run):
@@ -222,7 +230,7 @@ def test_pictures_are_well_formed_svg(v_run):
 def test_a_second_run_gives_the_same_bytes(v_run, tmp_path, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", EPOCH)
     assert opl("run", V_JOB, "--out", tmp_path, "-q") == Ended(0, "", "")
-    for name in FILES:
+    for name in [*FILES, "report.html"]:
         assert (tmp_path / name).read_bytes() == (v_run[0] / name).read_bytes(), name
 
 
@@ -260,7 +268,7 @@ def test_a_run_prints_the_comparison_the_figures_and_the_files(quick_run):
         "verification in PyBullet: ",
     ):
         assert told in ended.out
-    for name in [*FILES, "result.json"]:
+    for name in [*FILES, "report.html", "result.json"]:
         assert f"wrote out/V_SHAPE/{name}\n" in ended.out
 
 

@@ -15,7 +15,13 @@ from opl.run.stages import run_job
 from opl.run.values import Refused
 from tests.support.jobs import POST, document, opl, write_job, write_robot, write_trough
 
-PROGRAM = ["V_SHAPE.JBI", "V_SHAPE.csv", "V_SHAPE_contact.svg", "V_SHAPE_joints.svg"]
+PROGRAM = [
+    "V_SHAPE.JBI",
+    "V_SHAPE.csv",
+    "V_SHAPE_contact.svg",
+    "V_SHAPE_joints.svg",
+    "V_SHAPE_motion.json",
+]
 
 
 def written(folder):
@@ -57,15 +63,15 @@ def refused(run):
 
 def test_files_are_written_to_the_byte(run, tmp_path):
     paths = deliver(with_files(run, "A.JBI"), tmp_path / "new" / "folder")
-    assert [path.name for path in paths] == ["A.JBI", "result.json"]
+    assert [path.name for path in paths] == ["A.JBI", "report.html", "result.json"]
     assert paths[0].read_bytes() == b"new\r\n"
-    assert written(tmp_path / "new" / "folder") == ["A.JBI", "result.json"]
+    assert written(tmp_path / "new" / "folder") == ["A.JBI", "report.html", "result.json"]
 
 
 def test_a_run_without_a_program_takes_the_earlier_program_away(run, tmp_path):
     leave_earlier_run(tmp_path / "out")
     deliver(refused(run), tmp_path / "out")
-    assert written(tmp_path / "out") == ["notes.txt", "result.json"]
+    assert written(tmp_path / "out") == ["notes.txt", "report.html", "result.json"]
     assert result_in(tmp_path / "out")["status"] == "no_path"
     assert (tmp_path / "outside.txt").is_file()
 
@@ -73,7 +79,7 @@ def test_a_run_without_a_program_takes_the_earlier_program_away(run, tmp_path):
 def test_a_run_with_other_files_takes_the_earlier_ones_away(run, tmp_path):
     leave_earlier_run(tmp_path / "out")
     deliver(with_files(run, "V_SHAPE.JBI"), tmp_path / "out")
-    assert written(tmp_path / "out") == ["V_SHAPE.JBI", "notes.txt", "result.json"]
+    assert written(tmp_path / "out") == ["V_SHAPE.JBI", "notes.txt", "report.html", "result.json"]
     assert (tmp_path / "out" / "V_SHAPE.JBI").read_text() == "new\n"
 
 
@@ -81,7 +87,7 @@ def test_a_run_with_other_files_takes_the_earlier_ones_away(run, tmp_path):
 def test_a_result_that_cannot_be_read_hinders_nothing(run, tmp_path, text):
     (tmp_path / "result.json").write_text(text)
     deliver(with_files(run, "A.JBI"), tmp_path)
-    assert written(tmp_path) == ["A.JBI", "result.json"]
+    assert written(tmp_path) == ["A.JBI", "report.html", "result.json"]
 
 
 def test_a_write_that_fails_leaves_the_earlier_run_as_it_was(run, tmp_path, monkeypatch):
@@ -120,7 +126,7 @@ def test_a_folder_is_held_from_before_the_work(run, tmp_path):
         told = f"{tmp_path / 'a' / 'b'}: another run writes to it (process {os.getpid()})"
         assert ended.status == 2 and told in ended.err
         deliver(with_files(run, "A.JBI"), claim)
-    assert written(tmp_path / "a" / "b") == ["A.JBI", "result.json"]
+    assert written(tmp_path / "a" / "b") == ["A.JBI", "report.html", "result.json"]
     with claim_folder(tmp_path / "c" / "d", "V_SHAPE"):
         pass  # cut short before it had anything to deliver
     assert not (tmp_path / "c").exists()
@@ -170,7 +176,7 @@ def run_without_path(job, out, name="V_SHAPE"):
     ended = opl("run", job, "--out", out)
     assert ended.status == 3, ended.err
     assert "Traceback" not in ended.err
-    assert written(out) == ["notes.txt", "result.json"]
+    assert written(out) == ["notes.txt", "report.html", "result.json"]
     result = result_in(out)
     assert result["status"] == "no_path"
     assert result["program"] is None and result["path"] is None and result["verification"] is None
@@ -229,7 +235,7 @@ def test_what_the_planner_overlooks_pybullet_finds_and_no_program_is_written(tmp
     job = write_job(tmp_path / "j", {"obstacles": obstacles})
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 4
-    assert written(tmp_path / "out") == ["notes.txt", "result.json"]
+    assert written(tmp_path / "out") == ["notes.txt", "report.html", "result.json"]
     result = result_in(tmp_path / "out")
     assert result["status"] == "unsafe"
     assert result["program"] is None

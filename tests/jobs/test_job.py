@@ -116,6 +116,33 @@ def test_a_job_may_name_its_own_joint_accelerations(tmp_path):
         ),
         ({"wheel.width_mm": 0}, "wheel.width_mm: must be more than 0, got 0"),
         ({"wheel.width_mm": -3}, "wheel.width_mm: must be more than 0, got -3"),
+        ({"wheel.width_mm": 1e23}, "wheel.width_mm: must be at most 2000, got 1.0e+23"),
+        ({"clearance_mm": 1e9}, "clearance_mm: must be at most 1000, got 1000000000.0"),
+        ({"passes.max_step_mm": 1e-9}, "passes.max_step_mm: must be at least 0.01, got 1.0e-09"),
+        (
+            {"search.contact_positions": 100_000},
+            "search.contact_positions: must be at most 2000, got 100000",
+        ),
+        (
+            {"search.max_contact_step": 1e-9},
+            "search.max_contact_step: must be at least 0.05, got 1.0e-09",
+        ),
+        (
+            {"passes.pitch_mm": 0.01, "passes.rows": GONE},
+            "passes.pitch_mm: makes 2001 rows with their repeats, at most 2000 are laid",
+        ),
+        (
+            {"passes.max_step_mm": 0.01},
+            "passes.max_step_mm: 0.01 mm makes about 23354 cutter points; at most 20000 are",
+        ),
+        (
+            {"passes.pitch_mm": 0.02, "passes.rows": 150, "passes.max_chord_error_mm": 0.0001},
+            "passes.max_chord_error_mm: 0.0001 mm makes about",
+        ),
+        (
+            {"search.contact_positions": 2000, "passes.max_step_mm": 0.5},
+            "search.contact_positions: 2000 at each of",
+        ),
         ({"wheel.max_roll_deg": 120}, "wheel.max_roll_deg: must be at most 90, got 120"),
         ({"search.contact_positions": 1}, "search.contact_positions: must be at least 2, got 1"),
         (

@@ -12,13 +12,16 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 
 import opl as package
+from opl.cell.robot_file import RobotFile
 from opl.files import documents
+from opl.geometry.machined import _SurfaceFile
 from opl.job.bodies import BodySection
 from opl.job.cell_file import CellFile
 from opl.job.file import JobFile
 from opl.job.process import ProcessSection
 from opl.job.reference import json_schema, keys_page, unit_of
 from opl.job.search import ObjectiveWeightsSection, SearchSection, WeightsSection
+from opl.program.ratios import _RatioFile
 from tests.support.jobs import document, opl
 
 PAGE = Path(__file__).parents[2] / "docs" / "keys.md"
@@ -118,7 +121,7 @@ def test_descriptions_of_the_schema_end_with_unit_default_and_range(kind):
     assert json.loads(json.dumps(made)) == made
     wheel = made["$defs"]["WheelSection" if kind == "job" else "CellWheelSection"]["properties"]
     assert wheel["max_belt_penetration_mm"]["description"] == (
-        "How deep the part may sink into the belt. [mm] Default: 0.5. Allowed: >= 0."
+        "How deep the part may sink into the belt. [mm] Default: 0.5. Allowed: >= 0, <= 50."
     )
     assert wheel["max_roll_deg"]["description"].endswith("[deg] Allowed: >= 0, <= 90.")
 
@@ -220,7 +223,7 @@ def test_what_the_schema_allows_is_read_and_comes_back_the_same(model, data, tmp
 
 @given(
     weights=st.fixed_dictionaries(
-        {}, optional={key: st.floats(0.0, 1e6) for key in ("range", "travel", "time")}
+        {}, optional={key: st.floats(0.0, 1e5) for key in ("range", "travel", "time")}
     )
 )
 def test_objective_weights_need_one_above_zero(weights):
@@ -233,7 +236,7 @@ def test_objective_weights_need_one_above_zero(weights):
             documents.check(weights, ObjectiveWeightsSection, "x")
 
 
-LENGTHS = st.floats(1e-3, 1e6)
+LENGTHS = st.floats(1e-3, 1e5)
 SHAPES = {
     "box_mm": st.lists(LENGTHS, min_size=3, max_size=3),
     "cylinder_mm": st.lists(LENGTHS, min_size=2, max_size=2),
@@ -252,6 +255,35 @@ def test_a_body_has_exactly_one_shape(chosen):
     else:
         with pytest.raises(documents.InputError, match="needs either box_mm"):
             documents.check(content, BodySection, "x")
+
+
+def numbers_in(schema, place):
+    """Yield the place and the schema of every number and every list that a schema allows."""
+    if schema.get("type") in ("number", "integer", "array"):
+        yield place, schema
+    for one in [*schema.get("anyOf", []), schema.get("items"), schema.get("additionalProperties")]:
+        if isinstance(one, dict):
+            yield from numbers_in(one, place)
+
+
+@pytest.mark.parametrize(
+    "model", [JobFile, CellFile, RobotFile, _RatioFile, _SurfaceFile], ids=lambda one: one.__name__
+)
+def test_every_number_has_bounds_on_both_sides(model):
+    made = model.model_json_schema()
+    seen = 0
+    for name, section in {model.__name__: made, **made.get("$defs", {})}.items():
+        for key, value in section["properties"].items():
+            for place, one in numbers_in(value, f"{name}.{key}"):
+                seen += 1
+                if one["type"] == "array":  # how much a surface has is bounded by its file
+                    assert "maxItems" in one or model is _SurfaceFile, place
+                    continue
+                if "enum" in one:
+                    continue
+                for end in ("inimum", "aximum"):
+                    assert {f"m{end}", f"exclusiveM{end}"} & one.keys(), place
+    assert seen > 5
 
 
 def test_the_v_job_comes_back_the_same_with_all_defaults_written_out():

@@ -434,5 +434,8 @@ def test_a_run_that_writes_something_else_writes_nothing(tmp_path, monkeypatch):
     job = write_job(tmp_path, COARSE)
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 4 and "file at V_SHAPE line" in ended.err
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["result.json"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "report.html",
+        "result.json",
+    ]
     assert json.loads((tmp_path / "out" / "result.json").read_text())["status"] == "unsafe"

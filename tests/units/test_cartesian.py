@@ -86,7 +86,7 @@ def test_cartesian_job_says_what_its_positions_are():
         "///RCONF 1,0,0" + 21 * ",0",
     ]
     assert "///ATTR SC,RW,RJ\r\n////FRAME USER 7\r\n///GROUP1 RB1" in text
-    assert "///RCONF 1,0,0,0,0,0\r\n" in write(verified_motion().motion.q[0], NX100)
+    assert "///RCONF 1,0,0,0,0,0,0,0\r\n" in write(verified_motion().motion.q[0], NX100)
 
 
 def test_rconf_is_written_where_it_changes_only():

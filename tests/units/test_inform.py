@@ -305,7 +305,7 @@ def test_legal_job_has_no_faults():
         ({"steps": "MOVJ C00002 VJ=1.00"}, "C00002 is used but not given"),
         ({"steps": "MOVJ C00000 VJ=0.00"}, "VJ must be 0.01 to 100.0, got 0.00"),
         ({"steps": "MOVJ C00000 VJ=100.01"}, "VJ must be 0.01 to 100.0"),
-        ({"steps": "MOVJ C00000 VJ=50.0"}, "VJ must have 2 decimals, got 50.0"),
+        ({"steps": "MOVJ C00000 VJ=50.000"}, "VJ takes 2 decimals, got 50.000"),
         ({"steps": "MOVL C00000 V=1500.1"}, "V must be 0.1 to 1500.0"),
         ({"steps": "MOVJ C00000 VJ=1.00  +MOVJ EC00000 VJ=200.00"}, "VJ must be 0.01 to 100.0"),
         ({"steps": "MOVJ C00000 VJ=1.00 PL=9"}, "PL must be 0 to 8, got 9"),

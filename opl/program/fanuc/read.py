@@ -170,12 +170,12 @@ class _Body:
             if notes.begun == (unit == "%"):
                 notes.doubt(line, "the first move needs a speed in %, every other one in msec")
             counts = SpeedUnit.TOP_SPEED if unit == "%" else SpeedUnit.SECONDS
-            value = float(speed) / (100.0 if unit == "%" else 1e3)
+            factor = 0.01 if unit == "%" else 1e-3
             axes = np.deg2rad([float(axis) for axis in position.axes])
             move = ReadMove(
                 target=from_fanuc(axes),
                 straight=word == "L",
-                speed=WrittenSpeed(counts, value, speed + unit),
+                speed=WrittenSpeed.of_number(counts, factor, speed, 0, speed + unit),
                 corner=Corner(0.0 if end == "FINE" else float(end[3:]) or 1.0, end),
                 tool=position.tool,
                 place=notes.place(line),

@@ -12,19 +12,21 @@ from opl.program.controller import ControllerProfile
 from opl.program.inform.job import POSITION_KINDS, InformJob, Instruction
 from opl.program.inform.parse import parse
 
-# Order in which controllers write the headers that occur once; the others hold for the positions
-# after them and stand among those.
+# Order in which controllers write the headers that occur once. Others hold for the positions after
+# them and stand among those, or stand in any order: //ARGINFO, //ALIAS, ///LVARS.
 _HEADER_ORDER = (
-    "/JOB", "//NAME", "///FOLDERNAME", "//POS", "///NPOS", "//ARGINFO", "///ARGTYPE", "///COMMENT",
-    "//INST", "///DATE", "///COMM", "///ATTR", "////FRAME", "///GROUP1", "///GROUP2", "///GROUP3",
-    "///LVARS",
+    "/JOB", "//NAME", "///FOLDERNAME", "//POS", "///NPOS", "//INST", "///DATE", "///COMM",
+    "///ATTR", "////FRAME", "///GROUP1", "///GROUP2", "///GROUP3",
 )  # fmt: skip
+# Comments on arguments follow one a line, some of them empty.
+_MAY_BE_EMPTY = "///COMMENT"
 _REQUIRED_HEADERS = ("//POS", "///NPOS", "//INST", "///DATE", "///ATTR")
 _DATE = re.compile(r"[0-9]{4}/[0-9]{2}/[0-9]{2} [0-9]{2}:[0-9]{2}")
 _NOT_PRINTABLE = re.compile(r"[^\t -~]")
 _DECIMAL = re.compile(r"[0-9]+(?:\.[0-9]+)?")
 _SIGNAL = re.compile(r"\b(IN|OT)#\(([0-9]{1,9})\)")
-_VARIABLE = re.compile(r"[A-Z]+(?:[0-9]+|\[.*\])")
+# a variable, or its alias
+_VARIABLE = re.compile(r"[A-Z][A-Z0-9_]*(?:\[.*\])?")
 
 
 def job_faults(text: str, profile: ControllerProfile) -> tuple[str, ...]:
@@ -45,13 +47,16 @@ def _text_faults(text: str, job: InformJob) -> Iterator[str]:
     # a job of bare line feeds is refused at load: the controller finds neither NOP nor END
     if "\n" in text.replace("\r\n", "") or "\r" in text.replace("\r\n", ""):
         yield "lines must end in CR LF"
-    if not text.endswith("\nEND\r\n"):
+    if job.lines[-2:] != ("END", ""):
         yield "the file must end with END and CR LF"
+    header = ""
     for number, line in enumerate(job.lines[:-1], start=1):
         if found := _NOT_PRINTABLE.search(line):
             yield f"line {number}: must be printable ASCII, got {found[0]!r}"
+        header = line.split()[0] if line.startswith("/") else header
         if not line.strip():
-            yield f"line {number}: is empty"
+            if header != _MAY_BE_EMPTY:
+                yield f"line {number}: is empty"
         elif line.startswith(" "):
             yield f"line {number}: begins with a space"
 
@@ -80,15 +85,16 @@ def _position_faults(job: InformJob, profile: ControllerProfile) -> Iterator[str
         yield f"///NPOS is {_listed(job.npos)}, there are {_listed(true)}"
     if counts["C"] > profile.step_limit:
         yield f"{counts['C']} positions, {profile.name} takes {profile.step_limit} in a job"
+    most = profile.rconf_fields
     for position in job.positions:
         if not position.coordinates or position.tool is None:
             yield f"line {position.line}: ///TOOL and ///POSTYPE must come before the positions"
         elif (
             position.coordinates == "RECTAN"
             and position.kind == "C"
-            and (len(position.rconf) != profile.rconf_fields)
+            and not (profile.least_rconf_fields <= len(position.rconf) <= most)
         ):
-            yield f"line {position.line}: RCONF has {profile.rconf_fields} numbers"
+            yield f"line {position.line}: RCONF has {most} numbers, here {len(position.rconf)}"
         elif not 0 <= position.tool <= profile.highest_tool:
             yield f"line {position.line}: tools are 0 to {profile.highest_tool}"
         if position.kind == "C" and len(position.label) != 1 + profile.label_digits:
@@ -162,8 +168,9 @@ def _move_faults(move: Instruction, profile: ControllerProfile) -> Iterator[str]
                 yield f"line {move.line}: {name} must be {low} to {high}, got {text}"
             continue
         allowed = speeds[name]
-        if not re.fullmatch(rf"[0-9]{{1,9}}\.[0-9]{{{allowed.decimals}}}", text):
-            yield f"line {move.line}: {name} must have {allowed.decimals} decimals, got {text}"
+        # controllers write all decimals, and take fewer
+        if not re.fullmatch(rf"[0-9]{{1,9}}(?:\.[0-9]{{1,{allowed.decimals}}})?", text):
+            yield f"line {move.line}: {name} takes {allowed.decimals} decimals, got {text}"
         elif not allowed.lowest <= float(text) <= allowed.highest:
             span = f"{allowed.lowest} to {allowed.highest}"
             yield f"line {move.line}: {name} must be {span}, got {text}"

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 # Kinds of positions, in the order ///NPOS counts them: taught robot, base and station positions,
 # then robot, base and station position variables.
 POSITION_KINDS = ("C", "BC", "EC", "P", "BP", "EX")
+# Those of the arm itself.
+ROBOT_KINDS = ("C", "P")
 
 _MOVE = re.compile(r"(?:S|I|X|EI)?MOV[A-Z]*")
 _LABEL = re.compile(r"(BC|EC|BP|EX|C|P)([0-9]{1,9})")
@@ -49,7 +51,8 @@ class Position:
         kind: One of `POSITION_KINDS`.
         number: The number in the label.
         values: Pulses, or lengths in [mm] and angles in [deg], by `coordinates`.
-        coordinates: ``PULSE``, ``RECTAN``, ``ANGLE``, or "" where the file does not say.
+        coordinates: ``PULSE``, ``RECTAN``, ``ANGLE``, or "" where the file does not say and the
+            values are not whole numbers, which are pulses.
         frame: ``PULSE``, ``ANGLE``, ``BASE``, ``ROBOT``, ``USER``, ``TOOL``, ``MTOOL``, or "".
         tool: Tool number, None where the file does not say.
         user: User frame number, None where the file does not say.
@@ -80,6 +83,7 @@ class Instruction:
         comment: Text of a comment line or after ``//``, None without one.
         disabled: Whether the instruction is commented out by COMM.
         coupled: Moves of other groups on the same line, each opened by ``+``.
+        rest: All words after the first as they stand, those of coupled moves left out.
     """
 
     line: int
@@ -89,6 +93,7 @@ class Instruction:
     comment: str | None = None
     disabled: bool = False
     coupled: tuple[Instruction, ...] = ()
+    rest: tuple[str, ...] = ()
 
     @property
     def moves(self) -> bool:
@@ -117,6 +122,7 @@ class InformJob:
         headers: Header lines, known or not, in order.
         positions: Positions in order.
         instructions: Lines between NOP and END in order.
+        aliases: Lines of the section //ALIAS, names that instructions may use for variables.
     """
 
     lines: tuple[str, ...]
@@ -125,6 +131,7 @@ class InformJob:
     headers: tuple[Header, ...]
     positions: tuple[Position, ...]
     instructions: tuple[Instruction, ...]
+    aliases: tuple[str, ...] = ()
 
     @property
     def moves(self) -> tuple[Instruction, ...]:

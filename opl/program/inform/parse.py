@@ -13,8 +13,12 @@ from opl.program.inform.job import Header, InformJob, Instruction, Position, rea
 
 BYTE_ORDER_MARK = "\ufeff"
 
-# Controllers save ASCII and Shift-JIS; copies in repositories are UTF-8. The last takes any byte.
+# Controllers save ASCII and the code page of their language, copies in repositories are UTF-8. The
+# last takes any byte.
 _ENCODINGS = ("ascii", "utf-8", "cp932", "latin-1")
+# Bytes of Latin-1 are mostly some of Shift-JIS too: it is Japanese if two letters of it stand
+# together, kana or kanji or both; an umlaut among ASCII letters makes no such pair.
+_JAPANESE = re.compile("[\u3000-\u30ff\u3400-\u9fff\uff01-\uff9f]{2}")
 _LINE_END = re.compile(r"\r\n?|\n")
 _HEADER = re.compile(r"(/{1,4}[A-Z]+[0-9]*)(?:[ \t]+(.*))?")
 _POSITION = re.compile(r"([A-Z]+[0-9]+)=(.*)")
@@ -27,11 +31,14 @@ _COUPLED = re.compile(r"[ \t]+\+(?=S?MOV)")
 
 
 def decode(data: bytes) -> tuple[str, str]:
-    """Return the text of a job file and its encoding, which gives the same bytes again."""
+    """Return the text of a job file and its encoding, found by trial.
+
+    The encoding gives the same bytes again.
+    """
     for encoding in _ENCODINGS:
         try:
             text = data.decode(encoding)
-            if text.encode(encoding) == data:
+            if text.encode(encoding) == data and (encoding != "cp932" or _JAPANESE.search(text)):
                 return text, encoding
         except UnicodeError:
             continue
@@ -55,7 +62,7 @@ def parse(text: str, source: str = "job") -> InformJob:
         if line.rstrip() == "/JOB":
             raise _error(source, number, "a second job begins; read_jobs reads several")
     first, last = _body(lines, source)
-    headers, positions = _head(lines[: first - 1], source)
+    headers, positions, aliases = _head(lines[: first - 1], source)
     names = [header for header in headers if header.key == "//NAME"]
     if len(names) != 1:
         raise _error(source, 2, f"a job has one //NAME, this one has {len(names)}")
@@ -69,6 +76,7 @@ def parse(text: str, source: str = "job") -> InformJob:
         instructions=tuple(
             _instruction(number, lines[number - 1]) for number in range(first + 1, last)
         ),
+        aliases=aliases,
     )
 
 
@@ -109,8 +117,11 @@ def _body(lines: tuple[str, ...], source: str) -> tuple[int, int]:
     return places[2], places[3]
 
 
-def _head(lines: tuple[str, ...], source: str) -> tuple[tuple[Header, ...], tuple[Position, ...]]:
-    """Read what stands before NOP."""
+def _head(
+    lines: tuple[str, ...], source: str
+) -> tuple[tuple[Header, ...], tuple[Position, ...], tuple[str, ...]]:
+    """Read headers, positions and aliases, which stand before NOP."""
+    aliases: list[str] = []
     headers: list[Header] = []
     positions: list[Position] = []
     section = ""
@@ -125,7 +136,9 @@ def _head(lines: tuple[str, ...], source: str) -> tuple[tuple[Header, ...], tupl
         elif section == "//POS" and not line.startswith("/"):
             # not kept as unknown: a position that cannot be read must not pass unnoticed
             positions.append(_position(number, line, in_force, source))
-    return tuple(headers), tuple(positions)
+        elif section == "//ALIAS" and line.strip():
+            aliases.append(" ".join(line.split()))
+    return tuple(headers), tuple(positions), tuple(aliases)
 
 
 def _meaning(header: Header) -> dict[str, Header]:
@@ -145,9 +158,12 @@ def _position(number: int, line: str, in_force: dict[str, Header], source: str) 
     label = read_label(match[1]) if match else None
     if match is None or label is None:
         raise _error(source, number, f"is neither a header nor a position: {_shown(line)}")
-    coordinates = in_force["coordinates"].value if "coordinates" in in_force else ""
-    shape = _INTEGER if coordinates == "PULSE" else _NUMBER
     values = [value.strip(" \t") for value in match[2].split(",")]
+    if "coordinates" in in_force:
+        coordinates = in_force["coordinates"].value
+    else:  # jobs without ///POSTYPE and ///PULSE are found, and play
+        coordinates = "PULSE" if all(map(_INTEGER.fullmatch, values)) else ""
+    shape = _INTEGER if coordinates == "PULSE" else _NUMBER
     if not all(shape.fullmatch(value) for value in values):
         kind = "pulses are whole numbers" if coordinates == "PULSE" else "positions are numbers"
         raise _error(source, number, f"{kind} with commas between, got {_shown(match[2])}")
@@ -182,7 +198,7 @@ def _instruction(number: int, line: str) -> Instruction:
         body, comment = match[1], match[2]
     own, *others = (_words(number, part, disabled) for part in _COUPLED.split(body))
     return Instruction(
-        number, own.word, own.operands, own.tags, comment, disabled, coupled=tuple(others)
+        number, own.word, own.operands, own.tags, comment, disabled, tuple(others), own.rest
     )
 
 
@@ -194,6 +210,7 @@ def _words(number: int, part: str, disabled: bool) -> Instruction:
         operands=tuple(item for item in rest if "=" not in item),
         tags=tuple((key, value) for key, _, value in (i.partition("=") for i in rest if "=" in i)),
         disabled=disabled,
+        rest=tuple(rest),
     )
 
 

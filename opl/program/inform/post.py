@@ -94,28 +94,49 @@ def _read(
     return Reading(first_job(jobs), playback, tuple(foreign), (*refused, *doubtful))
 
 
+_MOST_FAULTS = 10  # that are listed
+_CODE_PAGES = {"cp932": "Shift-JIS", "latin-1": "Latin-1", "utf-8": "UTF-8"}
+
+
 def describe_file(name: str, content: bytes, robot: Robot) -> list[str]:
     """Say what each job of a file does.
 
     Raises:
         InputError: If the file holds what is no job.
     """
-    jobs = read_jobs(decode(content)[0], name)
+    text, encoding = decode(content)
+    jobs = read_jobs(text, name)
     unsure = ", ".join(robot.unverified_pulses)
     about = f"read as a program of {robot.title}"
     about += f", whose pulse ratios of {unsure} are not verified" if unsure else ""
-    return [about, *(line for job in jobs for line in describe(job, robot))]
+    lines = [about]
+    if encoding in _CODE_PAGES:
+        lines.append(f"text in {_CODE_PAGES[encoding]}, found by trial; controllers need ASCII")
+    for job in jobs:
+        lines += describe(job, robot, _cautions(text if len(jobs) == 1 else unparse(job)))
+    return lines
 
 
-def file_differences(first: tuple[str, bytes], second: tuple[str, bytes]) -> list[str]:
-    """Say what differs in meaning between two files of jobs.
+def _cautions(text: str) -> list[str]:
+    """Say what is wrong with a job on the controller that finds least wrong with it."""
+    by_name = {profile.name: job_faults(text, profile) for profile in PROFILES.values()}
+    name, faults = min(reversed(by_name.items()), key=lambda item: len(item[1]))
+    shown = [f"caution, on {name}: {fault}" for fault in faults[:_MOST_FAULTS]]
+    more = len(faults) - len(shown)
+    return [*shown, *([f"caution: {more} more of this kind"] if more else [])]
+
+
+def file_differences(
+    first: tuple[str, bytes], second: tuple[str, bytes], robot: Robot
+) -> list[str]:
+    """Say how two files of jobs differ in meaning.
 
     Raises:
         InputError: If a file holds what is no job.
     """
     one, other = (read_jobs(decode(content)[0], name) for name, content in (first, second))
     pairs = zip(one, other, strict=False)
-    lines = [line for pair in pairs for line in differences_in_meaning(*pair)]
+    lines = [line for pair in pairs for line in differences_in_meaning(*pair, robot)]
     return lines if len(one) == len(other) else [*lines, f"{len(one)} jobs against {len(other)}"]
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from opl.cell.robot import Robot, forward_kinematics
-from opl.program.inform.job import POSITION_KINDS, InformJob, Instruction, Position
+from opl.program.inform.job import ROBOT_KINDS, InformJob, Instruction, Position
 from opl.program.inform.times import job_configurations
 from opl.program.listing import angles_text, pose_text, pose_values
 
@@ -17,14 +17,20 @@ _SIGNAL = re.compile(r"\b(?:IN|OT|IG|OG|AO|AI)#\([^)]*\)")
 _SPEEDS = ("VJ", "V", "VR", "VE")
 
 
-def describe(job: InformJob, robot: Robot) -> list[str]:
+def describe(job: InformJob, robot: Robot, cautions: Sequence[str] = ()) -> list[str]:
     """Return the summary of a job and its instructions in order, one line each.
 
     Positions in pulses are shown as joint angles and as the pose of the flange in the base frame,
     Cartesian ones as the pose that the file gives. Those of tool 0 in the base frame are shown as
-    joint angles too; what other tools and user frames are, only the controller knows.
+    joint angles too; what other tools and user frames are, only the controller knows. Base and
+    station axes are shown as the file gives them: their pulses have ratios of their own.
+
+    Args:
+        job: The job.
+        robot: Whose job it is taken for.
+        cautions: What is wrong with it, for the end of the summary.
     """
-    return [*_summary(job), "", *_steps(job, robot)]
+    return [*_summary(job), *cautions, "", *_steps(job, robot)]
 
 
 def _summary(job: InformJob) -> Iterator[str]:
@@ -37,10 +43,11 @@ def _summary(job: InformJob) -> Iterator[str]:
     yield from (f"comment: {text}" for text in job.values("///COMM"))
     kinds = Counter((p.kind, p.frame or p.coordinates or "unknown", p.tool) for p in job.positions)
     for (kind, frame, tool), count in sorted(kinds.items(), key=str):
-        yield f"{count} {kind} positions: {frame}, tool {'unknown' if tool is None else tool}"
-    counts = tuple(sum(p.kind == kind for p in job.positions) for kind in POSITION_KINDS)
-    if job.npos and job.npos != counts:
-        yield f"caution: ///NPOS is {_listed(job.npos)}, there are {_listed(counts)}"
+        plural = "s" if count > 1 else ""
+        yield f"{count} {kind} position{plural}: {frame}, tool {'?' if tool is None else tool}"
+    if job.positions and not any(header.key == "///POSTYPE" for header in job.headers):
+        yield "no ///POSTYPE: whole numbers are taken for pulses"
+    yield from (f"alias: {text}" for text in job.aliases)
     yield from _moves(job)
     for title, texts in (
         ("calls", job.calls),
@@ -59,7 +66,8 @@ def _moves(job: InformJob) -> Iterator[str]:
             values = [_number(move.tag(name)) for move in moves]
             known = [value for value in values if value is not None]
             if known:
-                spans.append(f"{name} {min(known):g} to {max(known):g}")
+                low, high = min(known), max(known)
+                spans.append(f"{name} {low:g}" + (f" to {high:g}" if high > low else ""))
         yield ", ".join([f"{len(moves)} {word}", *spans])
 
 
@@ -68,14 +76,20 @@ def _steps(job: InformJob, robot: Robot) -> Iterator[str]:
     q = job_configurations(job, robot, np.eye(4), np.eye(4))
     for step in job.instructions:
         yield f"{step.line:5d}  {job.lines[step.line - 1].expandtabs(2).rstrip()}"
-        for label in step.positions:
+        for label in step.positions if step.moves else ():
             if label in places:
                 yield from _where(job.positions[places[label]], q[places[label]], robot)
+            else:
+                yield f"       {label[0]}{label[1]:03d} is not in the file, the controller has it"
 
 
 def _where(position: Position, q: np.ndarray, robot: Robot) -> Iterator[str]:
     label = f"       {position.label}"
     pulses = position.coordinates == "PULSE"
+    if position.kind not in ROBOT_KINDS or (pulses and np.isnan(q).any()):
+        unit = "pulses" if pulses else "deg"
+        yield f"{label} {' '.join(f'{value:.10g}' for value in position.values)} {unit}"
+        return
     frame_known = position.frame in ("BASE", "ROBOT") and position.tool == 0
     if not np.isnan(q).any() and (pulses or frame_known):
         yield f"{label} {angles_text(q, robot)}"

@@ -102,16 +102,17 @@ def parse(text: str, source: str) -> Listing:
 
 
 def _ptp(state: Mapping[str, str], values: list[float], rounds: bool, place: str) -> ReadMove:
-    percent = int(state[_PERCENT])
+    percent = state[_PERCENT]
     return ReadMove(
         target=np.deg2rad(values),
         straight=False,
-        speed=WrittenSpeed(SpeedUnit.TOP_SPEED, percent / 100.0, f"BAS(#VEL_PTP, {percent})"),
+        speed=WrittenSpeed.of_number(
+            SpeedUnit.TOP_SPEED, 0.01, percent, 0, f"BAS(#VEL_PTP, {percent})"
+        ),
         corner=_corner(rounds, f"C_PTP with {_CPTP} = {state[_CPTP]}", state[_CPTP], _PTP_CORNER),
         tool=state[_TOOL],
         place=place,
         resolution=_HALF_DIGIT,
-        last_digit=1.0 / max(percent, 1),
     )
 
 
@@ -120,8 +121,8 @@ def _lin(state: Mapping[str, str], values: list[float], rounds: bool, place: str
     return ReadMove(
         target=pose(turned, np.array(values[:3]) * 1e-3),
         straight=True,
-        speed=WrittenSpeed(
-            SpeedUnit.TOOL_POINT, float(state[_METRES]), f"{_METRES} = {state[_METRES]}"
+        speed=WrittenSpeed.of_number(
+            SpeedUnit.TOOL_POINT, 1.0, state[_METRES], 4, f"{_METRES} = {state[_METRES]}"
         ),
         corner=_corner(rounds, f"C_DIS with {_CDIS} = {state[_CDIS]}", state[_CDIS], _LIN_CORNER),
         tool=state[_TOOL],

@@ -105,9 +105,9 @@ def _statement(notes: Notes, line: int, code: str, free: bool) -> None:
     if time is None:
         if notes.begun:
             notes.doubt(line, "a move after the first one needs its time (argument T)")
-        speed = WrittenSpeed(SpeedUnit.TOOL_POINT, float(v) * 1e-3, f"v{v}")
+        speed = WrittenSpeed.of_number(SpeedUnit.TOOL_POINT, 1e-3, v, 0, f"v{v}")
     else:
-        speed = WrittenSpeed(SpeedUnit.SECONDS, float(time), f"\\T:={time}")
+        speed = WrittenSpeed.of_number(SpeedUnit.SECONDS, 1.0, time, 4, f"\\T:={time}")
     zone = zone.lower()
     move = ReadMove(
         target=target,

@@ -76,9 +76,9 @@ def _move(notes: Notes, line: int, found: re.Match[str], tool: str | None) -> Re
     if time is None and notes.begun:
         notes.doubt(line, "a move after the first one needs its time (t)")
     speed = (
-        WrittenSpeed(SpeedUnit.LEADING_JOINT, float(velocity), f"v={velocity}")
+        WrittenSpeed.of_number(SpeedUnit.LEADING_JOINT, 1.0, velocity, 4, f"v={velocity}")
         if time is None
-        else WrittenSpeed(SpeedUnit.SECONDS, float(time), f"t={time}")
+        else WrittenSpeed.of_number(SpeedUnit.SECONDS, 1.0, time, 4, f"t={time}")
     )
     return ReadMove(
         target=np.array([float(joint) for joint in joints.split(",")]),

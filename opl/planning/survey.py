@@ -1,0 +1,141 @@
+"""Every node of one IK branch looked at: what it is, what it hits, and how it is reached.
+
+For pictures: the search looks only at what it proposes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from opl.cell.collision import BodyPair
+from opl.cell.inverse_kinematics import N_IK_BRANCHES, singularity_margins
+from opl.cell.nearest import Nearest, nearest_pairs
+from opl.cell.robot import Robot
+from opl.cell.workcell import PART, WHEEL
+from opl.geometry.frames import Array
+from opl.planning.problem import GrindingProblem
+
+# clearances are measured at about so many cutter points and contact positions, evenly
+_COLUMNS, _POSITIONS = 40, 24
+_TURN = 2.0 * np.pi
+
+
+class NodeState(str, Enum):
+    """The states, in the order of their codes 0, 1, ..."""
+
+    FREE = "free"
+    REACH = "out of reach"
+    LIMITS = "beyond joint limits"
+    WHEEL = f"{PART} cuts into {WHEEL}"
+    COLLISION = "robot or fixture collides"
+
+
+CODES = {state: code for code, state in enumerate(NodeState)}
+
+
+@dataclass(frozen=True, eq=False)
+class NodeSurvey:
+    """What each of N x M nodes of one IK branch is.
+
+    Attributes:
+        ik_branch: The slot of the inverse kinematics.
+        states: Code of each node, shape (N, M) of uint8.
+        q: The configuration of each in [rad], within the limits where there is such a one; NaN out
+            of reach; shape (N, M, 6).
+        hit: Which pair collides first, -1 where none does, shape (N, M).
+        pairs: The names of these pairs.
+        singularity: The least of `singularity_margins` at each, NaN out of reach, shape (N, M).
+        columns: The cutter points at which clearance was measured.
+        positions: And the contact positions, by their indices.
+        clearance: At free nodes of both, cutter points first.
+        measured: Which nodes of both these are, shape (columns, positions).
+    """
+
+    ik_branch: int
+    states: np.ndarray
+    q: Array
+    hit: np.ndarray
+    pairs: tuple[BodyPair, ...]
+    singularity: Array
+    columns: np.ndarray
+    positions: np.ndarray
+    clearance: Nearest
+    measured: np.ndarray
+
+
+def survey_nodes(problem: GrindingProblem, ik_branch: int, near: Array) -> NodeSurvey:
+    """Look at every node of an IK branch.
+
+    Of configurations that differ by full turns, the one is taken that is nearest to `near` in
+    [rad], shape (N, 6) or (6,), joint by joint.
+    """
+    robot, collision = problem.cell.robot, problem.scene.collision
+    solutions = problem.field.q[:, :, ik_branch]
+    q = _turned(solutions, near, robot)
+    reached = ~np.isnan(solutions[..., 0])
+    states: np.ndarray = np.full(problem.cuts.shape, CODES[NodeState.LIMITS], dtype=np.uint8)
+    for nodes in problem.field.matrices:
+        if nodes.ik_branch == ik_branch:
+            column, row = np.nonzero(nodes.exists)
+            states[column, nodes.position_index[row]] = CODES[NodeState.FREE]
+    hit, pairs = np.full(states.shape, -1), dict[BodyPair, int]()
+    states[problem.cuts] = CODES[NodeState.WHEEL]
+    states[~reached] = CODES[NodeState.REACH]
+    # full turns do not matter for collisions: one configuration of each node is checked
+    column, position = np.nonzero(states == CODES[NodeState.FREE])
+    struck = collision.collides(q[column, position])
+    for i, j in zip(column[struck], position[struck], strict=True):
+        first = collision.colliding_pairs(q[i, j])[0]
+        states[i, j], hit[i, j] = CODES[NodeState.COLLISION], pairs.setdefault(first, len(pairs))
+    n_columns, n_positions = problem.cuts.shape
+    columns, positions = _some(n_columns, _COLUMNS), _some(n_positions, _POSITIONS)
+    grid = np.ix_(columns, positions)
+    measured = states[grid] == CODES[NodeState.FREE]
+    return NodeSurvey(
+        ik_branch,
+        states,
+        q,
+        hit,
+        tuple(pairs),
+        singularity_margins(robot.arm, q).min(axis=-1),
+        columns,
+        positions,
+        nearest_pairs(collision, q[grid][measured]),
+        measured,
+    )
+
+
+def widest_branch(problem: GrindingProblem) -> int:
+    """Return the IK branch with free nodes, collisions of the robot aside, at most cutter points.
+
+    Of those the one with most free nodes; without any, the one that reaches most nodes.
+    """
+    free = np.zeros((N_IK_BRANCHES, *problem.cuts.shape), dtype=bool)
+    for nodes in problem.field.matrices:
+        column, row = np.nonzero(problem.free_nodes(nodes))
+        free[nodes.ik_branch, column, nodes.position_index[row]] = True
+    reached = ~np.isnan(problem.field.q[..., 0])
+    ranks = [
+        (int(free[k].any(axis=1).sum()), int(free[k].sum()), int(reached[..., k].sum()))
+        for k in range(N_IK_BRANCHES)
+    ]
+    return ranks.index(max(ranks))
+
+
+def _turned(q: Array, near: Array, robot: Robot) -> Array:
+    """Return angles (N, M, 6) full turns away, near to others but within the joints' ranges.
+
+    Angles that no full turn brings within the range of their joint stay near.
+    """
+    wanted = np.round((np.broadcast_to(near, (len(q), 6))[:, None] - q) / _TURN)
+    least, most = np.ceil((robot.lower - q) / _TURN), np.floor((robot.upper - q) / _TURN)
+    turns = np.where(least <= most, np.clip(wanted, least, most), wanted)
+    return np.asarray(q + _TURN * turns)
+
+
+def _some(count: int, most: int) -> np.ndarray:
+    """Return so many of ``count`` indices at the most, evenly from the first to the last."""
+    return np.unique(np.linspace(0, count - 1, most).round().astype(int))

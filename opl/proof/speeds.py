@@ -1,0 +1,113 @@
+"""Speeds of a written program, move by move, against those that its job asks for.
+
+A controller takes speeds of few digits, so a move on the wheel may make up for what rounding did to
+those before it (`opl.program.speeds`). And where a configuration grinds between two cutter points
+is recognised to a fraction of a millimetre only. So the feed is held against the ground point's
+lead over where it would be at the feed: moves that were slow use it up, and at a cutter point,
+which is recognised exactly, nothing but the last digit of a speed may be left of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from opl.findings import Finding, Level
+from opl.motion.motion import MoveKind, Phase, TimedMotion
+from opl.motion.timing import Timing
+from opl.program.played import Playback, ReadMove, SpeedUnit
+from opl.program.posts import PASS_TIME_TOLERANCE
+from opl.program.speeds import MOST_CORRECTION
+
+AHEAD = 0.02  # of the feed: what a pass may be off
+AT_POINT = 5e-5  # [m] that a cutter point may be ground too early
+BETWEEN = 2.5e-4  # [m] the same between two, where places are recognised less well
+# What a move may be off where joints or the contact's way over the wheel limit it, and off the
+# wheel: faster, and slower; times of moves too short to be written go to the next one.
+LIMITED = 1.3
+FASTER = 1.05
+SLOWER = 1.5
+
+
+def speed_findings(
+    written: TimedMotion, requested: Timing, playback: Playback, feed: float
+) -> Iterator[Finding]:
+    """Give the moves that are faster or slower than asked for, and the passes that are.
+
+    Args:
+        written: The written configurations and times, one for each move.
+        requested: The same with the times that the job asks for.
+        playback: The moves.
+        feed: Of the ground point in [m/s].
+    """
+    motion, durations = written.motion, requested.timed.duration
+    for phase, moves in motion.runs():
+        if phase is Phase.GRINDING:
+            yield from _ahead(written, requested, playback, feed, moves.tolist())
+            yield from _pass_time(written, requested.timed, moves.tolist())
+        else:
+            for k in moves.tolist():
+                wanted, takes = float(durations[k]), float(written.duration[k])
+                digit = _last_digit(playback.moves[k], takes)
+                if not wanted / FASTER - digit <= takes <= wanted * SLOWER + digit:
+                    yield _finding(written, playback, k, wanted, "the speed")
+
+
+def _ahead(
+    written: TimedMotion, requested: Timing, playback: Playback, feed: float, moves: list[int]
+) -> Iterator[Finding]:
+    """Look at the moves of a pass, given by their indices."""
+    motion = written.motion
+    lead = late = 0.0  # of the ground point in [m], negative if it is too early; of the time in [s]
+    for k in moves:
+        takes, wanted = float(written.duration[k]), float(requested.timed.duration[k])
+        distance = float(requested.surface_distance[k])
+        digit = _last_digit(playback.moves[k], takes)
+        aims = wanted, min(max(wanted - late, wanted / MOST_CORRECTION), wanted * MOST_CORRECTION)
+        late += takes - wanted
+        place = AT_POINT if motion.kind[k] is MoveKind.GRIND else BETWEEN
+        allowed = place + digit * feed
+        lead += takes * (1.0 + AHEAD) * feed - distance
+        early, lead = -lead, min(max(lead, -allowed), allowed)
+        by_feed = wanted * feed <= distance * (1.0 + AHEAD)
+        too_fast = not by_feed and takes + digit < min(aims) / LIMITED
+        too_slow = takes > max(aims) * LIMITED + digit + BETWEEN / feed
+        if too_fast or too_slow or (early > allowed and wanted > FASTER * takes):
+            yield _finding(written, playback, k, wanted, "the feed")
+        elif early > allowed:  # because of the moves before it
+            message = f"{1e3 * early:.2f} mm ahead of the feed that the job asks for"
+            where = f"{motion.place(k)} ({playback.moves[k].place})"
+            yield Finding(Level.ERROR, "speed", where, message)
+
+
+def _last_digit(move: ReadMove, takes: float) -> float:
+    """Return by how much in [s] the time of a move changes with the last digit of its speed.
+
+    Args:
+        move: The move.
+        takes: Its time as written in [s].
+    """
+    speed = move.speed
+    if speed.unit is SpeedUnit.SECONDS:
+        return speed.digit
+    slower = speed.value - speed.digit
+    # the slowest speed there is may stand for any slower one
+    return takes * speed.digit / slower if slower > 0.0 else np.inf
+
+
+def _pass_time(written: TimedMotion, requested: TimedMotion, moves: list[int]) -> Iterator[Finding]:
+    wanted, takes = requested.duration[moves].sum(), written.duration[moves].sum()
+    if abs(takes - wanted) > PASS_TIME_TOLERANCE * wanted:
+        message = f"takes {takes:.2f} s, {wanted:.2f} s at the feed that the job asks for"
+        place = f"pass {written.motion.pass_index[moves[0]] + 1}"
+        yield Finding(Level.ERROR, "speed", place, message)
+
+
+def _finding(
+    written: TimedMotion, playback: Playback, k: int, wanted: float, speed: str
+) -> Finding:
+    factor = wanted / max(float(written.duration[k]), 1e-9)
+    place = f"{written.motion.place(k)} ({playback.moves[k].place})"
+    message = f"{factor:.2g} times {speed} that the job asks for"
+    return Finding(Level.ERROR, "speed", place, message)

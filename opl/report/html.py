@@ -1,0 +1,123 @@
+"""Pieces of a page: text made safe, tables, lists, a small bar chart; and the page around them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+_VIEWER = Path(__file__).parent / "viewer"
+_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+
+
+def page(title: str, body: str, data: Mapping[str, Any], block: str) -> str:
+    """Return a whole page: nothing in it is fetched from anywhere, and its policy forbids it.
+
+    Args:
+        title: What the page is called.
+        body: Its content as HTML.
+        data: What its script draws.
+        block: The arrays of the data, packed.
+    """
+    plain = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    style = (_VIEWER / "page.css").read_text(encoding="utf-8")
+    script = (_VIEWER / "viewer.js").read_text(encoding="utf-8")
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{_POLICY}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{text(title)}</title>
+<style>
+{style}</style>
+</head>
+<body>
+{body}
+<script type="application/json" id="page-data">{plain}</script>
+<script type="text/plain" id="page-block">{block}</script>
+<script>
+{script}</script>
+</body>
+</html>
+"""
+
+
+def text(value: object) -> str:
+    """Return anything as text that is safe in HTML."""
+    return escape(str(value))
+
+
+def section(name: str, heading: str, *content: str) -> str:
+    """Return a section with its heading; nothing without content."""
+    inside = "\n".join(piece for piece in content if piece)
+    if not inside:
+        return ""
+    label = f'aria-labelledby="{name}-heading"'
+    return (
+        f'<section id="{name}" {label}>\n<h2 id="{name}-heading">{text(heading)}</h2>\n'
+        f"{inside}\n</section>"
+    )
+
+
+def bullets(lines: Iterable[str], kind: str = "") -> str:
+    """Return lines as a list; nothing if there are none."""
+    items = "\n".join(f"<li>{text(line)}</li>" for line in lines)
+    return f'<ul class="{kind}">\n{items}\n</ul>' if items else ""
+
+
+def table(
+    caption: str,
+    heads: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    marks: Sequence[str | None] = (),
+    kind: str = "",
+) -> str:
+    """Return a table; the first column heads its rows. Nothing without rows.
+
+    Args:
+        caption: What it shows.
+        heads: Of its columns.
+        rows: Its cells.
+        marks: The place that each row leads to in the viewer, None for none.
+        kind: Class for the style.
+    """
+    if not rows:
+        return ""
+    lines = []
+    for k, row in enumerate(rows):
+        mark = marks[k] if k < len(marks) else None
+        first = text(row[0])
+        if mark is not None:
+            first = f'<button type="button" data-mark="{text(mark)}">{first}</button>'
+        cells = "".join(f"<td>{text(cell)}</td>" for cell in row[1:])
+        lines.append(f'<tr><th scope="row">{first}</th>{cells}</tr>')
+    head = "".join(f'<th scope="col">{text(one)}</th>' for one in heads)
+    body = "\n".join(lines)
+    return (
+        f'<div class="scroll"><table class="{kind}"><caption>{text(caption)}</caption>'
+        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
+    )
+
+
+def bars(
+    caption: str, starts: Sequence[float], step: float, values: Sequence[float], unit: str
+) -> str:
+    """Return a bar chart as SVG: values over bins that begin at places, a step wide."""
+    most = max(values) or 1.0
+    width = 100.0 / len(values)
+    shapes = "".join(
+        f'<rect x="{k * width:.2f}" y="{40.0 - 40.0 * value / most:.2f}" width="{0.86 * width:.2f}"'
+        f' height="{40.0 * value / most:.2f}"><title>{start:g} to {start + step:g}: {value:.2f} '
+        f"{text(unit)}</title></rect>"
+        for k, (start, value) in enumerate(zip(starts, values, strict=True))
+    )
+    told = f"{caption}; most is {most:.2f} {unit}"
+    ends = f"<span>{starts[0]:g}</span><span>t</span><span>{starts[-1] + step:g}</span>"
+    return (
+        f'<figure class="bars"><figcaption>{text(told)}</figcaption><svg viewBox="0 0 100 40" '
+        f'preserveAspectRatio="none" role="img" aria-label="{text(told)}">{shapes}</svg>'
+        f'<div class="ends">{ends}</div></figure>'
+    )

@@ -1,0 +1,203 @@
+"""What the viewer of a page draws of a run: cell, nodes, motion, and the places to go to."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from opl.cell.drawn_cell import drawn_chain, drawn_solids
+from opl.cell.nearest import Nearest, nearest_pairs
+from opl.cell.robot import Robot
+from opl.cell.workcell import WorkCell
+from opl.geometry.frames import Array
+from opl.geometry.scallop import ridge_height
+from opl.motion.motion import Motion, MoveKind, TimedMotion
+from opl.planning.survey import CODES, NodeState, NodeSurvey
+from opl.report import curves
+from opl.report.chart import chart_cells
+from opl.report.drawn import drawn_cell, drawn_passes, drawn_wheel
+from opl.report.packing import Packer
+from opl.run.values import Planned, Prepared, Surfaced
+
+MM, MICRONS = 1e3, 1e6
+MOST_LOOKS = 600  # at the nearest pair along the motion, evenly in time, beside those on the wheel
+KINDS = tuple(MoveKind)
+
+Data = dict[str, Any]
+
+
+def cell_data(cell: WorkCell, home: Array | None, packer: Packer) -> Data:
+    """Return a page's data with the cell and nothing else, robot at home."""
+    return {
+        "joints": joints_data(cell.robot),
+        "cell": drawn_cell(drawn_chain(cell.robot), drawn_solids(cell), packer),
+        "home": None if home is None else home.tolist(),
+        "wheel": drawn_wheel(cell.wheel),
+        "points": None,
+        "field": None,
+        "motion": None,
+        "clearance": None,
+        "curves": {},
+        "paints": {},
+        "marks": {},
+    }
+
+
+def joints_data(robot: Robot) -> list[Data]:
+    """Return names and limits of the joints."""
+    limits = zip(robot.joint_names, robot.lower.tolist(), robot.upper.tolist(), strict=True)
+    return [{"name": name, "lower": lower, "upper": upper} for name, lower, upper in limits]
+
+
+def passes_data(surfaced: Surfaced, packer: Packer) -> tuple[Data, Data]:
+    """Return the passes as drawn on the part, and what they can be coloured by."""
+    job, points = surfaced.job, surfaced.points
+    across = surfaced.laid.bending[:, 1, 1]
+    ridge = MICRONS * ridge_height(across, job.passes.pitch, job.cell.wheel.radius)
+    paints = {
+        "pass": {"unit": "pass", "values": packer.floats(points.pass_index + 1)},
+        "ridge": {"unit": "micrometres of ridge", "values": packer.floats(ridge)},
+    }
+    missed = surfaced.inspection.uncovered.points
+    return drawn_passes(points, job.passes.pitch, missed, packer), paints
+
+
+def run_data(prepared: Prepared, planned: Planned | None, packer: Packer) -> Data:
+    """Return the data of a page of a run, as far as it came."""
+    surfaced = prepared.surfaced
+    job = surfaced.job
+    data = cell_data(job.cell, job.process.home, packer)
+    data["points"], data["paints"] = passes_data(surfaced, packer)
+    data["field"] = _field(prepared, prepared.survey if planned is None else planned.survey, packer)
+    if planned is not None:
+        timed, scene = planned.timing.timed, prepared.problem.scene
+        times, nearest = _along(timed, prepared)
+        data["motion"] = _motion(timed, packer)
+        data["clearance"] = {
+            "time": packer.floats(times),
+            "distance": packer.floats(nearest.distance),
+            "pair": packer.counts(nearest.pair),
+            "points": packer.floats(nearest.points),
+            "pairs": [list(pair) for pair in nearest.pairs],
+        }
+        robot, timing = scene.cell.robot, planned.timing
+        data["curves"] = {
+            "joints": curves.joint_panels(timing, robot, prepared.fixed.q, packer),
+            "speeds": curves.speed_panels(timing, robot, packer),
+            "accelerations": curves.acceleration_panels(timing, robot, packer),
+            "feed": curves.feed_panels(timing, job.process.feed, robot, packer),
+            "clearance": curves.clearance_panels(times, nearest, packer),
+        }
+        data["paints"] |= _paints(planned, times, nearest, packer)
+    return data
+
+
+def blocked_place(reasons: Sequence[str], survey: NodeSurvey, distance: Array) -> Data | None:
+    """Return the place that the first reason names, as a mark; None if it names no cutter point.
+
+    Of its contact positions the one that comes nearest to being free.
+
+    Args:
+        reasons: Why there is no path, one line each.
+        survey: The nodes.
+        distance: Of part and wheel at each node in [m], shape (N, M).
+    """
+    for reason in reasons:
+        found = re.match(r"cutter points? (\d+)(?: to (\d+))?", reason)
+        if found is not None:
+            first, last = int(found[1]), int(found[2] or found[1])
+            return blocked_mark((first + last) // 2, survey, distance)
+    return None
+
+
+def blocked_mark(point: int, survey: NodeSurvey, distance: Array) -> Data:
+    """Return the cell of a cutter point that comes nearest to being free, as a mark."""
+    states = survey.states[point]
+    for state in (
+        NodeState.FREE,
+        NodeState.COLLISION,
+        NodeState.WHEEL,
+        NodeState.LIMITS,
+        NodeState.REACH,
+    ):
+        rows = np.flatnonzero(states == CODES[state])
+        if len(rows):
+            row = int(rows[distance[point, rows].argmax()])
+            return {"point": point, "position": row, "text": f"cutter point {point}"}
+    raise ValueError(f"cutter point {point} has no nodes")
+
+
+def moves_at(motion: Motion, wheres: Sequence[str]) -> list[int | None]:
+    """Return the first move at each of some places as findings name them; None where none is."""
+    places: dict[str, int] = {}
+    for move in range(len(motion)):
+        places.setdefault(motion.place(move), move)
+    return [places.get(where) for where in wheres]
+
+
+def move_to(motion: Motion, cutter_point: float) -> int:
+    """Return the move on the wheel that ends nearest to a cutter point, fractional or not."""
+    return int(np.nanargmin(np.abs(motion.cutter_point - cutter_point)))
+
+
+def _field(prepared: Prepared, survey: NodeSurvey, packer: Packer) -> Data:
+    return chart_cells(
+        prepared.problem.field.contact_positions,
+        survey.states,
+        [state.value for state in NodeState],
+        survey.q,
+        (survey.hit, survey.pairs),
+        survey.singularity,
+        (survey.columns, survey.positions, survey.measured),
+        survey.clearance,
+        packer,
+    )
+
+
+def _motion(timed: TimedMotion, packer: Packer) -> Data:
+    motion = timed.motion
+    return {
+        "q": packer.floats(motion.q),
+        "time": packer.floats(curves.moments(timed)),
+        "t": packer.floats(motion.contact_position),
+        "point": packer.floats(motion.cutter_point),
+        "pass": packer.counts(motion.pass_index),
+        "kind": packer.counts([KINDS.index(kind) for kind in motion.kind]),
+        "kinds": [kind.value for kind in KINDS],
+    }
+
+
+def _along(timed: TimedMotion, prepared: Prepared) -> tuple[Array, Nearest]:
+    """Return moments in [s] and the nearest pair at each, for the whole motion."""
+    moments = curves.moments(timed)
+    ground = timed.motion.on_wheel & (timed.motion.cutter_point % 1.0 == 0.0)
+    times = np.union1d(np.linspace(0.0, moments[-1], MOST_LOOKS), moments[ground])
+    rows = np.arange(len(moments), dtype=float)
+    at = np.interp(times, moments, rows)
+    q = np.stack([np.interp(at, rows, joint) for joint in timed.motion.q.T], axis=1)
+    return times, nearest_pairs(prepared.problem.scene.collision, q)
+
+
+def _paints(planned: Planned, times: Array, nearest: Nearest, packer: Packer) -> Mapping[str, Data]:
+    """Return what the passes of a planned motion can be coloured by."""
+    timing = planned.timing
+    motion, duration = timing.timed.motion, timing.timed.duration
+    moments = curves.moments(timing.timed)
+    rows = np.flatnonzero(motion.on_wheel & (motion.cutter_point % 1.0 == 0.0))
+    point = motion.cutter_point[rows].astype(int)
+    speed = MM * timing.surface_distance[rows] / np.maximum(duration[rows], curves.SHORTEST)
+    near = MM * np.interp(moments[rows], times, nearest.distance)
+
+    def painted(values: Array, unit: str) -> Data:
+        every = np.full(len(planned.surfaced.points), np.nan)
+        every[point] = values
+        return {"unit": unit, "values": packer.floats(every)}
+
+    return {
+        "t": painted(motion.contact_position[rows], "mm or deg of t"),
+        "clearance": painted(near, "mm of clearance"),
+        "feed": painted(speed, "mm/s"),
+    }
