@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.gradual import gradual, largest_ratio
+from opl.motion.gradual import LEAST_COUNTED, gradual, largest_ratio
 from opl.motion.motion import Motion, Phase, TimedMotion
 from opl.motion.process_settings import ProcessSettings
 from opl.motion.rounded import rounded_line
@@ -29,6 +29,10 @@ from opl.motion.time_law import JointLimits, TimeLaw, fastest_law
 SHORTEST = 1e-6
 FOLLOWED = 1.01  # a move that takes no longer than this times what is wanted keeps it
 AT_CONTACT = 1e-6  # [m] from the contact that a lead begins or ends at it
+MOST_ROUNDS = 4  # of asking the joints again after moves were slowed for their neighbours
+# Changes of speed from one move to the next, as `_suddenness` has them, that the corners of a time
+# law leave as well: its own are up to 1.3 of what a joint can, because they take more than a move.
+SUDDEN = 1.4
 SHORTEST_FREE = 0.05  # [s] of a free move: a shorter one is over before a robot is at its speed
 
 
@@ -39,7 +43,7 @@ class Cause(str, Enum):
     PIVOTING = "pivoting"  # the contact moves over the wheel, which has a speed limit of its own
     SPEED = "speed"  # a joint turns at its top speed
     ACCELERATION = "acceleration"  # a joint speeds up or slows down as fast as it can
-    NEIGHBOUR = "neighbour"  # a move near by is slow, and speeds change gradually
+    NEIGHBOUR = "slow neighbour"  # a move near by is slow, and speeds change gradually
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +91,9 @@ def time_motion(
     p_flange = forward_kinematics(robot, motion.q)[:, :3, 3]
     moved = np.linalg.norm(np.diff(p_flange, axis=0, prepend=p_flange[:1]), axis=1)
     distance = np.where(grinding, surface_distance, moved)
+    # pivoting alone may leave the ground point next to no speed
+    pivoting = over_wheel * LEAST_COUNTED * process.feed > distance
+    speed_counts = ~(grinding & pivoting)
     wanted = np.maximum(fastest / process.air_speed, np.where(motion.free, SHORTEST_FREE, 0.0))
     wanted[grinding] = np.maximum(surface_distance / process.feed, over_wheel)[grinding]
 
@@ -103,21 +110,26 @@ def time_motion(
         if not len(kept):
             continue
         rows = np.concatenate([[moves[0] - 1], kept])
-        even = gradual(distance[kept], duration[kept], process.feed)
-        law = _law(motion.q[rows], even, robot)
-        needed = np.diff(law.node_times)
-        slowed = needed > FOLLOWED * even
-        limiting, accelerating = _limiting_joint(law)
-        joint[kept[slowed]] = limiting[slowed]
-        by_acceleration[kept[slowed]] = accelerating[slowed]
-        followed_there = np.maximum(needed, even)
-        # what joints slow down, slows its neighbours
-        found = gradual(distance[kept], followed_there, process.feed)
-        by_neighbour[kept] = (even > FOLLOWED * duration[kept]) | (
-            found > FOLLOWED * followed_there
-        )
+        way, counts = distance[kept], speed_counts[kept]
+        found = duration[kept]
+        for _ in range(MOST_ROUNDS):
+            even = gradual(way, found, counts, process.feed)
+            law = _law(motion.q[rows], even, robot)
+            needed = np.diff(law.node_times)
+            slowed = needed > FOLLOWED * even
+            limiting, accelerating = _limiting_joint(law)
+            joint[kept[slowed]] = limiting[slowed]
+            by_acceleration[kept[slowed]] = accelerating[slowed]
+            followed_there = np.maximum(needed, even)
+            # what joints slow down, slows its neighbours
+            found = gradual(way, followed_there, counts, process.feed)
+            by_neighbour[kept] = found > FOLLOWED * duration[kept]
+            if _suddenness(motion.q[rows], found, robot) <= SUDDEN:
+                break
+        else:
+            found = followed_there
         duration[kept] = found
-        speed_ratio = max(speed_ratio, largest_ratio(distance[kept], found, process.feed))
+        speed_ratio = max(speed_ratio, largest_ratio(way, found, counts, process.feed))
     cause = [Cause.NONE] * len(motion)
     for move in np.flatnonzero(grinding):
         if duration[move] * process.feed > FOLLOWED * distance[move]:
@@ -151,6 +163,18 @@ def _near_wheel(way: Array, phases: list[Phase], process: ProcessSettings) -> Ar
     speed = np.where(near < process.approach_slow, process.approach_speed, np.inf)
     speed = np.where(near < AT_CONTACT, process.feed, np.maximum(speed, process.feed))
     return np.where(coming | going, way / speed, 0.0)
+
+
+def _suddenness(q: Array, times: Array, robot: Robot) -> float:
+    """Return the largest change of a joint's speed between two moves, as part of what it can.
+
+    From the middle of a move to the middle of the next; `q` is in [rad], shape (n + 1, 6), `times`
+    in [s], shape (n,).
+    """
+    speed = np.diff(q, axis=0) / times[:, None]
+    between = (times[:-1] + times[1:])[:, None] / 2.0
+    change = np.abs(np.diff(speed, axis=0)) / between / robot.max_acceleration
+    return float(change.max(initial=0.0))
 
 
 def air_seconds(motion: Motion, robot: Robot, process: ProcessSettings) -> float:
