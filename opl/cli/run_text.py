@@ -78,7 +78,7 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
         f"path: {report.cutter_points} cutter points in {report.passes} passes, "
         f"{path.intermediate_nodes} intermediate nodes, branch {path.branch}"
     )
-    yield from _certified(report, job.search.n_contact_positions)
+    yield from _certified(report)
     # the clearance layer is part of the collision checks
     spent = report.seconds["clearance"] + report.seconds["search"]
     yield f"search with its collision checks: {spent:.2f} s"
@@ -105,29 +105,37 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
         )
 
 
-# what the searches, and so their bounds, are limited to
-ONE_BRANCH = ", all passes on one IK branch and count of full turns,"
+# what every bound covers, and what it is not about
+COVERED = (
+    "at any contact positions, each pass on one IK branch and count of full turns (approach, links "
+    "and retract not counted)"
+)
+OBJECTIVES = {
+    "travel": ("joint travel", "{:.4f} rad"),
+    "time": ("time on the wheel", "{:.2f} s"),
+    "weighted": ("weighted sum", "{:.4f}"),
+}
 
 
-def _certified(report: opl.Report, n_positions: int) -> Iterator[str]:
-    """Yield what the lower bounds say of the path; ``n_positions`` are those of the job."""
+def _certified(report: opl.Report) -> Iterator[str]:
+    """Yield what the lower bounds say of the path."""
     path = report.path
     if path is None:
         return
-    weighted = path.weighted
-    if weighted is not None:
+    known = path.objective_value
+    if known is not None:
+        name, form = OBJECTIVES[path.objective]
         yield (
-            f"no path through these points at {n_positions} contact positions{ONE_BRANCH} has a "
-            f"weighted sum below {weighted.lower_bound:.4f}: the one found has "
-            f"{weighted.value:.4f}, {100.0 * weighted.gap:.1f} % of which may be too much"
+            f"no motion along these passes has a {name} below {form.format(known.lower_bound)}, "
+            f"{COVERED}: the one found has {form.format(known.value)}, at most "
+            f"{100.0 * known.gap:.1f} % of it too much"
         )
     bound, gap = path.lower_bound_rad, path.gap
     if bound is None or gap is None:
         return
     yield (
-        f"no motion along these passes has a joint range sum below {bound:.4f} rad, at any contact "
-        "positions, each pass on one IK branch and count of full turns (approach, links and "
-        f"retract not counted): the one found is within {100.0 * gap:.3f} % of the least there is"
+        f"no motion along these passes has a joint range sum below {bound:.4f} rad, "
+        f"{COVERED}: the one found is within {100.0 * gap:.3f} % of the least there is"
     )
 
 
@@ -211,6 +219,13 @@ def show_proof(report: Mapping[str, Any], robot: str) -> None:
         lines.append("no result.json beside it tells whether opl run wrote these very bytes")
     elif report["as_written"]:
         lines.append("to the last byte what opl run proved and wrote")
+    if report["changed"]:
+        lines.append(
+            "changed since opl wrote it, says the digest in it; what it says now was looked at"
+        )
+    if report["other_inputs"]:
+        names = ", ".join(report["other_inputs"])
+        lines.append(f"other inputs than it was made of: {names}; it was held against those of now")
     found = len(report["findings"])
     lines.append("proven" if report["proven"] else f"not proven: {found} findings")
     _print(_console(), lines)

@@ -7,11 +7,13 @@ from collections.abc import Mapping
 from datetime import datetime, timezone
 
 from opl.errors import InputError
+from opl.files.digests import STAMP, stamped
 from opl.geometry.frames import transform
 from opl.geometry.mesh import box_corners
 from opl.planning.survey import NodeState
 from opl.program.export import StraightLimit, export_program
 from opl.program.moves import Program
+from opl.proof.digest import inputs_mark
 from opl.report.pictures import contact_chart, joint_chart
 from opl.report.trace import motion_trace
 from opl.run.values import Planned, Proven
@@ -24,11 +26,14 @@ def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
     # what the proven path leaves of the allowed contact error
     left = job.search.max_contact_error - proven.verification.max_contact_error
     limit = StraightLimit(box_corners(vertices), left)
+    comments = ["OPL", inputs_mark(job.inputs), STAMP]
     program, files = export_program(
-        proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), ["OPL"]
+        proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), comments
     )
     trace = motion_trace(proven.motion, job.name, job.cell.robot.joint_names)
-    return program, {**files, f"{job.name}_motion.json": trace}
+    return program, {name: stamped(text) for name, text in files.items()} | {
+        f"{job.name}_motion.json": trace
+    }
 
 
 def draw_charts(planned: Planned) -> Mapping[str, str]:

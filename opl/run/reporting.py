@@ -8,14 +8,16 @@ import numpy as np
 
 from opl.cell.inverse_kinematics import ik_branch_name
 from opl.cell.robot import Robot
+from opl.files.digests import digest
+from opl.job.search import Objective
 from opl.motion.feed import SlowStretch
 from opl.program.moves import CycleTime
-from opl.proof.digest import digest
 from opl.proof.read_back import FileProof
 from opl.run import result
 from opl.run.result import Report
 from opl.run.values import Planned, Prepared, Proven, Refused, Written
 from opl.verification.replay import Verification
+from opl.version import VERSION
 
 MM = 1e3
 
@@ -53,6 +55,8 @@ def make_report(run: Written | Refused) -> Report:
         verification=None if found is None else replay_report(found, proof),
         program=None if written is None else _program(written),
         seconds={**seconds, "total": round(sum(run.seconds.values()), 4)},
+        opl=VERSION,
+        inputs=surfaced.job.inputs,
     )
 
 
@@ -85,7 +89,12 @@ def _compared(planned: Planned) -> dict[str, result.FiguresReport]:
 
 def _path(planned: Planned) -> result.PathReport:
     plan, search = planned.plan, planned.surfaced.job.search
-    path, weighted = plan.path, plan.weighted
+    path, known = plan.path, plan.objective
+    objective = None
+    if known is not None:
+        objective = result.ObjectiveReport(
+            *map(_rounded, (known.value, known.lower_bound, known.gap))
+        )
     return result.PathReport(
         method=search.method.value,
         objective=search.objective.value,
@@ -98,11 +107,8 @@ def _path(planned: Planned) -> result.PathReport:
         intermediate_nodes=path.n_intermediate,
         lower_bound_rad=_rounded(plan.lower_bound),
         gap=_rounded(plan.gap),
-        weighted=None
-        if weighted is None
-        else result.WeightedReport(
-            *map(_rounded, (weighted.value, weighted.lower_bound, weighted.gap))
-        ),
+        weighted=objective if search.objective is Objective.WEIGHTED else None,
+        objective_value=objective,
     )
 
 

@@ -33,8 +33,8 @@ class FixedReport:
 
 
 @dataclass(frozen=True)
-class WeightedReport:
-    """The weighted sum of the path, and its lower bound."""
+class ObjectiveReport:
+    """Travel in rad, time in s or weighted sum of the path, and its lower bound."""
 
     value: float
     lower_bound: float
@@ -68,7 +68,8 @@ class PathReport:
     intermediate_nodes: int
     lower_bound_rad: float | None  # no path has a smaller sum, whatever its contact positions
     gap: float | None  # fraction by which the sum may be above the least there is
-    weighted: WeightedReport | None
+    weighted: ObjectiveReport | None
+    objective_value: ObjectiveReport | None  # of travel, time or weighted sum
 
 
 @dataclass(frozen=True)
@@ -187,6 +188,9 @@ class Report:
         compared: The figures of the paths that exist: ``fixed``, ``paper_start``, ``recursive``,
             ``optimal``.
         seconds: Time of each stage, and their ``total``.
+        opl: Version of opl.
+        inputs: SHA-256 of everything the job is made of, by name: job and cell file by what they
+            say, all other files by their bytes.
     """
 
     status: str
@@ -205,6 +209,8 @@ class Report:
     verification: VerificationReport | None
     program: ProgramReport | None
     seconds: Mapping[str, float]
+    opl: str
+    inputs: Mapping[str, str]
 
 
 def to_json(value: Any) -> str:

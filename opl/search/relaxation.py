@@ -1,85 +1,19 @@
-"""The smallest box that holds a point of each of some segments, by linear programming.
+"""The least box that holds a point of each of some spans, by linear programming.
 
-How far each face must move out of a core, and where on its segment each point lies, are the
-variables; that every face lies beyond every point are the constraints. The dual of this starts
-from prices of nothing, and a simplex method in a small table raises them. The bound does not rest
-on the method: from any prices a lower bound follows, and it is computed anew from those found.
+A span is relaxed to a segment, start + along * x + [pad_low, pad_high] for some 0 <= x <= 1; its
+error falls with the square of the span. How far each face of the box must move out of the core, and
+where on its segment each point lies, are the variables; that every face lies beyond every point are
+the constraints. The dual of this starts from prices of nothing, and a simplex method in a small
+table raises them. The bound does not rest on the method: from any prices a lower bound follows, and
+it is computed anew from those found.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numba import njit
 
-from opl.geometry.frames import Array
-from opl.search.walls import Segment
-
 ROUND_OFF = 1e-9  # [rad] of the sums that make a bound
-
-
-@dataclass(frozen=True)
-class Relaxation:
-    """The least box of some segments.
-
-    Attributes:
-        bound: No box that holds the core and a point of each is smaller, in [rad].
-        low: Lower faces of the box found, shape (6,).
-        high: Upper faces.
-        x: Where on each segment, 0 to 1, shape (k,).
-        lost: How much larger it could be if each segment had no pads, in [rad], shape (k,).
-        missed: By how much the box misses each segment without its pads, in [rad], shape (k,).
-        prices: How hard each segment presses on each upper face of the box, and on each lower one,
-            from 0 to 1, shape (k, 6, 2).
-    """
-
-    bound: float
-    low: Array
-    high: Array
-    x: Array
-    lost: Array
-    prices: Array
-    missed: Array
-
-
-def least_box_of(segments: list[Segment], low: Array, high: Array) -> Relaxation:
-    """Return the least box that holds a core and a point of each segment.
-
-    Args:
-        segments: The segments.
-        low: The lower faces are not above these, in [rad], shape (6,).
-        high: The upper faces are not below these.
-    """
-    k = len(segments)
-    start = np.array([segment.start for segment in segments]).reshape(k, 6)
-    along = np.array([segment.along for segment in segments]).reshape(k, 6)
-    pad_low = np.array([segment.pad_low for segment in segments]).reshape(k, 6)
-    pad_high = np.array([segment.pad_high for segment in segments]).reshape(k, 6)
-    # upper faces in columns 0 to 5, lower ones mirrored in 6 to 11: out >= reach + slope * x
-    reach = np.concatenate([start + pad_low - high, low - start - pad_high], axis=1)
-    slope = np.concatenate([along, -along], axis=1)
-    wall, face = (
-        np.ascontiguousarray(index) for index in np.nonzero(reach + np.maximum(slope, 0.0) > 0.0)
-    )
-    bound = float((high - low).sum())
-    prices, out, x = np.zeros((k, 12)), np.zeros(12), np.full(k, 0.5)
-    if len(wall):
-        price = np.empty(len(wall))
-        _raise_prices(reach[wall, face], slope[wall, face], wall, face, k, price, out, x)
-        prices[wall, face] = price
-        prices /= np.maximum(prices.sum(axis=0), 1.0)
-        # the least over every place on each segment
-        bound += float((prices * reach).sum() + np.minimum((prices * slope).sum(axis=1), 0.0).sum())
-    out = np.maximum((reach + slope * x[:, None]).max(axis=0, initial=0.0), 0.0)
-    lost = (prices[:, 6:] * pad_high - prices[:, :6] * pad_low).sum(axis=1)
-    by_face = np.stack([prices[:, :6], prices[:, 6:]], axis=-1)
-    found_low, found_high = low - out[6:], high + out[:6]
-    point = start + along * x[:, None]
-    away = np.maximum(point - found_high, 0.0) + np.maximum(found_low - point, 0.0)
-    return Relaxation(bound - ROUND_OFF, found_low, found_high, x, lost, by_face, away.sum(axis=1))
-
-
 MOST_PIVOTS = 2000
 ENTERS = 1e-10  # [rad] gain below which a price is not raised
 PIVOT = 1e-9  # smallest that is divided by
@@ -148,3 +82,88 @@ def _raise_prices(reach, slope, wall, face, n_walls, price, out, x):  # type: ig
         out[row] = max(-table[n_rows, n + n_walls + row], 0.0)
     for w in range(n_walls):
         x[w] = min(max(-table[n_rows, n + n_walls + 12 + w], 0.0), 1.0)
+
+
+@njit(
+    "float64(float64[:,::1],int64[:,::1],float64[::1],float64[::1],float64[::1],float64[::1],"
+    "float64[::1],float64[::1],float64[::1],float64[:,:,::1])",
+    cache=True,
+)
+def least_box(cells, spans, low, high, box_low, box_high, x, lost, missed, prices):  # type: ignore[no-untyped-def]
+    """Return a bound on the box that holds a core and a point of each of some spans, in [rad].
+
+    Args:
+        cells: The table of `Cells`.
+        spans: One of each wall, shape (k, 5).
+        low: The lower faces are not above these, in [rad], shape (6,).
+        high: The upper faces are not below these.
+        box_low: Filled with the lower faces of the box found.
+        box_high: Filled with the upper ones.
+        x: Filled with where on each segment the box holds it, 0 to 1, shape (k,).
+        lost: Filled with how much larger the box could be if a segment had no pads, in [rad].
+        missed: Filled with by how much the box misses each segment without its pads, in [rad].
+        prices: Filled with how hard each segment presses on each upper face of the box, and on
+            each lower one, from 0 to 1, shape (k, 6, 2).
+    """
+    k = len(spans)
+    along, pad_low, pad_high = np.empty((k, 6)), np.empty((k, 6)), np.empty((k, 6))
+    reach, slope = np.empty((k, 12)), np.empty((k, 12))
+    n = 0
+    for w in range(k):
+        first, end = spans[w, 3], spans[w, 4]
+        place, length = cells[first, 24], cells[end - 1, 25] - cells[first, 24]
+        for j in range(6):
+            start = cells[first, j]
+            step = cells[end - 1, 6 + j] - start
+            below, above = np.inf, -np.inf
+            # within a cell both chords are straight: they are farthest apart at its ends
+            for cell in range(first, end):
+                a = cells[cell, j] - start - step * ((cells[cell, 24] - place) / length)
+                b = cells[cell, 6 + j] - start - step * ((cells[cell, 25] - place) / length)
+                below = min(below, min(a, b) + cells[cell, 12 + j])
+                above = max(above, max(a, b) + cells[cell, 18 + j])
+            along[w, j], pad_low[w, j], pad_high[w, j] = step, below, above
+            # upper faces 0 to 5, lower ones mirrored 6 to 11: out >= reach + slope * x
+            reach[w, j], slope[w, j] = start + below - high[j], step
+            reach[w, 6 + j], slope[w, 6 + j] = low[j] - start - above, -step
+            n += int(reach[w, j] + max(step, 0.0) > 0.0)
+            n += int(reach[w, 6 + j] + max(-step, 0.0) > 0.0)
+    wall, face = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
+    of_reach, of_slope, price = np.empty(n), np.empty(n), np.empty(n)
+    n = 0
+    for w in range(k):
+        for f in range(12):
+            if reach[w, f] + max(slope[w, f], 0.0) > 0.0:
+                wall[n], face[n] = w, f
+                of_reach[n], of_slope[n] = reach[w, f], slope[w, f]
+                n += 1
+    out = np.zeros(12)
+    x[:] = 0.5
+    if n:
+        _raise_prices(of_reach, of_slope, wall, face, k, price, out, x)
+    total = np.zeros(12)
+    for i in range(n):
+        total[face[i]] += price[i]
+    prices[:] = 0.0
+    bound = 0.0
+    for i in range(n):
+        prices[wall[i], face[i] % 6, face[i] // 6] = price[i] / max(total[face[i]], 1.0)
+    out[:] = 0.0
+    for w in range(k):
+        lost[w], tilt = 0.0, 0.0
+        for f in range(12):
+            p = prices[w, f % 6, f // 6]
+            bound += p * reach[w, f]
+            tilt += p * slope[w, f]
+            lost[w] += p * (pad_high[w, f - 6] if f >= 6 else -pad_low[w, f])
+            out[f] = max(out[f], reach[w, f] + slope[w, f] * x[w])
+        bound += min(tilt, 0.0)  # the least over every place on the segment
+    for j in range(6):
+        bound += high[j] - low[j]
+        box_low[j], box_high[j] = low[j] - out[6 + j], high[j] + out[j]
+    for w in range(k):
+        missed[w] = 0.0
+        for j in range(6):
+            point = cells[spans[w, 3], j] + along[w, j] * x[w]
+            missed[w] += max(point - box_high[j], 0.0) + max(box_low[j] - point, 0.0)
+    return bound - ROUND_OFF

@@ -1,0 +1,164 @@
+"""What no box below a size can hold is cut off the spans of a subproblem."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from opl.search.outside import nearest_on_chord
+from opl.search.relaxation import ROUND_OFF
+from opl.search.walls import UNKNOWN
+
+MOST_ROUNDS = 12  # of cutting spans off; more would cut little
+STILL = 1e-6  # [rad] a core that grows by less in a round has stopped growing
+
+
+@njit(
+    "int64(float64[:,::1],int64[:,::1],int64[::1],int64,float64[::1],float64[::1],float64,"
+    "float64[::1])",
+    cache=True,
+)
+def tighten(cells, spans, pass_index, n_keys, low, high, closing, sizes):  # type: ignore[no-untyped-def]
+    """Cut off what no box below a size can hold; return how many spans are left, 0 if none can be.
+
+    Args:
+        cells: The table of `Cells`.
+        spans: Sorted by their walls; those left are moved to the front, shape (n, 5).
+        pass_index: Of each wall, shape (k,).
+        n_keys: Number of keys.
+        low: The lower faces of the box are not above these, lowered, in [rad], shape (6,).
+        high: The upper faces are not below these, raised.
+        closing: The size in [rad].
+        sizes: Filled with the least size of a box that reaches each wall, shape (k,).
+    """
+    n, n_walls = len(spans), len(pass_index)
+    n_passes = 0
+    for wall in range(n_walls):
+        n_passes = max(n_passes, pass_index[wall] + 1)
+    walls_of = np.zeros(n_passes, dtype=np.int64)
+    for wall in range(n_walls):
+        walls_of[pass_index[wall]] += 1
+    least, most = np.empty(6), np.empty(6)
+    for _ in range(MOST_ROUNDS):
+        change, left, k = 0.0, 0, 0
+        for wall in range(n_walls):
+            before, smallest = left, np.inf
+            least[:], most[:] = np.inf, -np.inf
+            while k < n and spans[k, 0] == wall:
+                begin, stop = -1, -1
+                for cell in range(spans[k, 3], spans[k, 4]):
+                    size = 0.0
+                    for j in range(6):
+                        a, b = cells[cell, j], cells[cell, 6 + j]
+                        edge = max(min(a, b) + cells[cell, 12 + j], high[j]) - min(
+                            max(a, b) + cells[cell, 18 + j], low[j]
+                        )
+                        size += max(edge, 0.0)
+                    if size < closing:
+                        if begin < 0:
+                            begin = cell
+                        stop = cell + 1
+                        smallest = min(smallest, size)
+                if begin >= 0:
+                    for cell in range(begin, stop):
+                        for j in range(6):
+                            a, b = cells[cell, j], cells[cell, 6 + j]
+                            least[j] = min(least[j], min(a, b) + cells[cell, 12 + j])
+                            most[j] = max(most[j], max(a, b) + cells[cell, 18 + j])
+                    for i in range(3):
+                        spans[left, i] = spans[k, i]
+                    spans[left, 3], spans[left, 4] = begin, stop
+                    left += 1
+                k += 1
+            if left == before:
+                return 0
+            sizes[wall] = smallest
+            for j in range(6):
+                change = max(change, least[j] - high[j], low[j] - most[j])
+                high[j], low[j] = max(high[j], least[j]), min(low[j], most[j])
+        # each pass is left the postures that all of its walls have
+        walls_with = np.zeros((n_passes, n_keys), dtype=np.int64)
+        last_wall = np.full((n_passes, n_keys), -1)
+        for k in range(left):
+            at, key = pass_index[spans[k, 0]], spans[k, 1]
+            if last_wall[at, key] != spans[k, 0]:
+                last_wall[at, key] = spans[k, 0]
+                walls_with[at, key] += 1
+        n = 0
+        kept = walls_of == 0
+        for k in range(left):
+            at = pass_index[spans[k, 0]]
+            if walls_with[at, spans[k, 1]] == walls_of[at]:
+                kept[at] = True
+                for i in range(5):
+                    spans[n, i] = spans[k, i]
+                n += 1
+        if not kept.all():
+            return 0
+        if change < STILL:
+            break
+    return n
+
+
+@njit("float64(float64[:,::1],int64,float64[:,::1],float64[::1],float64[::1])", cache=True)
+def _pressed(cells, cell, prices, low, high):  # type: ignore[no-untyped-def]
+    """Return how far a cell presses the faces of a core outwards at the least, at their prices."""
+    start, end = 0.0, 0.0
+    for j in range(6):
+        up, down = prices[j, 0], prices[j, 1]
+        out = up * (cells[cell, 12 + j] - high[j]) + down * (low[j] - cells[cell, 18 + j])
+        start += out + (up - down) * cells[cell, j]
+        end += out + (up - down) * cells[cell, 6 + j]
+    return min(start, end)
+
+
+@njit(
+    "float64(float64[:,::1],int64[:,::1],float64[:,:,::1],float64[::1],float64[::1],float64)",
+    cache=True,
+)
+def trim(cells, spans, prices, low, high, closing):  # type: ignore[no-untyped-def]
+    """Cut cells off the ends of spans that no box below a size can hold; return a bound in [rad].
+
+    At the prices of a linear program each wall adds to the bound what its cheapest cell does, and
+    whoever takes another cell of it pays the difference. Infinite if a wall has no cell left.
+
+    Args:
+        cells: The table of `Cells`.
+        spans: One of each wall, shape (k, 5); they become shorter.
+        prices: As of `least_box`.
+        low: The lower faces of the box are not above these, in [rad], shape (6,).
+        high: The upper faces are not below these.
+        closing: The size in [rad].
+    """
+    k = len(spans)
+    least = np.full(k, np.inf)
+    total = 0.0
+    for j in range(6):
+        total += high[j] - low[j]
+    for w in range(k):
+        for cell in range(spans[w, 3], spans[w, 4]):
+            least[w] = min(least[w], _pressed(cells, cell, prices[w], low, high))
+        total += least[w]
+    for w in range(k):
+        most = closing - (total - least[w]) + ROUND_OFF
+        first, end = spans[w, 3], spans[w, 4]
+        while first < end and _pressed(cells, first, prices[w], low, high) >= most:
+            first += 1
+        while first < end and _pressed(cells, end - 1, prices[w], low, high) >= most:
+            end -= 1
+        if first == end:
+            return np.inf
+        spans[w, 3], spans[w, 4] = first, end
+    return total - ROUND_OFF
+
+
+@njit("float64(float64[:,::1],int64,int64,float64[::1],float64[::1])", cache=True)
+def distance(cells, first, end, low, high):  # type: ignore[no-untyped-def]
+    """Return by how much a box misses the chords of a span, in [rad]; 0 if a pad is not known."""
+    best = np.inf
+    for cell in range(first, end):
+        for j in range(6):
+            if cells[cell, 18 + j] >= UNKNOWN:
+                return 0.0
+        best, _ = nearest_on_chord(cells[cell, :6], cells[cell, 6:12], low, high, best)
+    return best
