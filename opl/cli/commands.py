@@ -155,6 +155,8 @@ def batch(
     except Stopped:
         click.echo(f"error: stopped; {len(jobs) - len(ended)} jobs have not ended", err=True)
         sys.exit(STATUS)
+    out.mkdir(parents=True, exist_ok=True)
+    opl.write_file(out / "report.html", opl.batch_page(rows, out))
     _show_rows(rows, as_json)
     sys.exit(max(row.exit_status for row in rows))
 
