@@ -134,13 +134,11 @@ def _certified(report: opl.Report) -> Iterator[str]:
     bound, gap = path.lower_bound_rad, path.gap
     if bound is None or gap is None:
         return
+    why = "" if path.open_because is None else f"; more than wanted: {path.open_because}"
     yield (
-        f"no motion along these passes has a joint range sum below {bound:.4f} rad, "
-        f"{COVERED}, with the clearances that the plan keeps: the one found is within "
-        f"{100.0 * gap:.3f} % of the least there is"
+        f"no motion along these passes has a joint range sum below {bound:.4f} rad, {COVERED}, with "
+        f"the plan's clearances: the one found is within {100.0 * gap:.3f} % of the least{why}"
     )
-    if path.open_because is not None:
-        yield f"that is more than wanted: {path.open_because}"
 
 
 def _times(report: opl.Report, robot: str) -> Iterator[str]:
