@@ -79,6 +79,7 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
         f"{path.intermediate_nodes} intermediate nodes, branch {path.branch}"
     )
     yield from _certified(report)
+    yield from _held(report)
     # the clearance layer is part of the collision checks
     spent = report.seconds["clearance"] + report.seconds["search"]
     yield f"search with its collision checks: {spent:.2f} s"
@@ -110,6 +111,7 @@ COVERED = (
     "at any contact positions, each pass on one IK branch and count of full turns (approach, links "
     "and retract not counted)"
 )
+MOST_HOLDERS = 4  # that are named
 OBJECTIVES = {
     "travel": ("joint travel", "{:.4f} rad"),
     "time": ("time on the wheel", "{:.2f} s"),
@@ -136,6 +138,22 @@ def _certified(report: opl.Report) -> Iterator[str]:
     yield (
         f"no motion along these passes has a joint range sum below {bound:.4f} rad, "
         f"{COVERED}: the one found is within {100.0 * gap:.3f} % of the least there is"
+    )
+
+
+def _held(report: opl.Report) -> Iterator[str]:
+    """Yield what keeps the joint range sum from being smaller."""
+    path = report.path
+    if path is None or not path.held_by:
+        return
+    places = [
+        f"cutter point {one.cutter_point:g} (pass {one.pass_}: {', '.join(one.joints)}) "
+        f"{one.most_gain_rad:.4f} rad"
+        for one in path.held_by[:MOST_HOLDERS]
+    ]
+    yield (
+        "the joint range sum is held up by these; what could be gained at the most if one of them "
+        f"need not be ground: {'; '.join(places)}"
     )
 
 
