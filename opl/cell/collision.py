@@ -161,6 +161,15 @@ class CollisionScene:
         """Indices of the pairs that have to keep a distance, not only not to touch."""
         return np.flatnonzero(self._needed > 0.0)
 
+    def anew(self) -> CollisionScene:
+        """Return the scene without what its measures left in it, which the next would begin from.
+
+        Distances then are the same to the last digit, whatever was measured before.
+        """
+        scene = copy(self)
+        scene._prepare(self._margins, range(0))
+        return scene
+
     def pair(self, index: int) -> BodyPair:
         """Return the names of a pair."""
         return self._pairs[index]
