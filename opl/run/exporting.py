@@ -6,9 +6,12 @@ import os
 from collections.abc import Mapping
 from datetime import datetime, timezone
 
+import numpy as np
+
 from opl.errors import InputError
 from opl.geometry.frames import transform
 from opl.geometry.mesh import box_corners
+from opl.job.load import Job
 from opl.planning.survey import NodeState
 from opl.program.export import StraightLimit, export_program
 from opl.program.moves import Program
@@ -25,10 +28,23 @@ def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
     left = job.search.max_contact_error - proven.verification.max_contact_error
     limit = StraightLimit(box_corners(vertices), left)
     program, files = export_program(
-        proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), ["OPL"]
+        proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), _comments(job)
     )
     trace = motion_trace(proven.motion, job.name, job.cell.robot.joint_names)
     return program, {**files, f"{job.name}_motion.json": trace}
+
+
+def _comments(job: Job) -> list[str]:
+    """Return the lines at the top of a program, with home where it is not that of the job."""
+    asked, given = np.rad2deg(job.around.home), np.rad2deg(job.process.home)
+    return [
+        "OPL",
+        *(
+            f"HOME {name} {given[k]:.2f}, NOT {asked[k]:.2f}"
+            for k, name in enumerate(job.cell.robot.joint_names)
+            if given[k] != asked[k]
+        ),
+    ]
 
 
 def draw_charts(planned: Planned) -> Mapping[str, str]:

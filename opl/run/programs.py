@@ -11,6 +11,7 @@ from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.job.refusals import keys_named
+from opl.program.posts import find_post
 from opl.proof.digest import changed_since, digests_in
 from opl.proof.prove import Proof, prove
 from opl.run.delivery import RESULT
@@ -52,7 +53,8 @@ def prove_program(job: Job, files: Sequence[Path], watch: Watch | None = None) -
 
     Args:
         job: Cell, surface, feed and tolerances.
-        files: The files: the master and all parts of a program that is split.
+        files: The files: the master and all parts of a program that is split. Files of frames and
+            tools beside them are read with them.
         watch: Follows the work.
 
     Raises:
@@ -61,7 +63,14 @@ def prove_program(job: Job, files: Sequence[Path], watch: Watch | None = None) -
         Cancelled: If the work was cancelled.
     """
     watch = watch or Watch()
-    content = {path: read_program(path) for path in files}
+    reader = find_post(job.program.controller).reader
+    beside = [
+        path.parent / name
+        for path in files
+        for name in (() if reader is None else reader.companions)
+        if (path.parent / name).is_file()
+    ]
+    content = {path: read_program(path) for path in dict.fromkeys([*files, *beside])}
     points = cut_surface(job, watch).points
     with watch.stage(Stage.VERIFICATION) as progress, keys_named(job.source):
         found = prove(job, points, {str(path): data for path, data in content.items()}, progress)
