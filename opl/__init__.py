@@ -78,6 +78,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from opl.version import VERSION
+
 if TYPE_CHECKING:
     from opl.cell.robot import Robot as Robot
     from opl.cell.robot import known_robots as known_robots
@@ -147,7 +149,7 @@ if TYPE_CHECKING:
     from opl.run.watch import Stage as Stage
     from opl.run.watch import Watch as Watch
 
-__version__ = "0.1.0"
+__version__ = VERSION
 
 # where each name is defined
 _HOMES = {

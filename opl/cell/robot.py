@@ -141,6 +141,7 @@ def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
     robot = _robot(read_robot_file(path), path.parent)
     if not robot.urdf.is_file():
         raise InputError(str(path), f"urdf: no such file, got {robot.urdf.name!r}")
+    UrdfTree(robot.urdf).require_shapes_on_joints()
     _check_urdf(robot)
     if not _arm_fits_urdf(robot):
         raise InputError(str(path), f"arm: is not the arm that {robot.urdf.name} describes")
@@ -193,7 +194,7 @@ def _model(urdf: Path) -> pin.Model:
 
 
 def _check_urdf(robot: Robot) -> None:
-    """Refuse a URDF that has other joints, lacks a frame, or hides shapes from the replay."""
+    """Refuse a URDF that has other joints, or lacks a frame."""
     try:
         model = _model(robot.urdf)
     except ValueError as error:
@@ -206,7 +207,6 @@ def _check_urdf(robot: Robot) -> None:
     missing = [frame for frame in ("base", "tool0") if not model.existFrame(frame)]
     if missing:
         raise InputError(str(robot.urdf), f"must have links base and tool0, lacks {missing[0]}")
-    UrdfTree(robot.urdf).require_shapes_on_joints()
 
 
 def _arm_fits_urdf(robot: Robot) -> bool:

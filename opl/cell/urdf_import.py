@@ -25,6 +25,7 @@ from opl.cell.urdf_arm import UrdfArm, arm_of_urdf
 from opl.cell.urdf_tree import UrdfTree
 from opl.cell.xacro_file import SUFFIX, expand
 from opl.errors import InputError
+from opl.files.writing import write_folder
 
 N_CHECKED = 500
 # Farthest that a configuration found may be from its pose: what rounded right angles cost.
@@ -83,6 +84,7 @@ def import_urdf(
     controller = tree.base_frame()
     tree.set_base(height)
     tree.gather_shapes()
+    tree.leave_out_pictures()
     meshes = tree.collect_meshes()
     cautions = [*tree.cautions(), *_doubts(found)]
     found = replace(found, arm=replace(found.arm, c1=found.arm.c1 - height))
@@ -99,10 +101,7 @@ def import_urdf(
         if closure > CLOSURE:
             message = f"FK(IK) misses by {closure:.1g}: the closed form is not that of the URDF"
             raise InputError(str(urdf), message)
-        try:
-            shutil.copytree(draft, folder, dirs_exist_ok=True)
-        except (OSError, shutil.Error) as error:
-            raise InputError(str(folder), f"cannot be written: {error}") from error
+        write_folder(draft, folder)
     robot = load_robot(str(folder))
     files = (path, robot.urdf, *(folder / target for target in meshes))
     return ImportedRobot(robot, files, closure, tuple(cautions))
@@ -110,7 +109,7 @@ def import_urdf(
 
 def _read(urdf: Path) -> tuple[UrdfTree, UrdfArm]:
     if urdf.suffix != SUFFIX:
-        return UrdfTree(urdf), arm_of_urdf(urdf)
+        return UrdfTree(urdf), arm_of_urdf(urdf)  # the tree first: it refuses what falls over
     with TemporaryDirectory() as scratch:
         plain = Path(scratch) / "arm.urdf"
         plain.write_text(expand(urdf), encoding="utf-8")

@@ -5,16 +5,43 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from opl.errors import InputError
+from opl.files.reading import MB, read_bytes
 from opl.geometry.frames import Array, pose
+from opl.geometry.mesh import load_shell
 
 BASE = "base"
 _NOWHERE = "0 0 0"
 _EXACT = 1e-6  # [m], [rad]; URDFs round right angles
+
+
+MOST_BYTES = 10 * MB
+MOST_DEPTH = 60
+
+
+class _DeepError(Exception):
+    """Elements in elements in elements."""
+
+
+class _Builder(ET.TreeBuilder):
+    """Builds the tree of a file, unless it is so deep that whoever walks through it would fall."""
+
+    _depth = 0
+
+    def start(self, tag: Any, attrs: Any) -> ET.Element:
+        self._depth += 1
+        if self._depth > MOST_DEPTH:
+            raise _DeepError(f"elements are nested more than {MOST_DEPTH} deep")
+        return super().start(tag, attrs)
+
+    def end(self, tag: Any) -> ET.Element:
+        self._depth -= 1
+        return super().end(tag)
 
 
 class UrdfTree:
@@ -27,18 +54,30 @@ class UrdfTree:
 
     def __init__(self, path: Path, source: Path | None = None) -> None:
         self._path = source or path
+        content = read_bytes(path, MOST_BYTES)
         try:
-            builder = ET.TreeBuilder(insert_comments=True)
-            self._root = ET.parse(path, ET.XMLParser(target=builder)).getroot()
-        except ET.ParseError as error:
+            parser = ET.XMLParser(target=_Builder(insert_comments=True))
+            parser.feed(content)
+            self._root = parser.close()
+        except (ET.ParseError, _DeepError) as error:
             raise InputError(str(self._path), f"is not XML: {error}") from error
         self._joints = {_child(joint): joint for joint in self._root.findall("joint")}
+        self._require_no_ring()
         free = [link for link in self._links() if link not in self._joints]
         if len(free) != 1:
             raise InputError(
                 str(self._path), f"must have one root link, has {', '.join(free) or 'none'}"
             )
         self._root_link = free[0]
+
+    def _require_no_ring(self) -> None:
+        for link in self._joints:
+            seen = {link}
+            while (joint := self._joints.get(link)) is not None:
+                link = _parent(joint)
+                if link in seen:
+                    raise InputError(str(self._path), f"link {link} hangs on itself")
+                seen.add(link)
 
     def base_frame(self) -> tuple[float, float] | None:
         """Return where the frame ``base`` lies on the z axis of the root link; None without one.
@@ -109,11 +148,18 @@ class UrdfTree:
                 f"link {self._carrier(name)[0]}, else they would not be checked",
             )
 
+    def leave_out_pictures(self) -> None:
+        """Leave out the meshes that are only looked at: opl shows and checks collision shapes."""
+        for link in self._root.findall("link"):
+            for visual in link.findall("visual"):
+                if visual.find("geometry/mesh") is not None:
+                    link.remove(visual)
+
     def collect_meshes(self) -> dict[str, Path]:
         """Name the meshes relative to the URDF; return where each is now, by its new name.
 
         Raises:
-            InputError: If one is not there.
+            InputError: If one is not there, or is no mesh that can be read.
         """
         found: dict[str, Path] = {}
         for mesh in self._root.iter("mesh"):
@@ -121,6 +167,10 @@ class UrdfTree:
             source = self._locate(name)
             if source is None:
                 raise InputError(str(self._path), f"mesh {name}: no such file")
+            try:
+                load_shell(source, "m")
+            except InputError as error:
+                raise InputError(str(self._path), f"mesh {name}: {error}") from error
             target, number = f"meshes/{source.name}", 1
             while found.get(target, source) != source:
                 number += 1

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from importlib.util import find_spec
 from pathlib import Path
 from xml.parsers.expat import ExpatError
 
 from opl.errors import InputError
+from opl.files.apart import apart
+from opl.files.reading import MB, read_bytes
 
 SUFFIX = ".xacro"
 _BY_HAND = "or expand it by hand: xacro {name} ARGUMENT:=VALUE > arm.urdf"
@@ -20,11 +23,16 @@ def expand(path: Path) -> str:
             which may be an included one, and the line where that can be found.
     """
     by_hand = _BY_HAND.format(name=path.name)
-    try:
-        import xacro
-    except ImportError as error:
+    if find_spec("xacro") is None:
         message = f"needs the optional extra for xacro: pip install 'opl[xacro]', {by_hand}"
-        raise InputError(str(path), message) from error
+        raise InputError(str(path), message)
+    # the expressions in a xacro are programs
+    return apart(_expanded, path, by_hand, about=str(path))
+
+
+def _expanded(path: Path, by_hand: str) -> str:
+    import xacro
+
     try:
         return str(xacro.process_file(str(path)).toxml())
     except ExpatError as error:
@@ -55,7 +63,7 @@ def _line_of(path: Path, reason: str) -> int | None:
         (r"ament_index", r"\$\(find\s"),
         (r"No such file or directory: .*?([^/ ]+) \[", r"<xacro:include[^>]*{}"),
     ]
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    lines = read_bytes(path, MB).decode("utf-8", "replace").splitlines()
     for clue, pattern in clues:
         found = re.search(clue, reason)
         if found is None:

@@ -206,6 +206,13 @@ def show_proof(report: Mapping[str, Any], robot: str) -> None:
         lines.append("no result.json beside it tells whether opl run wrote these very bytes")
     elif report["as_written"]:
         lines.append("to the last byte what opl run proved and wrote")
+    if report["changed"]:
+        lines.append(
+            "changed since opl wrote it, says the digest in it; what it says now was looked at"
+        )
+    if report["other_inputs"]:
+        names = ", ".join(report["other_inputs"])
+        lines.append(f"other inputs than it was made of: {names}; it was held against those of now")
     found = len(report["findings"])
     lines.append("proven" if report["proven"] else f"not proven: {found} findings")
     _print(_console(), lines)

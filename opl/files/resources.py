@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 from opl.errors import InputError
-from opl.files.writing import check_folder
+from opl.files.writing import check_folder, write_folder
 
 
 def folder(name: str) -> Path:
@@ -31,6 +30,5 @@ def start_job(directory: Path) -> Path:
     if directory.exists():
         raise InputError(str(directory), "exists already; name a new folder")
     check_folder(directory)
-    example = folder("workpieces") / "v_shape"
-    shutil.copytree(example, directory, ignore=shutil.ignore_patterns("__pycache__"))
+    write_folder(folder("workpieces") / "v_shape", directory)
     return directory / "job.yaml"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 from pathlib import Path
 
 from opl.errors import InputError
@@ -45,6 +46,30 @@ def write_file(path: Path, text: str) -> None:
             raise
     except OSError as error:
         raise InputError(str(path), f"cannot be written: {error.strerror}") from error
+
+
+def write_folder(source: Path, folder: Path) -> None:
+    """Write a copy of a folder of plain files and folders, beside its place first.
+
+    Into a folder that is there the files are put one by one.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    aside = folder.with_name(HIDDEN + "folder-" + folder.name)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            shutil.rmtree(aside, ignore_errors=True)  # of an attempt that was killed
+            shutil.copytree(source, aside, ignore=shutil.ignore_patterns("__pycache__"))
+            if folder.is_dir():
+                shutil.copytree(aside, folder, dirs_exist_ok=True)
+            else:
+                os.rename(aside, folder)
+        finally:
+            shutil.rmtree(aside, ignore_errors=True)
+    except (OSError, shutil.Error) as error:
+        raise InputError(str(folder), f"cannot be written: {error}") from error
 
 
 def write_through(path: Path, content: bytes) -> None:

@@ -28,6 +28,7 @@ from OCP.TopExp import TopExp_Explorer
 from OCP.TopoDS import TopoDS
 
 from opl.errors import InputError
+from opl.files.reading import MB, read_bytes
 from opl.geometry.frames import Array
 from opl.geometry.nurbs import NurbsSurface
 from opl.geometry.patchwork import Face
@@ -49,6 +50,9 @@ _LEAST_AREA = 1e-6
 # in the order of GeomAbs_SurfaceType
 _TYPES = ("plane", "cylinder", "cone", "sphere", "torus", "bezier", "b-spline",
           "revolution", "extrusion", "offset", "other")  # fmt: skip
+
+
+MOST_BYTES = 100 * MB
 
 
 def load_cad_faces(path: Path) -> tuple[Face, ...]:
@@ -78,10 +82,7 @@ def _all(shape: Any, kind: str) -> Iterator[Any]:
 
 def _read(path: Path) -> Any:
 
-    try:
-        content = path.read_bytes().rstrip()
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}") from error
+    content = read_bytes(path, MOST_BYTES).rstrip()
     if not content:
         raise InputError(str(path), "is empty")
     # OpenCASCADE prints its troubles to standard output

@@ -6,16 +6,18 @@ A file of NURBS faces is JSON or YAML, in millimetres.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from opl.errors import InputError
 from opl.files import documents
-from opl.files.quantities import Number, between
+from opl.files.apart import apart
+from opl.files.quantities import between
 from opl.geometry.frames import Array
 from opl.geometry.mesh_surface import load_mesh_surface
 from opl.geometry.nurbs import NurbsSurface
@@ -36,15 +38,37 @@ def load_smooth_faces(path: Path) -> tuple[Face, ...]:
     """
     suffix = path.suffix.lower()
     if suffix in CAD:
-        try:  # the extra is only needed by those who have such files
-            from opl.geometry.cad import load_cad_faces
-        except ImportError as error:
+        if find_spec("OCP") is None:  # the extra is only needed by those who have such files
             extra = "needs the optional extra for STEP and IGES: pip install 'opl[cad]'"
-            raise InputError(str(path), extra) from error
-        return load_cad_faces(path)
+            raise InputError(str(path), extra)
+        return tuple(
+            Face(NurbsSurface(*surface), outward, None if loops is None else Trim(loops), kind)
+            for surface, outward, loops, kind in apart(_cad_faces, path, about=str(path))
+        )
     if suffix in NURBS:
         return load_faces(path)
     raise InputError(str(path), f"must be one of {', '.join((*NURBS, *MESHES, *CAD))}")
+
+
+_Plain = tuple[tuple[Any, ...], float, tuple[Array, ...] | None, str]
+
+
+def _cad_faces(path: Path) -> list[_Plain]:
+    """Return the faces of a STEP or IGES file as plain values, for a process of its own.
+
+    OpenCASCADE crashes on some broken files.
+    """
+    from opl.geometry.cad import load_cad_faces
+
+    return [
+        (
+            tuple(getattr(face.surface, one.name) for one in fields(face.surface) if one.init),
+            face.outward,
+            None if face.trim is None else face.trim.loops,
+            face.type,
+        )
+        for face in load_cad_faces(path)
+    ]
 
 
 def load_machined(
@@ -86,7 +110,7 @@ _Parameter = Annotated[float, between(-1e9, 1e9)]
 _Knots = list[_Parameter]
 _Weight = Annotated[float, between(-1e6, 1e6)]
 _Degree = Annotated[int, between(-1, 20)]
-_Point = Annotated[list[Number], Field(min_length=3, max_length=3)]
+_Point = Annotated[list[_Parameter], Field(min_length=3, max_length=3)]
 _Parameters = Annotated[list[_Parameter], Field(min_length=2, max_length=2)]
 _Row = Annotated[list[_Point], Field(min_length=1)]
 _Loop = Annotated[list[_Parameters], Field(min_length=3)]

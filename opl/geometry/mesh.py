@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Literal
 
@@ -11,8 +12,13 @@ import trimesh
 from numpy.typing import NDArray
 
 from opl.errors import InputError
+from opl.files.reading import MB, read_bytes
 from opl.geometry.crossings import crossing_triangles
 from opl.geometry.frames import Array, in_mm, read_only
+
+# more of them take gigabytes and minutes to be looked through
+MOST_TRIANGLES = 400_000
+MOST_BYTES = 100 * MB
 
 _METRES = {"mm": 1e-3, "m": 1.0}
 _SUFFIXES = (".stl", ".ply", ".obj")
@@ -159,12 +165,12 @@ def _read(path: Path) -> trimesh.Trimesh:
     """Return what a file holds, in its own unit, corners at the same place merged."""
     if path.suffix.lower() not in _SUFFIXES:
         raise InputError(str(path), f"must be one of {', '.join(_SUFFIXES)}")
+    content = read_bytes(path, MOST_BYTES)
     try:
-        with path.open("rb") as file:
-            mesh = trimesh.load_mesh(file, file_type=path.suffix.lower()[1:])
+        mesh = trimesh.load_mesh(BytesIO(content), file_type=path.suffix.lower()[1:])
+        if len(mesh.faces) > MOST_TRIANGLES:
+            raise ValueError(f"has {len(mesh.faces)} triangles, at most {MOST_TRIANGLES} are taken")
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}") from error
     # trimesh lets whatever its parsers stumble over through: ValueError, KeyError, struct.error ...
     except Exception as error:
         raise InputError(str(path), f"is not a mesh: {error}") from error

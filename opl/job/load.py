@@ -6,7 +6,7 @@ Its sections, and the cell file that many jobs share, are the other modules of t
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from opl.geometry.patchwork import Face, Patchwork
 from opl.job.around import Surroundings, check_home, surroundings
 from opl.job.bodies import bodies_in_si, pose_of
 from opl.job.file import JobFile
+from opl.job.inputs import input_digests
 from opl.job.search import Method, Search
 from opl.job.source import Source
 from opl.job.workpiece import GIVEN
@@ -41,6 +42,7 @@ class Job:
         search: How the path is searched.
         process: Speeds, approach and home.
         program: How the program is written.
+        inputs: SHA-256 of everything it is made of, by name; see `opl.job.inputs`.
     """
 
     source: Source
@@ -52,6 +54,7 @@ class Job:
     search: Search
     process: ProcessSettings
     program: ProgramSettings
+    inputs: Mapping[str, str] = field(default_factory=dict)
 
 
 def load_job(
@@ -90,7 +93,9 @@ def load_job(
     file = check(content, JobFile, origin.label, {GIVEN: given})
     if isinstance(surface, NurbsSurface):
         surface = Patchwork((Face(surface),))
-    return _in_si(file, origin, method, surface, part)
+    job = _in_si(file, origin, method, surface, part)
+    values = {"surface": surface, "part": part}
+    return replace(job, inputs=input_digests(origin, content, job.cell.robot, values))
 
 
 def _in_si(file: JobFile, source: Source, method: str | None,

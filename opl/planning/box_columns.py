@@ -9,11 +9,11 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.columns import Sweep
 from opl.planning.families import GROWN, Placement
 from opl.planning.images import Seams
 from opl.planning.nodes import inverse_solutions
 from opl.planning.problem import GrindingProblem, wheel_distances
+from opl.planning.rows import Row
 from opl.search.box import JointBox
 from opl.search.in_box import missing as missing_of
 from opl.search.in_box import missing_chords, sampled
@@ -44,30 +44,30 @@ class Columns:
     q: Array
     free: np.ndarray
 
-    def without(
-        self, box: JointBox, place: float, t: float, back: bool, above: bool
-    ) -> float | None:
-        """Return the cutter point nearest to a place that has nothing in a box on one side of t.
+    def span(self, box: JointBox) -> tuple[Array, Array]:
+        """Return the least and the greatest contact position of each place in a box, shape (n,)."""
+        inside = self.free & (missing_of(self.q, box) <= GROWN)
+        least = np.where(inside, self.t, np.inf).min(axis=1)
+        return least, np.where(inside, self.t, -np.inf).max(axis=1)
 
-        Args:
-            box: The box.
-            place: The place.
-            t: The contact position.
-            back: Whether to look before the place, not after it.
-            above: Whether nothing is to lie in the box above t, not below it.
+    def around(
+        self, box: JointBox, place: float, t: float, upwards: bool
+    ) -> tuple[float | None, float | None]:
+        """Return the nearest cutter points between which motions in a box must pass t.
+
+        Before a place one where nothing in the box lies beyond t, after it one where nothing lies
+        on the near side of t; None where there is none.
         """
+        least, most = self.span(box)
+        below, above = most <= t, least >= t
         index = self.points.pass_index[int(np.searchsorted(self.places, place, side="right")) - 1]
-        own = np.flatnonzero(
-            (self.points.pass_index == index)
-            & (self.places % 1.0 == 0.0)
-            & ((self.places <= place) if back else (self.places >= place))
+        own = (self.points.pass_index == index) & (self.places % 1.0 == 0.0)
+        before = self.places[own & (self.places <= place) & (below if upwards else above)]
+        after = self.places[own & (self.places >= place) & (above if upwards else below)]
+        return (
+            float(before[-1]) if len(before) else None,
+            float(after[0]) if len(after) else None,
         )
-        for column in own[::-1] if back else own:
-            side = self.t[column] > t if above else self.t[column] < t
-            inside = missing_of(self.q[column], box) <= GROWN
-            if not (side & inside & self.free[column]).any():
-                return float(self.places[column])
-        return None
 
     def missing(self, box: JointBox) -> Array:
         """Return by how much a box must grow for each place, in [rad], shape (n,)."""
@@ -127,20 +127,34 @@ class ColumnSampler:
         free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
         return Columns(places, there, tuple(placements), t, q, free)
 
-    def misses(self, box: JointBox, columns: Columns, sweep: Sweep) -> float:
-        """Return by how much a box misses the places of a sweep at its contact position."""
-        count = ROW_SAMPLES * int(np.ceil(sweep.after - sweep.before)) + 1
-        places = np.linspace(sweep.before, sweep.after, count)
+    def row(
+        self, first: float, last: float, t: float, must: bool, columns: Columns, box: JointBox
+    ) -> Row:
+        """Return the places between two of a pass at one contact position, closer near a box."""
+        places = np.linspace(first, last, ROW_SAMPLES * int(np.ceil(last - first)) + 1)
+        (row,) = self.rows([(places, t, must)], columns)
+        step = places[1] - places[0]
+        near = places[int(np.argmin(missing_of(row.q, box)))]
+        closer = near + step * np.linspace(-1.0, 1.0, 2 * ROW_SAMPLES + 1)
+        (row,) = self.rows([(np.union1d(places, np.clip(closer, first, last)), t, must)], columns)
+        return row
+
+    def rows(self, rows: Sequence[tuple[Array, float, bool]], columns: Columns) -> list[Row]:
+        """Return places of a pass at one contact position each, placed as columns are."""
+        if not rows:
+            return []
+        counts = [len(row[0]) for row in rows]
+        places = np.concatenate([row[0] for row in rows])
+        t = np.repeat([row[1] for row in rows], counts)
         points = self._problem.points
-        index = points.pass_index[int(sweep.before)]
-        q = inverse_solutions(
-            self._problem.cell,
-            points.frames_at(places)[:, None],
-            np.array([sweep.contact_position]),
-        )
-        row = np.swapaxes(self._placed(np.full(count, index), q, columns.placements), 0, 1)
-        free = ~np.isnan(row[..., 0])
-        return float(missing_chords(row, free, box)[0])
+        Ts_workpiece_cutter = points.frames_at(places)[:, None]
+        q = inverse_solutions(self._problem.cell, Ts_workpiece_cutter, t[:, None])
+        index = np.repeat([points.pass_index[int(row[0][0])] for row in rows], counts)
+        placed = self._placed(index, q, columns.placements)[:, 0]
+        return [
+            Row(*row, q)
+            for row, q in zip(rows, np.split(placed, np.cumsum(counts)[:-1]), strict=True)
+        ]
 
     def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m).

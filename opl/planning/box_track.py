@@ -8,7 +8,7 @@ the box between two places, more places are taken in.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +23,7 @@ from opl.planning.nodes import NodeField, NodeMatrix
 from opl.planning.open_matrix import Track, open_matrices
 from opl.planning.plan import Found, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem
+from opl.planning.rows import Row, levels, shut_edges
 from opl.planning.symmetry import twins
 from opl.search.box import JointBox
 from opl.search.in_box import missing as missing_of
@@ -32,9 +33,11 @@ from opl.search.smooth import Travel, smoothest_within
 
 SAMPLES = 17  # contact positions of a place
 ROUNDS = 3  # of sampling closer around a track
-SUBDIVIDE = np.array([0.25, 0.5, 0.75])  # where an edge that bulges is given places
+MOST_PARTS = 8  # into which an edge that bulges is cut at once
+FINE_SHARE = 3e-5  # of the box: what an edge may bulge
+LEVELS = 4  # contact positions of a sweep that are looked at
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
-SWEEP = 2.0  # belt units that the contact moves from cutter point to cutter point in a sweep
+SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
 MOST_CHECKS = 12  # of motions in one box
 LAZY_ROUNDS = 3  # in which only the nodes of a track are asked for their clearance
 
@@ -73,12 +76,18 @@ class BoxTracks:
         return self._costs.push_weight * self._wider.collides(q)
 
     def plan(
-        self, columns: Columns, box: JointBox, room: float, learn: Callable[[Bulges], bool]
+        self,
+        columns: Columns,
+        rows: Sequence[Row],
+        box: JointBox,
+        room: float,
+        learn: Callable[[Bulges], bool],
     ) -> Plan | None:
         """Return the motion of the smoothest free track in a box.
 
         Args:
             columns: Places, all with postures in the box.
+            rows: Contact positions that are passed only where they lie in the box.
             box: The box.
             room: By how much the motion may leave it, in [rad] of its size.
             learn: Given where the track leaves the box on its way between places; returns whether
@@ -89,13 +98,15 @@ class BoxTracks:
         """
         inner = box.widened(room / 2.0)
         t, spacing = samples_in(columns.t, columns.q, columns.free, inner, SAMPLES)
-        sampled = _Sampled(
-            self, self._sampler.at(columns.places, columns.points, columns.placements, t), inner
-        )
+        t = np.concatenate([t, levels(columns.places, rows, inner, t[:, :1])], axis=1)
+        at = self._sampler.at(columns.places, columns.points, columns.placements, t)
+        coarse = sampled = _Sampled(self, at, rows, inner)
         track = sampled.smoothest()
         if track is None:
+            return self.plan(columns, (), box, room, learn) if rows else None
+        bulges = sampled.bulges(track, box.widened(room))
+        if bulges is not None and bulges.sweeps and learn(bulges):
             return None
-        coarse = sampled
         for _ in range(ROUNDS):
             closer = sampled.closer(track, spacing)
             finer = closer.smoothest()
@@ -119,7 +130,7 @@ class Bulges:
 
     Attributes:
         places: More places there, shape (n,).
-        sweeps: Place and contact position, and whether that rises, where it leaves the box most
+        sweeps: Place and contact position, and whether that rises, where it is outside of the box
             while the contact moves over the wheel.
     """
 
@@ -130,9 +141,12 @@ class Bulges:
 class _Sampled:
     """The nodes of some places at contact positions of their own."""
 
-    def __init__(self, search: BoxTracks, columns: Columns, box: JointBox) -> None:
+    def __init__(
+        self, search: BoxTracks, columns: Columns, rows: Sequence[Row], box: JointBox
+    ) -> None:
         self._search = search
         self._columns = columns
+        self._rows = rows
         self._box = box
         problem = search._problem
         q = np.where(
@@ -145,6 +159,9 @@ class _Sampled:
             wheel_distance=np.zeros(columns.t.shape),
         )
         self.matrices = open_matrices(self.problem)
+        shut = shut_edges(columns.places, columns.t, rows, box)
+        for matrix in self.matrices:
+            matrix.blocked.update(shut)
 
     def sweep(self) -> None:
         """Close every node that collides."""
@@ -189,7 +206,7 @@ class _Sampled:
         last = search._problem.cell.wheel.last_position
         t = np.clip(own[:, None] + about * spacing[:, None], -last, last)
         around = search._sampler.at(columns.places, columns.points, columns.placements, t)
-        return _Sampled(search, around, self._box)
+        return _Sampled(search, around, self._rows, self._box)
 
     def bulges(self, track: Track, box: JointBox) -> Bulges | None:
         """Return where a track leaves the box on its way from place to place, None if nowhere."""
@@ -207,18 +224,23 @@ class _Sampled:
         bulging = np.unique(edge[excess > 0.0])
         places = self._columns.places
         sweeps = []
+        t = path.contact_position
         for column in bulging:
             on_edge = np.flatnonzero(edge == column)
-            worst = on_edge[np.argmax(excess[on_edge])]
-            t = path.contact_position
             change = t[min(on_edge[-1] + 1, len(t) - 1)] - t[on_edge[0]]
             if abs(change) > SWEEP * (places[column + 1] - places[column]):
-                place = np.interp(path.cutter_point[worst], np.arange(len(places)), places)
-                sweeps.append((float(place), float(t[worst]), bool(change > 0.0)))
-        wide = bulging[np.diff(places)[bulging] > SMALLEST_EDGE]
-        ends = places[wide], places[wide + 1]
-        more = np.ravel(ends[0][:, None] + (ends[1] - ends[0])[:, None] * SUBDIVIDE)
-        return Bulges(more, tuple(sweeps))
+                out = on_edge[excess[on_edge] > 0.0]
+                for k in out[np.unique(np.linspace(0, len(out) - 1, LEVELS).astype(int))]:
+                    place = np.interp(path.cutter_point[k], np.arange(len(places)), places)
+                    sweeps.append((float(place), float(t[k]), bool(change > 0.0)))
+        more = []
+        for column in bulging[np.diff(places)[bulging] > SMALLEST_EDGE]:
+            over = excess[edge == column].max() / (box.size * FINE_SHARE)
+            parts = int(
+                np.clip(np.ceil(np.sqrt(1.0 + over)), 2, MOST_PARTS)
+            )  # falls with the square
+            more.append(np.linspace(places[column], places[column + 1], parts + 1)[1:-1])
+        return Bulges(np.concatenate([*more, np.empty(0)]), tuple(sweeps))
 
     def check(self, track: Track) -> Plan | None:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free."""

@@ -8,11 +8,11 @@ could be smaller than the best motion by more than the gap.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opl.geometry.frames import Array
 from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.box_track import BoxTracks, Bulges
 from opl.planning.columns import ColumnWalls, Sweep
@@ -21,6 +21,7 @@ from opl.planning.families import Families, Fit, Placement, grown
 from opl.planning.images import Images, seams_of
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
+from opl.planning.rows import Row
 from opl.search.box import JointBox
 from opl.search.least_box import BoxProof, Candidate
 from opl.search.smooth import Travel
@@ -31,6 +32,7 @@ MISSED = 0.05  # of the widening: what a box may miss a cutter point by and stil
 RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for next
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
 SWEEP_MISSED = 0.2  # of the widening: what it may miss a contact position by between them
+PLACE_DIGITS = 5  # of places, in cutter points
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
 
@@ -82,7 +84,8 @@ class OptimalSearch:
         gap = PROOF_SHARE * settings.widen
         self.proof = BoxProof(self._walls.images.of, self._walls.finer, found, gap)
         self._places: set[float] = set()
-        self._sweeps: set[Sweep] = set()
+        self._rows: list[tuple[Array, float, bool]] = []
+        self._passed: set[tuple[float, float, float]] = set()
         self._columns = np.arange(len(problem.points), dtype=float)
         self._hope(self._families.smallest_grown())
         n = len(problem.points)
@@ -127,14 +130,17 @@ class OptimalSearch:
         columns = None
         if len({(one.family, float(one.flip[0][4])) for one in placements}) == 1:
             columns = self._sampler.columns(box, placements, self._columns)
+            rows = self._sampler.rows(self._rows, columns)
             inner = grown(columns.q, columns.free, box)
+            for row in rows:
+                inner = row.grown(inner) if inner is not None and row.must else inner
             self._hope(inner)
             missed = missed or self._missed(columns, box)
         if missed:
             self._add(missed)
             self.proof.put_back()
             return
-        if columns is not None and inner is not None and self._try(columns, inner):
+        if columns is not None and inner is not None and self._try(columns, rows, inner):
             self.proof.put_back()
         elif candidate.bound < self.proof.closing:
             # the bound cannot rise further; the path may still come nearer to it
@@ -171,25 +177,40 @@ class OptimalSearch:
             self.proof.add(wall)
             self._places.add(wall.place)
 
-    def _add_sweeps(
-        self, columns: Columns, box: JointBox, sweeps: Sequence[tuple[float, float, bool]]
-    ) -> bool:
-        """Add walls at contact positions that motions in a box must pass, if the box misses any."""
-        missed = []
-        allowed = SWEEP_MISSED * self._settings.widen * self.proof.threshold
-        for place, t, upwards in sweeps:
-            before = columns.without(box, place, t, back=True, above=upwards)
-            after = columns.without(box, place, t, back=False, above=not upwards)
-            if before is None or after is None:
+    def _learn(self, columns: Columns, box: JointBox, room: float, bulges: Bulges) -> bool:
+        """Take in where a track leaves a box between places; return whether that is new.
+
+        A contact position that motions in the box must pass, and nowhere can, becomes a wall. One
+        that they can pass somewhere is passed there: those places are looked at.
+        """
+        more, walls = [bulges.places], []
+        last = len(self._points) - 1
+        known = len(self._rows)
+        for place, t, upwards in bulges.sweeps:
+            before, after = columns.around(box, place, t, upwards)
+            must = before is not None and after is not None
+            index = self._points.pass_index
+            first = np.floor(place) if before is None else before
+            end = min(np.floor(place) + 1.0, last) if after is None else after
+            if index[int(first)] != index[int(end)]:
                 continue
-            sweep = Sweep(before, after, t, upwards)
-            if sweep in self._sweeps or self._sampler.misses(box, columns, sweep) <= allowed:
+            key = float(first), float(end), round(t, 1)
+            if key in self._passed:
                 continue
-            self._sweeps.add(sweep)
-            missed.append(sweep)
-        for wall in self._walls.sweeps(missed) if missed else ():
+            self._passed.add(key)
+            row = self._sampler.row(key[0], key[1], t, must, columns, box)
+            if must and row.missing(box) > SWEEP_MISSED * self._settings.widen * box.size:
+                walls.append(Sweep(key[0], key[1], t, upwards))
+                continue
+            self._rows.append((row.places, t, must))
+            stretches = row.inside(box.widened(room / 2.0))
+            more.append(np.append(stretches.ravel(), stretches.mean(axis=1)))
+        for wall in self._walls.sweeps(walls) if walls else ():
             self.proof.add(wall)
-        return bool(missed)
+        grown = np.union1d(self._columns, np.round(np.concatenate(more), PLACE_DIGITS))
+        new = len(grown) > len(self._columns) or len(self._rows) > known or bool(walls)
+        self._columns = grown
+        return new
 
     def _hold(self, candidate: Candidate) -> tuple[list[Placement], list[float]]:
         """Return the image of each pass that fits into the box, and the cutter points it misses."""
@@ -219,19 +240,17 @@ class OptimalSearch:
         at_walls = float(fit.missing[known].max(initial=0.0))
         return round(at_walls, 2), float(fit.missing.max())
 
-    def _try(self, columns: Columns, box: JointBox) -> bool:
+    def _try(self, columns: Columns, rows: list[Row], box: JointBox) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
         learnt = False
+        room = ROOM_SHARE * self._settings.widen * box.size
 
         def learn(bulges: Bulges) -> bool:
             nonlocal learnt
-            more = np.setdiff1d(bulges.places, self._columns)
-            self._columns = np.union1d(self._columns, more)
-            learnt = self._add_sweeps(columns, box, bulges.sweeps) or bool(len(more))
+            learnt = self._learn(columns, box, room, bulges)
             return learnt
 
-        room = ROOM_SHARE * self._settings.widen * box.size
-        found = self._tracks.plan(columns, box, room, learn)
+        found = self._tracks.plan(columns, rows, box, room, learn)
         if found is not None and found.path.joint_range_sum < self._value:
             self.plan = found
             self.proof.threshold = min(self.proof.threshold, self._value)

@@ -13,6 +13,11 @@ from jinja2 import StrictUndefined, TemplateSyntaxError
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from opl.errors import InputError
+from opl.files.apart import apart
+from opl.files.reading import MB, read_text
+from opl.files.resources import folder
+
+MOST_TEMPLATE, MOST_TEXT = MB, 50 * MB
 
 _ENVIRONMENT = ImmutableSandboxedEnvironment(
     undefined=StrictUndefined,
@@ -29,15 +34,22 @@ def fill(template: Path, values: Mapping[str, object]) -> str:
     Raises:
         InputError: If the file cannot be read or is no template, or uses a value there is not.
     """
+    source = read_text(template, MOST_TEMPLATE)
+    if template.resolve().is_relative_to(folder("templates").resolve()):
+        return _rendered(source, str(template), values)
+    # a template is a program: one that grows or never ends does so in a process of its own
+    return apart(_rendered, source, str(template), dict(values), about=str(template))
+
+
+def _rendered(source: str, template: str, values: Mapping[str, object]) -> str:
     try:
-        source = template.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(str(template), f"cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(str(template), "is not text in UTF-8") from error
-    try:
-        return _ENVIRONMENT.from_string(source).render(values)
+        text = _ENVIRONMENT.from_string(source).render(values)
+        if len(text) > MOST_TEXT:
+            raise ValueError(f"gives more than {MOST_TEXT / MB:g} MB of text")
+        return text
     except TemplateSyntaxError as error:
         raise InputError(f"{template}: line {error.lineno}", str(error.message)) from error
+    except MemoryError:
+        raise
     except Exception as error:  # a template runs code of its own: any error in it is the template's
-        raise InputError(str(template), str(error) or type(error).__name__) from error
+        raise InputError(template, str(error) or type(error).__name__) from error

@@ -19,12 +19,14 @@ from opl.cell.robot import Robot
 from opl.errors import InputError
 from opl.files.documents import Document, read
 from opl.files.quantities import Number, Positive, Pulses
+from opl.files.reading import MB, read_bytes
 from opl.files.writing import write_file
 from opl.program.parameter_fit import choose_group
 from opl.program.parameters import AxisParameters, read_parameters
 
 # Readings nearer than this in [deg] give a ratio of too few digits: the pendant shows hundredths.
 LEAST_SPAN = 20.0
+MOST_PARAMETERS = 20 * MB
 # Farthest from zero pulses [deg] that two readings may meet zero degrees.
 ZERO_TOLERANCE = 0.1
 
@@ -165,10 +167,7 @@ def import_pulse_ratios(
         InputError: If the one cannot be read, is no such file or contradicts the robot, or the
             other cannot be written.
     """
-    try:
-        text = parameter_file.read_text(encoding="latin-1")
-    except OSError as error:
-        raise InputError(str(parameter_file), f"cannot be read: {error.strerror}") from error
+    text = read_bytes(parameter_file, MOST_PARAMETERS).decode("latin-1")
     source = str(parameter_file)
     parameters, found = choose_group(read_parameters(text, source), robot, group, source)
     write_file(file, ratio_file(robot, parameters, parameter_file.name))

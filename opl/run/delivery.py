@@ -10,12 +10,14 @@ from typing import Any
 
 from opl.errors import InputError
 from opl.files.claiming import Claim, claimed
+from opl.files.reading import MB, read_text
 from opl.run.page import run_page
 from opl.run.reporting import make_report
 from opl.run.result import to_json
 from opl.run.values import Refused, Written
 
 RESULT = "result.json"
+MOST_RESULT = 20 * MB
 PAGE = "report.html"
 
 
@@ -72,8 +74,8 @@ def deliver(run: Written | Refused, folder: Path | Claim) -> list[Path]:
 
 def _earlier_result(folder: Path) -> dict[str, Any]:
     try:
-        found = json.loads((folder / RESULT).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        found = json.loads(read_text(folder / RESULT, MOST_RESULT))
+    except (InputError, ValueError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}
 

@@ -9,12 +9,14 @@ from datetime import datetime, timezone
 import numpy as np
 
 from opl.errors import InputError
+from opl.files.digests import STAMP, stamped
 from opl.geometry.frames import transform
 from opl.geometry.mesh import box_corners
 from opl.job.load import Job
 from opl.planning.survey import NodeState
 from opl.program.export import StraightLimit, export_program
 from opl.program.moves import Program
+from opl.proof.digest import inputs_mark
 from opl.report.pictures import contact_chart, joint_chart
 from opl.report.trace import motion_trace
 from opl.run.values import Planned, Proven
@@ -27,23 +29,23 @@ def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
     # what the proven path leaves of the allowed contact error
     left = job.search.max_contact_error - proven.verification.max_contact_error
     limit = StraightLimit(box_corners(vertices), left)
+    comments = ["OPL", inputs_mark(job.inputs), STAMP, *_home_moved(job)]
     program, files = export_program(
-        proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), _comments(job)
+        proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), comments
     )
     trace = motion_trace(proven.motion, job.name, job.cell.robot.joint_names)
-    return program, {**files, f"{job.name}_motion.json": trace}
+    return program, {name: stamped(text) for name, text in files.items()} | {
+        f"{job.name}_motion.json": trace
+    }
 
 
-def _comments(job: Job) -> list[str]:
-    """Return the lines at the top of a program, with home where it is not that of the job."""
+def _home_moved(job: Job) -> list[str]:
+    """Return the lines that tell a person where home is not that of the job."""
     asked, given = np.rad2deg(job.around.home), np.rad2deg(job.process.home)
     return [
-        "OPL",
-        *(
-            f"HOME {name} {given[k]:.2f}, NOT {asked[k]:.2f}"
-            for k, name in enumerate(job.cell.robot.joint_names)
-            if given[k] != asked[k]
-        ),
+        f"HOME {name} {given[k]:.2f}, NOT {asked[k]:.2f}"
+        for k, name in enumerate(job.cell.robot.joint_names)
+        if given[k] != asked[k]
     ]
 
 

@@ -6,7 +6,10 @@ from pathlib import Path
 
 from opl.cell.robot import Robot
 from opl.errors import InputError
+from opl.files.reading import MB, read_bytes
 from opl.program.posts import reader_for
+
+MOST_PROGRAM = 20 * MB
 
 
 def read_program(file: Path) -> bytes:
@@ -15,10 +18,7 @@ def read_program(file: Path) -> bytes:
     Raises:
         InputError: If it cannot be read.
     """
-    try:
-        return file.read_bytes()
-    except OSError as error:
-        raise InputError(str(file), f"cannot be read: {error.strerror}") from error
+    return read_bytes(file, MOST_PROGRAM)
 
 
 def describe_program(file: Path, robot: Robot) -> list[str]:

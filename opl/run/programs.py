@@ -7,14 +7,17 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from opl.errors import InputError
+from opl.files.digests import keeps_stamp
+from opl.files.reading import read_bytes
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.job.refusals import keys_named
 from opl.program.posts import find_post
-from opl.proof.digest import changed_since, digests_in
+from opl.proof.digest import changed_since, digests_in, other_inputs, read_result
 from opl.proof.prove import Proof, prove
-from opl.run.delivery import RESULT
+from opl.run.delivery import MOST_RESULT, RESULT
 from opl.run.listings import read_program
 from opl.run.reporting import replay_report
 from opl.run.result import VerificationReport
@@ -30,11 +33,17 @@ class ProgramProof:
         proof: What the files say, and what the replay of it found.
         as_written: Whether the files are to the byte what a run proved; None if no ``result.json``
             beside them tells.
+        changed: Whether they are other bytes than opl once wrote, as the digests in them tell; None
+            if they hold none.
+        other_inputs: Names of the inputs that are not those the program was made of; None if
+            nothing tells.
         report: The same in plain numbers, in mm; None stands for what could not be found out.
     """
 
     proof: Proof
     as_written: bool | None
+    changed: bool | None
+    other_inputs: tuple[str, ...] | None
     report: dict[str, Any]
 
     @property
@@ -74,14 +83,23 @@ def prove_program(job: Job, files: Sequence[Path], watch: Watch | None = None) -
     points = cut_surface(job, watch).points
     with watch.stage(Stage.VERIFICATION) as progress, keys_named(job.source):
         found = prove(job, points, {str(path): data for path, data in content.items()}, progress)
-    changed, as_written = _compared_with_results(content)
-    proof = replace(found, findings=(*found.findings, *changed))
-    return ProgramProof(proof, as_written, _report(job, points, proof, as_written))
+    results = {path: _result_beside(path, job) for path in content}
+    findings, as_written = _compared_with_results(content, results)
+    proof = replace(found, findings=(*found.findings, *findings))
+    kept = [keeps_stamp(content[path]) for path in files]
+    changed = True if False in kept else None if None in kept else False
+    differing = [other_inputs(content[path], job.inputs, results[path]) for path in files]
+    others = (
+        None
+        if None in differing
+        else tuple(sorted({n for names in differing for n in names or ()}))
+    )
+    report = _report(job, points, proof)
+    report |= {"as_written": as_written, "changed": changed, "other_inputs": others}
+    return ProgramProof(proof, as_written, changed, others, report)
 
 
-def _report(
-    job: Job, points: CutterPoints, proof: Proof, as_written: bool | None
-) -> dict[str, Any]:
+def _report(job: Job, points: CutterPoints, proof: Proof) -> dict[str, Any]:
     found, timed = proof.verification, proof.timed
     replayed = dict.fromkeys(field.name for field in fields(VerificationReport))
     if found is not None:
@@ -103,20 +121,27 @@ def _report(
         "findings": [
             {"kind": one.kind, "where": one.where, "message": one.message} for one in proof.findings
         ],
-        "as_written": as_written,
     }
 
 
-def _compared_with_results(files: Mapping[Path, bytes]) -> tuple[list[Finding], bool | None]:
+def _result_beside(path: Path, job: Job) -> Mapping[str, object] | None:
+    """Return the result.json beside a file, None if there is none of this job with a program."""
+    try:
+        result = read_result(read_bytes(path.parent / RESULT, MOST_RESULT))
+    except InputError:
+        return None
+    return result if result.get("job") == job.name and digests_in(result) else None
+
+
+def _compared_with_results(
+    files: Mapping[Path, bytes], results: Mapping[Path, Mapping[str, object] | None]
+) -> tuple[list[Finding], bool | None]:
     """Return what differs from what a run wrote, and whether all is as written; None if unknown."""
     findings, known = [], True
     for path, content in files.items():
-        try:
-            digests = digests_in((path.parent / RESULT).read_bytes())
-        except OSError:
-            digests = {}
-        if path.name in digests:
-            findings += changed_since(str(path), content, digests[path.name])
-        else:
+        result = results[path]
+        if result is None:
             known = False
+        else:
+            findings += changed_since(str(path), content, digests_in(result).values())
     return findings, False if findings else True if known else None

@@ -8,14 +8,15 @@ import numpy as np
 
 from opl.cell.inverse_kinematics import ik_branch_name
 from opl.cell.robot import Robot
+from opl.files.digests import digest
 from opl.motion.feed import SlowStretch
 from opl.program.moves import CycleTime
-from opl.proof.digest import digest
 from opl.proof.read_back import FileProof
 from opl.run import result
 from opl.run.result import Report
 from opl.run.values import Planned, Prepared, Proven, Refused, Written
 from opl.verification.replay import Verification
+from opl.version import VERSION
 
 MM = 1e3
 
@@ -53,6 +54,8 @@ def make_report(run: Written | Refused) -> Report:
         verification=None if found is None else replay_report(found, proof),
         program=None if written is None else _program(written),
         seconds={**seconds, "total": round(sum(run.seconds.values()), 4)},
+        opl=VERSION,
+        inputs=surfaced.job.inputs,
     )
 
 

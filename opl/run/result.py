@@ -186,6 +186,9 @@ class Report:
         compared: The figures of the paths that exist: ``fixed``, ``paper_start``, ``recursive``,
             ``optimal``.
         seconds: Time of each stage, and their ``total``.
+        opl: Version of opl.
+        inputs: SHA-256 of everything the job is made of, by name: job and cell file by what they
+            say, all other files by their bytes.
     """
 
     status: str
@@ -204,6 +207,8 @@ class Report:
     verification: VerificationReport | None
     program: ProgramReport | None
     seconds: Mapping[str, float]
+    opl: str
+    inputs: Mapping[str, str]
 
 
 def to_json(value: Any) -> str:

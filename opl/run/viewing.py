@@ -6,9 +6,12 @@ from pathlib import Path
 
 from opl.errors import InputError
 from opl.files import documents
+from opl.files.digests import digest
+from opl.files.reading import read_bytes
 from opl.job import keys
-from opl.proof.digest import digest, digests_in
-from opl.run.delivery import PAGE, RESULT
+from opl.proof.digest import digests_in, read_result
+from opl.run.delivery import MOST_RESULT, PAGE, RESULT
+from opl.run.listings import read_program
 
 JOBS = (".yaml", ".yml")
 
@@ -34,8 +37,8 @@ def find_page(target: Path, out: Path) -> Path:
         return _page_in(out / name, f"opl run {target}")
     page = _page_in(target.parent, "opl run on its job")
     result = target.parent / RESULT
-    known = digests_in(result.read_bytes()) if result.is_file() else {}
-    if known.get(target.name) != digest(target.read_bytes()):
+    known = digests_in(read_result(read_bytes(result, MOST_RESULT))) if result.is_file() else {}
+    if digest(read_program(target)) not in known.values():
         raise InputError(
             str(target), f"is not the program that {page} shows, says the {RESULT} beside it"
         )

@@ -15,16 +15,35 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.search.relaxation import Relaxation, least_box_of
-from opl.search.spans import Body, Span, fitting, grown
-from opl.search.walls import Image, Piece, Wall, relaxed
+from opl.search.bounding import distance, least_box, tighten
+from opl.search.cells import END, FIRST, WALL, Cells
+from opl.search.walls import Image, Piece, Wall
 
-SETTLED = (
-    0.1  # of the gap wanted: what the bend of the spans may lose where no wall is split further
-)
+SETTLED = 0.1  # of the gap wanted: what the bend of the spans may lose where none is split further
 PROBE_EVERY = 16  # subproblems: how often a box is shown that is not settled
-STILL = 1e-6  # [rad] a core that grows by less in a round has stopped growing
-MOST_ROUNDS = 12  # of cutting spans off; more would cut little
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """The least box of the walls that have one span left.
+
+    Attributes:
+        alone: Those walls, shape (k,).
+        low: Lower faces of the box found, shape (6,).
+        high: Upper faces.
+        x: Where on each span, 0 to 1, shape (k,).
+        cost: How much larger it could be if a span had no pads, or what the box misses of it
+            without them, in [rad], shape (k,).
+        prices: How hard each span presses on each upper face of the box, and on each lower one,
+            from 0 to 1, shape (k, 6, 2).
+    """
+
+    alone: np.ndarray
+    low: Array
+    high: Array
+    x: Array
+    cost: Array
+    prices: Array
 
 
 @dataclass(order=True)
@@ -34,14 +53,16 @@ class Subproblem:
     Attributes:
         bound: None of them is smaller, in [rad].
         number: To order those with equal bounds.
-        spans: The spans of each wall.
+        spans: The spans, sorted by their walls, columns as in `cells`, shape (n, 5).
+        n_walls: Of how many walls.
         low: The lower faces are not above these, in [rad], shape (6,).
         high: The upper faces are not below these.
     """
 
     bound: float
     number: int
-    spans: list[list[Span]] = field(compare=False)
+    spans: np.ndarray = field(compare=False)
+    n_walls: int = field(compare=False)
     low: Array = field(compare=False)
     high: Array = field(compare=False)
     found: Relaxation | None = field(default=None, compare=False)
@@ -83,21 +104,20 @@ class BoxProof:
         threshold: float,
         gap: float,
     ) -> None:
-        self._images = images
-        self._cut = cut
+        self._cells = Cells(images, cut)
         self._gap = gap
-        self._bodies: list[Body] = []
         self.threshold = threshold
         self.stuck = np.inf  # least bound of what could not be split
         self.subproblems = 0
         self._count = 0
         self._open: list[Subproblem] = []
-        self._push(0.0, [], np.full(6, np.inf), np.full(6, -np.inf))
+        nothing = np.empty((0, 5), dtype=np.int64)
+        self._push(0.0, nothing, 0, np.full(6, np.inf), np.full(6, -np.inf))
 
     @property
     def walls(self) -> list[Wall]:
         """All walls so far."""
-        return [body.wall for body in self._bodies]
+        return self._cells.walls
 
     @property
     def closing(self) -> float:
@@ -117,7 +137,7 @@ class BoxProof:
 
     def add(self, wall: Wall) -> None:
         """Take in a wall."""
-        self._bodies.append(Body(wall, self._images))
+        self._cells.add(wall)
 
     def take_next(self) -> Candidate | None:
         """Work on the subproblem with the least bound.
@@ -129,9 +149,8 @@ class BoxProof:
         """
         node = heapq.heappop(self._open)
         self.subproblems += 1
-        known = len(node.spans)
-        if node.found is None or known < len(self._bodies):
-            if not self._bound(node, known):
+        if node.found is None or node.n_walls < len(self.walls):
+            if not self._bound(node):
                 return None
             if self._open and node.bound > self._open[0].bound + 1e-9:
                 heapq.heappush(self._open, node)  # others are more promising now
@@ -141,8 +160,9 @@ class BoxProof:
         if not settled and self.subproblems % PROBE_EVERY:
             self.split()
             return None
-        found, alone = node.found, self._alone(node)
+        found = node.found
         assert found is not None
+        alone = found.alone.tolist()
         held_by = {k: found.prices[i] for i, k in enumerate(alone) if found.prices[i].any()}
         return Candidate(node.bound, found.low, found.high, held_by, settled)
 
@@ -150,27 +170,6 @@ class BoxProof:
         """Split the subproblem of the last candidate."""
         if self._branch is not None:
             self._split(self._kept, *self._branch)
-
-    @staticmethod
-    def _alone(node: Subproblem) -> list[int]:
-        """Return the walls of which one span is left."""
-        return [k for k, spans in enumerate(node.spans) if len(spans) == 1]
-
-    def _bound(self, node: Subproblem, known: int) -> bool:
-        """Bound a subproblem; return whether it is still of interest."""
-        node.spans = list(node.spans)
-        for index in range(known, len(self._bodies)):
-            node.spans.append(self._spans_of_new(node, index))
-        sizes = self._tighten(node)
-        if sizes is None:
-            return False
-        segments = []
-        for k in self._alone(node):
-            (span,) = node.spans[k]
-            segments.append(relaxed(self._bodies[k].moved(span), span.first, span.end))
-        node.found = least_box_of(segments, node.low, node.high)
-        node.bound = max(node.bound, node.found.bound, *sizes)
-        return node.bound < self.closing
 
     def put_back(self) -> None:
         """Leave the subproblem of the last candidate open."""
@@ -180,115 +179,70 @@ class BoxProof:
         """Let the subproblem of the last candidate stay as it is; its bound counts."""
         self.stuck = min(self.stuck, self._kept.bound)
 
-    def _push(self, bound: float, spans: list[list[Span]], low: Array, high: Array) -> None:
-        heapq.heappush(self._open, Subproblem(bound, self._count, spans, low, high))
+    def _push(self, bound: float, spans: np.ndarray, n_walls: int, low: Array, high: Array) -> None:
+        heapq.heappush(self._open, Subproblem(bound, self._count, spans, n_walls, low, high))
         self._count += 1
 
-    def _spans_of_new(self, node: Subproblem, index: int) -> list[Span]:
-        body = self._bodies[index]
-        spans, low, high = body.all_spans
-        keep = grown(low, high, node.low, node.high) < self.closing
-        if index == 0:
-            # the whole motion has images: of these the first is looked at
-            keep &= np.array([span.image == 0 for span in spans], dtype=bool)
-        elif body.wall.pass_index == self._bodies[0].wall.pass_index:
-            first = self._bodies[0]
-            keys = {first.key(span) for span in node.spans[0]}
-            keep &= np.array([body.key(span) in keys for span in spans], dtype=bool)
-        return [span for span, kept in zip(spans, keep, strict=True) if kept]
-
-    def _tighten(self, node: Subproblem) -> list[float] | None:
-        """Cut off what no box below the threshold can hold; the least growth for each wall."""
-        low, high, closing = node.low.copy(), node.high.copy(), self.closing
-        for _ in range(MOST_ROUNDS):
-            before = low.copy(), high.copy()
-            sizes = []
-            for index, body in enumerate(self._bodies):
-                kept, least, most = [], np.full(6, np.inf), np.full(6, -np.inf)
-                smallest = np.inf
-                for span in node.spans[index]:
-                    first, end, grown = fitting(
-                        *body.whole_box(span), span.first, span.end, low, high, closing, least, most
-                    )
-                    if first == end:
-                        continue
-                    kept.append(Span(span.piece, span.image, first, end))
-                    smallest = min(smallest, grown)
-                if not kept:
-                    return None
-                node.spans[index] = kept
-                high, low = np.maximum(high, least), np.minimum(low, most)
-                sizes.append(smallest)
-            if not self._link(node):
-                return None
-            if max(np.abs(before[0] - low).max(), np.abs(before[1] - high).max()) < STILL:
-                break
-        node.low, node.high = low, high
-        return sizes
-
-    def _link(self, node: Subproblem) -> bool:
-        """Leave each pass the postures that all of its walls have; whether there are any."""
-        keys: dict[int, set[tuple[int, tuple[int, ...]]]] = {}
-        for body, spans in zip(self._bodies, node.spans, strict=True):
-            own = {body.key(span) for span in spans}
-            index = body.wall.pass_index
-            keys[index] = keys[index] & own if index in keys else own
-        for k, body in enumerate(self._bodies):
-            left = keys[body.wall.pass_index]
-            node.spans[k] = [span for span in node.spans[k] if body.key(span) in left]
-            if not node.spans[k]:
-                return False
-        return True
+    def _bound(self, node: Subproblem) -> bool:
+        """Bound a subproblem; return whether it is still of interest."""
+        cells, closing, n_walls = self._cells, self.closing, len(self.walls)
+        new = [
+            cells.spans_of(wall, node.low, node.high, closing)
+            for wall in range(node.n_walls, n_walls)
+        ]
+        spans = np.concatenate([node.spans, *new])
+        low, high, sizes = node.low.copy(), node.high.copy(), np.empty(n_walls)
+        arguments = spans, cells.pass_index, cells.n_keys, low, high, closing, sizes
+        left = tighten(cells.table, *arguments)
+        if left == 0:
+            return False
+        node.spans, node.n_walls, node.low, node.high = spans[:left], n_walls, low, high
+        alone = np.flatnonzero(np.bincount(node.spans[:, WALL], minlength=n_walls) == 1)
+        only = node.spans[np.isin(node.spans[:, WALL], alone)]
+        box, k = np.empty((2, 6)), len(alone)
+        x, lost, missed, prices = np.empty(k), np.empty(k), np.empty(k), np.empty((k, 6, 2))
+        filled = box[0], box[1], x, lost, missed, prices
+        bound = least_box(cells.table, only, low, high, *filled)
+        node.found = Relaxation(alone, box[0], box[1], x, np.maximum(lost, missed), prices)
+        node.bound = max(node.bound, bound, float(sizes.max()))
+        return node.bound < closing
 
     def _where_to_split(self, node: Subproblem) -> tuple[int, float] | None:
         """Return the wall to be split, and where along its span; None if that gains nothing."""
-        found, alone = node.found, self._alone(node)
+        found, walls = node.found, node.spans[:, WALL]
         assert found is not None
-        low, high = found.low, found.high
-        settled = SETTLED * self._gap * self.threshold
-        if len(node.spans[0]) > 1:
+        if np.count_nonzero(walls == 0) > 1:
             return 0, 0.5
-        score, at = np.zeros(len(node.spans)), np.full(len(node.spans), 0.5)
-        for index, (body, spans) in enumerate(zip(self._bodies, node.spans, strict=True)):
-            score[index] = min(body.distance(span, low, high) for span in spans)
+        score, at = np.full(node.n_walls, np.inf), np.full(node.n_walls, 0.5)
+        for wall, (first, end) in zip(walls.tolist(), node.spans[:, FIRST:].tolist(), strict=True):
+            away = distance(self._cells.table, first, end, found.low, found.high)
+            score[wall] = min(score[wall], away)
         # where the chords lie, and what their pads cost
-        score[alone] = np.maximum(score[alone], np.maximum(found.lost, found.missed))
-        at[alone] = found.x
+        score[found.alone] = np.maximum(score[found.alone], found.cost)
+        at[found.alone] = found.x
         wall = int(np.argmax(score))
-        if score[wall] > settled:
+        if score[wall] > SETTLED * self._gap * self.threshold:
             return wall, float(at[wall])
         return None
 
-    def _split(self, node: Subproblem, index: int, x: float) -> None:
-        spans = node.spans[index]
-        if len(spans) > 1:
-            halves = [[span] for span in spans]
-        else:
-            (span,) = spans
-            body = self._bodies[index]
-            if span.end == span.first + 1:
-                finer = body.finer(span, self._cut)
-                if not finer:
-                    return
-                (span,) = finer[:1]
-                if len(finer) > 1:
-                    self._push(
-                        node.bound,
-                        [*node.spans[:index], finer, *node.spans[index + 1 :]],
-                        node.low,
-                        node.high,
-                    )
-                    return
-            at = body.pieces[span.piece].at[span.first : span.end + 1]
-            n = len(at) - 1
-            least = max(n // 8, 1)
-            place = int(np.searchsorted(at, at[0] + x * (at[-1] - at[0])))
-            middle = span.first + min(max(place, least), n - least)
-            halves = [
-                [Span(span.piece, span.image, span.first, middle)],
-                [Span(span.piece, span.image, middle, span.end)],
-            ]
+    def _split(self, node: Subproblem, wall: int, x: float) -> None:
+        before, end = np.searchsorted(node.spans[:, WALL], [wall, wall + 1])
+        own = node.spans[before:end]
+        halves = [own[k : k + 1] for k in range(len(own))]
+        if len(own) == 1:
+            if own[0, END] == own[0, FIRST] + 1:
+                own = self._cells.finer(own[0])
+            halves = [own]
+            if len(own) == 0:
+                return
+        if len(own) == 1:
+            at = self._cells.table[own[0, FIRST] : own[0, END], 24]
+            stop = self._cells.table[own[0, END] - 1, 25]
+            n, least = len(at), max(len(at) // 8, 1)
+            place = int(np.searchsorted(at, at[0] + x * (stop - at[0])))
+            middle = own[0, FIRST] + min(max(place, least), n - least)
+            halves = [own.copy(), own.copy()]
+            halves[0][0, END] = halves[1][0, FIRST] = middle
         for half in halves:
-            left = list(node.spans)
-            left[index] = half
-            self._push(node.bound, left, node.low, node.high)
+            spans = np.concatenate([node.spans[:before], half, node.spans[end:]])
+            self._push(node.bound, spans, node.n_walls, node.low, node.high)

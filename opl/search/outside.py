@@ -8,6 +8,46 @@ from numba import njit
 BISECTIONS = 24  # of a chord; its nearest point is then known to a ten millionth of its length
 
 
+@njit("UniTuple(float64,2)(float64[:],float64[:],float64[::1],float64[::1],float64)", cache=True)
+def nearest_on_chord(a, b, low, high, best):  # type: ignore[no-untyped-def]
+    """Return by how much a box misses a chord, and where on it, 0 to 1.
+
+    If that is not less than ``best`` in [rad], return that and -1.
+    """
+    place, least = -1.0, 0.0
+    for joint in range(len(a)):
+        start, end = min(a[joint], b[joint]), max(a[joint], b[joint])
+        least += max(start - high[joint], 0.0) + max(low[joint] - end, 0.0)
+    if not least < best - 1e-12:
+        return best, place
+    # the distance is convex along the chord: follow its slope
+    left, right = 0.0, 1.0
+    for step in range(BISECTIONS + 2):
+        x = float(step) if step < 2 else (left + right) / 2.0
+        away, slope = 0.0, 0.0
+        for joint in range(len(a)):
+            turn = b[joint] - a[joint]
+            value = a[joint] + x * turn
+            if value > high[joint]:
+                away += value - high[joint]
+                slope += turn
+            elif value < low[joint]:
+                away += low[joint] - value
+                slope -= turn
+        if away < best:
+            best, place = away, x
+        if step < 2:
+            if away == 0.0:
+                break
+        elif slope > 0.0:
+            right = x
+        elif slope < 0.0:
+            left = x
+        else:
+            break
+    return best, place
+
+
 @njit(
     "void(float64[:,:,::1],boolean[:,::1],float64[::1],float64[::1],float64,float64[::1],"
     "float64[::1])",
@@ -41,35 +81,13 @@ def outside(q, free, low, high, longest, missing, at):  # type: ignore[no-untype
         for row in range(n_rows - 1):
             if not (free[column, row] and free[column, row + 1]):
                 continue
-            least = 0.0
+            start, end = q[column, :, row], q[column, :, row + 1]
             jump = False
             for joint in range(n_joints):
-                a, b = q[column, joint, row], q[column, joint, row + 1]
-                least += max(min(a, b) - high[joint], 0.0) + max(low[joint] - max(a, b), 0.0)
-                jump = jump or abs(b - a) > longest
-            if jump or least >= best - 1e-12:
-                continue
-            # the distance is convex along the chord: follow its slope
-            left, right = 0.0, 1.0
-            for _ in range(BISECTIONS):
-                x = (left + right) / 2.0
-                away, slope = 0.0, 0.0
-                for joint in range(n_joints):
-                    a, b = q[column, joint, row], q[column, joint, row + 1]
-                    value = a + x * (b - a)
-                    if value > high[joint]:
-                        away += value - high[joint]
-                        slope += b - a
-                    elif value < low[joint]:
-                        away += low[joint] - value
-                        slope -= b - a
-                if away < best:
-                    best, place = away, row + x
-                if slope > 0.0:
-                    right = x
-                elif slope < 0.0:
-                    left = x
-                else:
-                    break
+                jump = jump or abs(end[joint] - start[joint]) > longest
+            if not jump:
+                best, x = nearest_on_chord(start, end, low, high, best)
+                if x >= 0.0:
+                    place = row + x
         missing[column] = best
         at[column] = place

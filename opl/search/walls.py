@@ -10,7 +10,6 @@ wrist flipped.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -51,11 +50,6 @@ class Piece:
     corners: Array
     pad_low: Array
     pad_high: Array
-
-    @cached_property
-    def open_cells(self) -> np.ndarray:
-        """In which cells the pads of some joint are not known, shape (n,)."""
-        return np.asarray((self.pad_high >= UNKNOWN).any(axis=1))
 
     @property
     def low(self) -> Array:
@@ -132,32 +126,3 @@ class Wall:
     pass_index: int
     place: float
     pieces: tuple[Piece, ...]
-
-
-@dataclass(frozen=True)
-class Segment:
-    """A run of cells relaxed: q = start + along * x + [pad_low, pad_high] for some 0 <= x <= 1.
-
-    Attributes:
-        start: In [rad], shape (6,).
-        along: In [rad], shape (6,).
-        pad_low: In [rad], shape (6,).
-        pad_high: In [rad], shape (6,).
-    """
-
-    start: Array
-    along: Array
-    pad_low: Array
-    pad_high: Array
-
-
-def relaxed(piece: Piece, first: int, end: int) -> Segment:
-    """Return a segment that holds the curve over the cells from ``first`` to before ``end``."""
-    corners, at = piece.corners[first : end + 1], piece.at[first : end + 1]
-    x = (at - at[0]) / (at[-1] - at[0])
-    along = corners[-1] - corners[0]
-    away = corners - corners[0] - x[:, None] * along
-    # within a cell both chords are straight: they are farthest apart at its ends
-    low = np.minimum(away[:-1], away[1:]) + piece.pad_low[first:end]
-    high = np.maximum(away[:-1], away[1:]) + piece.pad_high[first:end]
-    return Segment(corners[0], along, low.min(axis=0), high.max(axis=0))

@@ -254,12 +254,26 @@ def test_a_bad_robot_file_is_refused_with_file_and_key(copied_robot, old, new, m
         load_robot(str(copied_robot))
 
 
+RING = "".join(
+    f'<link name="{a}"/><joint name="{a}{b}" type="fixed"><parent link="{a}"/><child link="{b}"/>'
+    "</joint>"
+    for a, b in ("ab", "ba")
+)
+RING += "</robot>"
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
         ('<joint name="U"', '<joint name="J3"', r"joints S L U R B T in this order, has S L J3"),
-        ('<link name="tool0"', '<link name="tool1"', r"is not a URDF"),
-        ("</robot>", "", r"is not a URDF"),
+        (
+            '<link name="tool0"',
+            '<link name="tool1"',
+            r"must have one root link, has",
+        ),
+        ("</robot>", "", r"is not XML: no element found: line 259"),
+        ("</robot>", RING, r"link [ab] hangs on itself"),
+        ("</robot>", "<a>" * 70, r"is not XML: elements are nested more than 60 deep"),
     ],
 )
 def test_a_bad_urdf_is_refused_with_its_file(copied_robot, old, new, message):

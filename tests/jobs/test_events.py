@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import pytest
 
+from opl.files.digests import keeps_stamp
 from opl.program.actions import Actions
 from opl.program.events import meanings
 from opl.program.inform import TEMPLATE
+from opl.proof.digest import other_inputs
 from opl.proof.events import event_findings, expected_events, name_findings
 from opl.proof.prove import prove
 from tests.support.small_programs import ARMS, small_program
@@ -129,6 +131,16 @@ def test_a_program_of_a_job_that_asks_for_nothing_may_do_nothing(program):
     job = replace(program.job, program=quiet)
     found = [*event_findings(job, program.motion, reading.playback)]
     assert len(found) == len(reading.playback.events) > 10
+
+
+def test_programs_of_every_language_hold_digests_of_inputs_and_of_themselves(program):
+    content, inputs = program.text.encode("ascii"), program.job.inputs
+    assert keeps_stamp(content) is True
+    assert other_inputs(content, inputs, None) == []
+    assert other_inputs(content, {**inputs, "job": "0"}, None) == ["unknown which"]
+    at = len(content) // 2
+    changed = content[:at] + bytes([content[at] ^ 1]) + content[at + 1 :]
+    assert keeps_stamp(changed) is False
 
 
 # Yaskawa jobs: what only they have

@@ -112,7 +112,8 @@ def test_the_stages_one_by_one_make_the_program_of_the_whole_run(job, watched, m
     assert isinstance(run, opl.Written)
     assert run.proven is proven and proven.planned is planned and planned.surfaced is surfaced
     whole = watched[0]
-    assert list(run.files) == list(whole.files) == ["V_SHAPE.JBI", "V_SHAPE.csv"]
+    names = ["V_SHAPE.JBI", "V_SHAPE.csv", "V_SHAPE_motion.json"]
+    assert list(run.files) == list(whole.files) == names
     assert run.files["V_SHAPE.csv"] == whole.files["V_SHAPE.csv"]
 
 
@@ -126,7 +127,7 @@ def test_the_report_is_the_result_in_plain_numbers(watched):
     report = opl.make_report(run)
     path = run.proven.planned.plan.path
     assert report.path.joint_range_sum_rad == pytest.approx(path.joint_range_sum, abs=1e-6)
-    assert report.program.files == ["V_SHAPE.JBI", "V_SHAPE.csv"]
+    assert report.program.files == ["V_SHAPE.JBI", "V_SHAPE.csv", "V_SHAPE_motion.json"]
     assert report.seconds["total"] == pytest.approx(sum(run.seconds.values()), abs=1e-4)
     error = [abs(one.written_s / one.wanted_s - 1.0) for one in report.program.passes]
     told = [abs(one.error_percent) for one in report.program.passes]

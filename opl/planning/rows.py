@@ -1,0 +1,88 @@
+"""Places of a pass at one contact position: where a motion in a box can pass it, and where not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.geometry.frames import Array
+from opl.planning.families import grown
+from opl.search.box import JointBox
+from opl.search.in_box import clipped, missing_chords
+
+SAME = 1e-5  # cutter points that two places are apart at the least
+
+
+@dataclass(frozen=True)
+class Row:
+    """Places of a pass at one contact position.
+
+    Attributes:
+        places: Increasing, shape (m,).
+        contact_position: Theirs.
+        must: Whether motions in the box have to pass it there.
+        q: Placed postures in [rad], NaN where there are none, shape (m, 6).
+    """
+
+    places: Array
+    contact_position: float
+    must: bool
+    q: Array
+
+    def missing(self, box: JointBox) -> float:
+        """Return by how much a box must grow to hold one of them."""
+        return float(missing_chords(self.q[None], ~np.isnan(self.q[None, :, 0]), box)[0])
+
+    def grown(self, box: JointBox) -> JointBox:
+        """Return the box grown until it holds one of them, if there is any."""
+        return grown(self.q[None], ~np.isnan(self.q[None, :, 0]), box) or box
+
+    def inside(self, box: JointBox) -> Array:
+        """Return where the box holds them: first and last place of every stretch, shape (k, 2)."""
+        enter, leave = (share[0] for share in clipped(self.q[None], box))
+        hit = np.flatnonzero(leave >= enter)
+        step = np.diff(self.places)[hit]
+        first = self.places[hit] + enter[hit] * step
+        last = self.places[hit] + leave[hit] * step
+        starts = np.append(True, first[1:] > last[:-1] + 1e-9)[: len(hit)]
+        return np.stack([first[starts], np.append(last[:-1][starts[1:]], last[-1:])], axis=1)
+
+
+def levels(places: Array, rows: Sequence[Row], box: JointBox, otherwise: Array) -> Array:
+    """Return the contact positions of the rows that a box holds at each place, shape (n, k).
+
+    Where there are fewer than at another place, ``otherwise``, shape (n, 1), is repeated.
+    """
+    found: list[list[float]] = [[] for _ in places]
+    for row in rows:
+        for first, last in row.inside(box):
+            low, high = np.searchsorted(places, [first - SAME, last + SAME])
+            for k in range(low, high):
+                found[k].append(row.contact_position)
+    most = max(len(levels) for levels in found)
+    levels = np.repeat(otherwise, most, axis=1)
+    for k, own in enumerate(found):
+        levels[k, : len(own)] = own
+    return levels
+
+
+def shut_edges(places: Array, t: Array, rows: Sequence[Row], box: JointBox) -> list[int]:
+    """Return the keys of the edges that pass a row where it lies outside of a box.
+
+    The nodes are at some places and contact positions, shape (n,) and (n, m).
+    """
+    n_rows, found = t.shape[1], []
+    for row in rows:
+        first, last = row.inside(box).T
+        on = np.flatnonzero((places[:-1] >= row.places[0]) & (places[1:] <= row.places[-1]))
+        # a stretch of the row that begins before the end of the edge ends after its start
+        begun = np.searchsorted(first, places[on + 1] + SAME)
+        over = np.searchsorted(last, places[on] - SAME)
+        edge = on[begun <= over]
+        below = t < row.contact_position
+        passed = below[edge][:, :, None] != below[edge + 1][:, None, :]
+        k, here, there = np.nonzero(passed)
+        found += ((edge[k] * n_rows + here) * n_rows + there).tolist()
+    return found
