@@ -37,6 +37,7 @@ Runs
     `write_program`     `Proven` -> `Written`: the program as texts, read back and proven
     `Watch`             reports each `Stage` of a run while it goes on, and cancels it
     `run_batch`         many jobs in processes, each a `BatchRow`; `find_jobs` finds them
+    `batch_page`        `BatchRow`s -> a page of all, with links to theirs
 
 Results
     `make_report`       `Run` -> `Report`: the content of ``result.json``
@@ -53,7 +54,7 @@ Programs of a controller
     `compare_programs`  how two program files differ in what they do
 
 Cells and robots
-    `load_cell`         a cell file -> `Cell`
+    `load_cell`         a cell file -> `Cell`; `cell_page` shows it
     `load_robot`        a name or a folder -> `Robot`; `known_robots` lists the names
     `import_urdf`       a URDF -> the folder of a robot of your own
     `import_pulse_ratios`  parameters of a controller -> file of pulse ratios
@@ -125,6 +126,8 @@ if TYPE_CHECKING:
     from opl.run.descriptions import describe_job as describe_job
     from opl.run.listings import compare_programs as compare_programs
     from opl.run.listings import describe_program as describe_program
+    from opl.run.other_pages import batch_page as batch_page
+    from opl.run.other_pages import cell_page as cell_page
     from opl.run.page import run_page as run_page
     from opl.run.points import points_files as points_files
     from opl.run.points import report_points as report_points
@@ -174,6 +177,7 @@ _HOMES = {
     "opl.run.batch": "BatchRow find_jobs run_batch",
     "opl.run.delivery": "claim_folder deliver",
     "opl.run.descriptions": "cell_figures describe_cell describe_job",
+    "opl.run.other_pages": "batch_page cell_page",
     "opl.run.page": "run_page",
     "opl.run.points": "points_files report_points",
     "opl.run.listings": "compare_programs describe_program",

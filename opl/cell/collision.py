@@ -96,6 +96,25 @@ class CollisionScene:
         scene._prepare(self._margins + reserve, both_move)
         return scene
 
+    def less(self, amount: float) -> CollisionScene:
+        """Return the scene with less clearance [m]; below none, bodies must sink into each other.
+
+        That is not looked for where one of them is a mesh.
+        """
+        scene = copy(self)
+        margins = self._margins - amount
+        bodies = self._geometry.geometryObjects
+        meshes = [isinstance(body.geometry, coal.BVHModelBase) for body in bodies]
+        unchecked = [
+            index
+            for index, pair in enumerate(self._geometry.collisionPairs)
+            if margins[index] < 0.0 and (meshes[pair.first] or meshes[pair.second])
+        ]
+        scene._prepare(
+            np.where(np.isin(np.arange(len(margins)), unchecked), 0.0, margins), unchecked
+        )
+        return scene
+
     def levers(self) -> Array:
         """Return how far from each joint's axis anything it moves can ever be, in [m], shape (6,).
 
@@ -141,6 +160,15 @@ class CollisionScene:
     def kept_apart(self) -> np.ndarray:
         """Indices of the pairs that have to keep a distance, not only not to touch."""
         return np.flatnonzero(self._needed > 0.0)
+
+    def anew(self) -> CollisionScene:
+        """Return the scene without what its measures left in it, which the next would begin from.
+
+        Distances then are the same to the last digit, whatever was measured before.
+        """
+        scene = copy(self)
+        scene._prepare(self._margins, range(0))
+        return scene
 
     def pair(self, index: int) -> BodyPair:
         """Return the names of a pair."""

@@ -41,6 +41,7 @@ def nearest_pairs(scene: CollisionScene, q: Array) -> Nearest:
         q: Configurations in [rad], the fewer pairs are measured the nearer they follow each other,
             shape (n, 6).
     """
+    scene = scene.anew()
     kept = scene.kept_apart
     levers = scene.levers()
     least = np.full(len(kept), -np.inf)  # what each is at least apart, as far as known

@@ -138,6 +138,8 @@ def batch(
             click.echo(f"{row.status}: {row.job}", err=True)
 
     rows = opl.run_batch(jobs, out, count, done)
+    out.mkdir(parents=True, exist_ok=True)
+    opl.write_file(out / "report.html", opl.batch_page(rows, out))
     if as_json:
         click.echo(opl.to_json(rows))
     else:

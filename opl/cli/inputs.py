@@ -15,7 +15,8 @@ FILE = click.Path(path_type=Path, readable=False)  # whoever reads it refuses wh
 @click.command()
 @click.argument("file", type=FILE, metavar="CELL.yaml")
 @click.option("--json", "as_json", is_flag=True, help="Print as JSON.")
-def cell(file: Path, as_json: bool) -> None:
+@click.option("--page", type=FILE, help="Write a page that shows it, to be opened in a browser.")
+def cell(file: Path, as_json: bool, page: Path | None) -> None:
     """Validate a cell file and print what stands in it.
 
     Where each wheel is, as matrix and as the pendant shows it, and for a wheel that was found by
@@ -24,6 +25,8 @@ def cell(file: Path, as_json: bool) -> None:
     Example: opl cell workpieces/cells/belt_cell.yaml
     """
     loaded = opl.load_cell(file)
+    if page is not None:
+        opl.write_file(page, opl.cell_page(loaded))
     if as_json:
         click.echo(opl.to_json(opl.cell_figures(loaded)))
         return
@@ -35,7 +38,7 @@ def cell(file: Path, as_json: bool) -> None:
 @click.option("--out", type=FILE, help="Folder for the files; default ./out/<job name>.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def points(job: Path, out: Path | None, as_json: bool) -> None:
-    """Write the cutter points of a job as CSV and a picture of part, passes and frames.
+    """Write the cutter points of a job as CSV, a picture and a page of part, passes and frames.
 
     Example: opl points workpieces/v_shape/job.yaml --out programs
     """

@@ -78,12 +78,13 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
         f"path: {report.cutter_points} cutter points in {report.passes} passes, "
         f"{path.intermediate_nodes} intermediate nodes, branch {path.branch}"
     )
-    yield from _certified(report, job.search.n_contact_positions)
+    yield from _certified(report)
     # the clearance layer is part of the collision checks
     spent = report.seconds["clearance"] + report.seconds["search"]
     yield f"search with its collision checks: {spent:.2f} s"
     if found is not None:
         yield f"verified in {_REPLAYED.format(**vars(found))}"
+        yield from _extremes(vars(found), job.cell.robot.joint_names)
         if found.file is not None and found.file.proven:
             yield (
                 f"read back from {', '.join(found.file.files)}: {found.file.postures} "
@@ -105,29 +106,37 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
         )
 
 
-# what the searches, and so their bounds, are limited to
-ONE_BRANCH = ", all passes on one IK branch and count of full turns,"
+# what every bound covers, and what it is not about
+COVERED = (
+    "at any contact positions, each pass on one IK branch and count of full turns (approach, links "
+    "and retract not counted)"
+)
+OBJECTIVES = {
+    "travel": ("joint travel", "{:.4f} rad"),
+    "time": ("time on the wheel", "{:.2f} s"),
+    "weighted": ("weighted sum", "{:.4f}"),
+}
 
 
-def _certified(report: opl.Report, n_positions: int) -> Iterator[str]:
-    """Yield what the lower bounds say of the path; ``n_positions`` are those of the job."""
+def _certified(report: opl.Report) -> Iterator[str]:
+    """Yield what the lower bounds say of the path."""
     path = report.path
     if path is None:
         return
-    weighted = path.weighted
-    if weighted is not None:
+    known = path.objective_value
+    if known is not None:
+        name, form = OBJECTIVES[path.objective]
         yield (
-            f"no path through these points at {n_positions} contact positions{ONE_BRANCH} has a "
-            f"weighted sum below {weighted.lower_bound:.4f}: the one found has "
-            f"{weighted.value:.4f}, {100.0 * weighted.gap:.1f} % of which may be too much"
+            f"no motion along these passes has a {name} below {form.format(known.lower_bound)}, "
+            f"{COVERED}: the one found has {form.format(known.value)}, at most "
+            f"{100.0 * known.gap:.1f} % of it too much"
         )
     bound, gap = path.lower_bound_rad, path.gap
     if bound is None or gap is None:
         return
     yield (
-        f"no motion along these passes has a joint range sum below {bound:.4f} rad, at any contact "
-        "positions, each pass on one IK branch and count of full turns (approach, links and "
-        f"retract not counted): the one found is within {100.0 * gap:.3f} % of the least there is"
+        f"no motion along these passes has a joint range sum below {bound:.4f} rad, "
+        f"{COVERED}: the one found is within {100.0 * gap:.3f} % of the least there is"
     )
 
 
@@ -185,12 +194,35 @@ def _parts(report: opl.Report) -> Iterator[str]:
         yield f"  {_PARTS[one.part].format(one.pass_)}: {one.seconds:.2f} s of the cycle"
 
 
-def show_proof(report: Mapping[str, Any], robot: str) -> None:
+def _extremes(found: Mapping[str, Any], joint_names: Sequence[str]) -> Iterator[str]:
+    """Yield where the replay came nearest to what must not be."""
+    amounts = {
+        "smallest clearance": ("min_clearance_at", f"{found['min_clearance_mm']:.2f} mm"),
+        "largest contact error": (
+            "max_contact_error_at",
+            f"{found['max_contact_error_mm']:.3f} mm",
+        ),
+        "deepest in the belt": (
+            "max_belt_penetration_at",
+            f"{found['max_belt_penetration_mm']:.3f} mm of "
+            f"{found['allowed_belt_penetration_mm']:g} mm allowed",
+        ),
+    }
+    for what, (key, amount) in amounts.items():
+        place = found[key]
+        if place is not None:
+            joints = zip(joint_names, place.joints_deg, strict=True)
+            angles = " ".join(f"{name} {angle:.1f}" for name, angle in joints)
+            yield f"  {what}: {amount}, {place.subject}, {place.place}, at {angles} deg"
+
+
+def show_proof(report: Mapping[str, Any], robot: str, joint_names: Sequence[str]) -> None:
     """Print what was proven of a program, or how far the proof came.
 
     Args:
         report: What was found out.
         robot: The robot, for people.
+        joint_names: Of the robot.
     """
     lines = [f"read {path}" for path in report["files"]]
     lines += [f"calls {name}, which was not looked at" for name in report["calls_not_looked_at"]]
@@ -200,6 +232,7 @@ def show_proof(report: Mapping[str, Any], robot: str) -> None:
             f"{report['cutter_points_ground']} of {report['cutter_points']} cutter points "
             f"recognised in order, {report['passes']} passes",
             f"replayed in {_REPLAYED.format(**report)}",
+            *_extremes(report, joint_names),
         ]
     lines += _caution(report["unverified_pulse_ratios"], robot, "the proof rests on them")
     if report["as_written"] is None:

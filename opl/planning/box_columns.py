@@ -85,6 +85,7 @@ class ColumnSampler:
     def __init__(self, problem: GrindingProblem, seams: Seams) -> None:
         self._problem = problem
         self._seams = seams
+        self.collisions = False  # whether postures that collide are left out
 
     def columns(self, box: JointBox, placements: Sequence[Placement], places: Array) -> Columns:
         """Sample the postures of places where they are near to a box.
@@ -115,7 +116,11 @@ class ColumnSampler:
         # where the part begins to cut is known to a hair only
         last = problem.cell.wheel.last_position
         t = np.clip(np.concatenate([t[:, :1] - BORDER, t, t[:, -1:] + BORDER], axis=1), -last, last)
-        return self.at(places, there, placements, t)
+        columns = self.at(places, there, placements, t)
+        if self.collisions:
+            free = columns.free
+            free[free] = ~problem.scene.collision.collides(columns.q[free])
+        return columns
 
     def at(
         self, places: Array, there: CutterPoints, placements: Sequence[Placement], t: Array

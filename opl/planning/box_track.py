@@ -165,10 +165,17 @@ class _Sampled:
 
     def sweep(self) -> None:
         """Close every node that collides."""
+        hits: dict[int, np.ndarray] = {}
+        asked: dict[int, np.ndarray] = {}
         for matrix in self.matrices:
-            columns, rows = np.nonzero(matrix.free)
-            hit = self.problem.scene.collision.collides(matrix.nodes.q[columns, rows])
-            matrix.free[columns[hit], rows[hit]] = False
+            # full turns bring the same bodies to the same places
+            branch = matrix.nodes.ik_branch
+            hit = hits.setdefault(branch, np.zeros_like(matrix.free))
+            known = asked.setdefault(branch, np.zeros_like(matrix.free))
+            now = matrix.free & ~known
+            hit[now] = self.problem.scene.collision.collides(matrix.nodes.q[now])
+            known |= now
+            matrix.free &= ~hit
 
     def smoothest(self) -> Track | None:
         """Return the smoothest track in the matrix that is farthest from the limits."""

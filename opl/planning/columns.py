@@ -24,6 +24,7 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.cut_cells import cells_of, cut_finer
 from opl.planning.images import Images
+from opl.planning.obstructed import Obstructions
 from opl.search.walls import UNKNOWN, Image, Line, Piece, Wall
 
 MOST_PARTS = 32  # of a cell whose pads are large
@@ -71,6 +72,7 @@ class ColumnWalls:
         self._part = part
         self._points = points
         self.images = images
+        self.obstructions: Obstructions | None = None  # left out once they are known to matter
 
     def walls(self, places: Sequence[float]) -> list[Wall]:
         """Return the walls at fractional cutter points."""
@@ -183,7 +185,8 @@ class ColumnWalls:
             allowed |= (moved.low + up <= robot.upper).all(axis=1)
         for low, high in _runs(allowed):
             if allowed[low]:
-                yield piece.part(low, high)
+                part = piece.part(low, high)
+                yield from self.obstructions.clear(part) if self.obstructions else [part]
 
     def _cells(
         self, Ts_workpiece_cutter: Array, grids: list[Array], cuts: list[np.ndarray]

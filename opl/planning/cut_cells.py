@@ -6,6 +6,7 @@ it can move within the cell.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -17,7 +18,7 @@ from opl.geometry.frames import Array
 from opl.geometry.wheel import MM_PER_M
 
 CELL = 1.0  # belt units that a cell covers at first
-MOST_HALVINGS = 8  # of a cell where the part begins to cut into the wheel
+MOST_HALVINGS = 8  # of a cell where something begins
 
 
 def cells_of(
@@ -38,11 +39,34 @@ def cells_of(
             t = np.concatenate([t[:-1], np.linspace(t[-1], end, count + 1)])
     k = len(Ts_workpiece_cutter)
     place = np.repeat(np.arange(k), len(t) - 1)
-    low, high = np.tile(t[:-1], k), np.tile(t[1:], k)
-    cuts, deep = _surely_cuts(cell, part, Ts_workpiece_cutter[place], low, high)
+
+    def surely(place: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
+        return _surely_cuts(cell, part, Ts_workpiece_cutter[place], low, high)
+
+    place, low, high, cuts = halved(place, np.tile(t[:-1], k), np.tile(t[1:], k), surely)
+    ends = np.searchsorted(place, np.arange(k + 1))
+    runs = [slice(a, b) for a, b in pairwise(ends)]
+    return [np.append(low[run], high[run][-1:]) for run in runs], [cuts[run] for run in runs]
+
+
+def halved(
+    run: np.ndarray,
+    low: Array,
+    high: Array,
+    surely: Callable[[np.ndarray, Array, Array], tuple[np.ndarray, np.ndarray]],
+) -> tuple[np.ndarray, Array, Array, np.ndarray]:
+    """Return cells, halved where something begins in them, and which of them it surely fills.
+
+    Args:
+        run: To which run each cell belongs, not decreasing, shape (n,).
+        low: Least of each, one beginning where the one before in its run ends.
+        high: Greatest of each.
+        surely: Which cells of these it surely fills, and where it is at their middle.
+    """
+    cuts, deep = surely(run, low, high)
     for _ in range(MOST_HALVINGS):
         unsure = deep & ~cuts
-        begins = (deep[:-1] != deep[1:]) & (place[:-1] == place[1:])
+        begins = (deep[:-1] != deep[1:]) & (run[:-1] == run[1:])
         unsure[:-1] |= begins & ~deep[:-1]
         unsure[1:] |= begins & ~deep[1:]
         if not unsure.any():
@@ -52,15 +76,12 @@ def cells_of(
         fresh, second = np.repeat(unsure, parts), np.zeros(parts.sum(), dtype=bool)
         second[(np.cumsum(parts) - 1)[unsure]] = True
         first = fresh & ~second
-        place, low, high, middle, cuts, deep = (
-            np.repeat(values, parts) for values in (place, low, high, middle, cuts, deep)
+        run, low, high, middle, cuts, deep = (
+            np.repeat(values, parts) for values in (run, low, high, middle, cuts, deep)
         )
         low[second], high[first] = middle[second], middle[first]
-        found = _surely_cuts(cell, part, Ts_workpiece_cutter[place[fresh]], low[fresh], high[fresh])
-        cuts[fresh], deep[fresh] = found
-    ends = np.searchsorted(place, np.arange(k + 1))
-    runs = [slice(a, b) for a, b in pairwise(ends)]
-    return [np.append(low[run], high[run][-1:]) for run in runs], [cuts[run] for run in runs]
+        cuts[fresh], deep[fresh] = surely(run[fresh], low[fresh], high[fresh])
+    return run, low, high, cuts
 
 
 def _surely_cuts(

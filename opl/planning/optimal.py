@@ -19,6 +19,7 @@ from opl.planning.columns import ColumnWalls, Sweep
 from opl.planning.costs import CostWeights
 from opl.planning.families import Families, Fit, Placement, grown
 from opl.planning.images import Images, seams_of
+from opl.planning.obstructed import Obstructions
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Row
@@ -65,6 +66,7 @@ class OptimalSearch:
     """
 
     def __init__(self, problem: GrindingProblem, settings: OptimalSettings, fallback: Plan) -> None:
+        self._problem = problem
         self._points = problem.points
         self._settings = settings
         seams = seams_of(problem.field.q)
@@ -120,7 +122,8 @@ class OptimalSearch:
         box = JointBox(candidate.low, candidate.high)
         placements, missed = self._hold(candidate)
         if not candidate.settled:
-            self._hope(self._families.grown(box, placements))
+            if not self._sampler.collisions:
+                self._hope(self._families.grown(box, placements))
             if missed:
                 self._add(missed)
                 self.proof.put_back()
@@ -142,6 +145,8 @@ class OptimalSearch:
             return
         if columns is not None and inner is not None and self._try(columns, rows, inner):
             self.proof.put_back()
+        elif candidate.bound < self.proof.closing and not self._sampler.collisions:
+            self._mind_collisions()
         elif candidate.bound < self.proof.closing:
             # the bound cannot rise further; the path may still come nearer to it
             self._given_up += 1
@@ -153,14 +158,27 @@ class OptimalSearch:
             hoped = max(box.size * (1.0 + self._settings.widen), self._least_hope)
             self.proof.threshold = min(self.proof.threshold, hoped)
 
+    def _mind_collisions(self) -> None:
+        """Leave out where the robot collides: it does wherever a motion might have been."""
+        scene = self._problem.scene
+        self._walls.obstructions = Obstructions(scene.collision, self._walls.images)
+        self._sampler.collisions = True
+        self._places.clear()
+        self._begin_again(self._value, 0.0)
+
     def _hope_for_less(self) -> None:
         """Begin the proof again: no motion is as good as a box had made hope."""
+        hope = min(self._value, self.proof.threshold * RAISED)
+        self._begin_again(hope, hope)
+
+    def _begin_again(self, threshold: float, least_hope: float) -> None:
+        """Begin the proof again: boxes up to a larger size are of interest."""
         self._proven = self.lower_bound
         self._spent += self.proof.subproblems
-        self._least_hope = min(self._value, self.proof.threshold * RAISED)
+        self._least_hope = least_hope
         walls = self.proof.walls
         gap = PROOF_SHARE * self._settings.widen
-        self.proof = BoxProof(self._walls.images.of, self._walls.finer, self._least_hope, gap)
+        self.proof = BoxProof(self._walls.images.of, self._walls.finer, threshold, gap)
         for wall in walls:
             self.proof.add(wall)
 

@@ -20,12 +20,12 @@ from opl.planning.track_check import Free, check_track
 
 
 @dataclass(frozen=True)
-class WeightedValue:
-    """What is known of the least weighted sum.
+class ObjectiveValue:
+    """What is known of the least travel, time or weighted sum.
 
     Attributes:
         value: Of the path found.
-        lower_bound: No path through the cutter points at the field's contact positions has less.
+        lower_bound: No motion along the passes has less, whatever its contact positions.
     """
 
     value: float
@@ -47,14 +47,14 @@ class Plan:
         checks: How many motions were checked, this one included.
         lower_bound: No motion through the cutter points has a smaller joint range sum, whatever the
             contact positions, in [rad]; None if no bound was wanted.
-        weighted: The weighted sum that was kept small, if one was.
+        objective: What was kept small, where that is not the joint range sum alone.
     """
 
     path: GrindingPath
     motion: Motion
     checks: int
     lower_bound: float | None = None
-    weighted: WeightedValue | None = None
+    objective: ObjectiveValue | None = None
 
     @property
     def gap(self) -> float | None:

@@ -3,8 +3,8 @@
 Travel and time add up along a track, the joint range sum does not. But no track in a box has a
 larger one than the box, and dynamic programming finds the least of the rest in it: so the least box
 is widened step by step up to the whole field, and the best trade between the two is kept. It is the
-best of these, not proven to be the best of all; the lower bound is the least of each part alone,
-added up.
+best of these, not proven to be the best of all; the lower bound is that of the joint range sum and
+that of travel and time, added up.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ import numpy as np
 
 from opl.motion.figures import figures_of_path
 from opl.planning.costs import CostWeights, ObjectiveWeights, track_cost
+from opl.planning.least_cost import least_cost
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
 from opl.planning.optimal import OptimalSettings, plan_optimal
-from opl.planning.plan import Found, Plan, WeightedValue, propose_and_check
+from opl.planning.plan import Found, ObjectiveValue, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem
 from opl.planning.symmetry import twins
 from opl.search.box import JointBox
@@ -52,15 +53,13 @@ def plan_weighted(
     smallest = plan_optimal(problem, settings, fallback) if weights.joint_range > 0.0 else fallback
     least_range = smallest.lower_bound or 0.0
     box = JointBox(smallest.path.q.min(axis=0), smallest.path.q.max(axis=0))
-    lower_bound = np.inf
+    lower_bound = weights.joint_range * least_range
+    if weights.travel > 0.0 or weights.time > 0.0:
+        lower_bound += least_cost(problem, weights.travel, weights.time)
     queue: list[Entry] = []
     sweeps = {}
     for index, matrix in enumerate(matrices):
         cost = track_cost(problem, matrix.nodes, prices, np.zeros_like(matrix.free))
-        rest = smoothest(matrix.ladder, matrix.blocked_edges, matrix.free, cost)
-        if rest is not None:
-            # the parts are each at least their own least, so the sum is at least theirs
-            lower_bound = min(lower_bound, weights.joint_range * least_range + rest.cost)
         ladder = matrix.ladder_within(settings.max_contact_change)
         sweeps[index] = sweep = _Sweep(index, matrix, ladder, box, cost, weights)
         queue += sweep.entries(range(len(WIDENINGS)))
@@ -81,8 +80,8 @@ def plan_weighted(
             checks += len(proposals)
             for entry in sweeps[index].entries([widening]):
                 heapq.heappush(queue, entry)
-    known = WeightedValue(value, min(lower_bound, value))
-    return replace(best, lower_bound=None, weighted=known)
+    known = ObjectiveValue(value, min(lower_bound, value))
+    return replace(best, lower_bound=None, objective=known)
 
 
 @dataclass(frozen=True)

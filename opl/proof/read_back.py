@@ -44,6 +44,8 @@ class FileProof:
             where it was proven; 0 if they are one.
         replayed: Whether the files were proven anew on their own.
         findings: What is wrong.
+        places: File and line of the move to each configuration, for people; none where the files
+            do not hold as many as were proven.
     """
 
     files: tuple[str, ...]
@@ -52,6 +54,7 @@ class FileProof:
     largest_difference: float
     replayed: bool
     findings: tuple[Finding, ...]
+    places: tuple[str, ...] = ()
 
     @property
     def proven(self) -> bool:
@@ -125,7 +128,8 @@ def read_back(
             *name_findings(job, reading.name),
         )
     apart = _apart(job, q, proven) if difference > EXACT else 0.0
-    return FileProof(tuple(files), len(q), rounding, apart, bool(other_paths), findings)
+    places = tuple(move.place for move in kept.moves)
+    return FileProof(tuple(files), len(q), rounding, apart, bool(other_paths), findings, places)
 
 
 def _without_repeats(playback: Playback) -> Playback:

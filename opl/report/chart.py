@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import base64
+import io
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_rgb
+from matplotlib.image import imsave
 
 from opl.cell.collision import BodyPair
 from opl.cell.nearest import Nearest
@@ -13,7 +17,19 @@ from opl.geometry.frames import Array
 from opl.motion.motion import Motion
 from opl.report.html import text
 from opl.report.packing import Packer
+from opl.report.pictures import STATE_COLOURS
 
+# of each state, free first: which pixels of an image are darker
+HATCHES: tuple[Callable[[Any, Any], Any], ...] = (
+    lambda x, y: np.zeros(np.broadcast_shapes(x.shape, y.shape), dtype=bool),
+    lambda x, y: (x % 9 == 4) | (y % 9 == 4),
+    lambda x, y: (x % 6 < 2) & (y % 6 < 2),
+    lambda x, y: (x + y) % 8 == 0,
+    lambda x, y: ((x - y) % 5 == 0) | ((x + y) % 15 == 0),
+)
+LEAST, MOST = 0.005, 0.1  # [m] clearance that is shown darkest, and lightest
+LEAST_PIXELS = (1200, 420)  # across and up
+NEAR_SINGULAR = 0.1  # of the margin that is 0 at a singularity; the viewer's is the same
 STILL = 'vector-effect="non-scaling-stroke"'
 
 
@@ -43,8 +59,8 @@ def chart_cells(
         packer: Takes the arrays.
     """
     columns, positions, measured = grid
-    distance, pair = np.full(measured.shape, np.nan), np.zeros(measured.shape, dtype=int)
-    distance[measured], pair[measured] = nearest.distance, nearest.pair
+    pair: np.ndarray = np.zeros(measured.shape, dtype=int)
+    pair[measured] = nearest.pair
     return {
         "t": packer.floats(contact_positions),
         "states": packer.counts(states),
@@ -55,14 +71,63 @@ def chart_cells(
         "singularity": packer.rounded(singularity),
         "columns": packer.counts(columns),
         "positions": packer.counts(positions),
-        "clearance": packer.floats(distance),
+        "clearance": packer.floats(measured_clearance(measured, nearest)),
         "nearest": packer.counts(pair),
         "near_pairs": [list(names) for names in nearest.pairs],
     }
 
 
+def measured_clearance(measured: np.ndarray, nearest: Nearest) -> Array:
+    """Return the clearances at the places of a grid in [m], NaN where none was measured."""
+    distance = np.full(measured.shape, np.nan)
+    distance[measured] = nearest.distance
+    return distance
+
+
+def chart_image(
+    states: np.ndarray, singular: np.ndarray, clearance: Array, grid: tuple[np.ndarray, np.ndarray]
+) -> str:
+    """Return the cells as an image for HTML, each state with a hatch beside its colour.
+
+    Args:
+        states: Code of each node, shape (N, M).
+        singular: Which are near a singularity, shape (N, M).
+        clearance: In [m], NaN where none was measured, shape (columns, positions); free nodes are
+            the darker, the less of it there is at the place measured nearest to them.
+        grid: Cutter points and contact positions at which it was measured.
+    """
+    near = np.ix_(*(_nearest(places, n) for places, n in zip(grid, states.shape, strict=True)))
+    room = clearance[near]
+    part = np.clip(np.log(np.maximum(room, 1e-4) / LEAST) / np.log(MOST / LEAST), 0.0, 1.0)
+    colours = np.array([to_rgb(STATE_COLOURS[code]) for code in range(len(HATCHES))])[states]
+    shaded = (states == 0) & ~np.isnan(room)
+    tight, roomy = np.array(to_rgb("#8cbd9d")), np.array(to_rgb("#f6fbf7"))
+    colours[shaded] = (tight + part[..., None] * (roomy - tight))[shaded]
+    across, up = (-(-least // n) for least, n in zip(LEAST_PIXELS, states.shape, strict=True))
+
+    def pixels(cells: np.ndarray) -> np.ndarray:
+        return np.asarray(cells.repeat(across, axis=0).repeat(up, axis=1).swapaxes(0, 1)[::-1])
+
+    image, code = pixels(colours), pixels(states)
+    y, x = np.ogrid[: code.shape[0], : code.shape[1]]
+    for state, hatch in enumerate(HATCHES):
+        image[(code == state) & hatch(x, y)] *= 0.45
+    image[pixels(singular & (states == 0)) & ((x % 9 - 4) ** 2 + (y % 9 - 4) ** 2 == 4)] *= 0.3
+    file = io.BytesIO()
+    # no version in it
+    metadata: dict[str, Any] = {"Software": None}
+    imsave(file, np.clip(image, 0.0, 1.0), format="png", metadata=metadata)
+    return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode("ascii")
+
+
+def _nearest(places: np.ndarray, count: int) -> np.ndarray:
+    """Return which of some increasing places is nearest to each of 0, 1, ..., shape (count,)."""
+    return np.asarray(np.abs(np.arange(count)[:, None] - places).argmin(axis=1))
+
+
 def chart_frame(
     title: str,
+    image: str,
     contact_positions: Array,
     pass_index: np.ndarray,
     flat_end: float,
@@ -70,10 +135,11 @@ def chart_frame(
     fixed: bool,
     legend: Sequence[tuple[int, str, float]],
 ) -> str:
-    """Return the chart's frame with its lines and legend; the script fills the cells.
+    """Return the chart with its lines and legend, which need no script.
 
     Args:
         title: What it says to those who do not see it.
+        image: Its cells, see `chart_image`.
         contact_positions: Evenly spaced, shape (M,).
         pass_index: Of each cutter point, shape (N,).
         flat_end: Contact position where the flat ends.
@@ -109,7 +175,7 @@ def chart_frame(
     kept = '<li><span class="key line-fixed"></span>contact kept at t = 0</li>'
     return f"""<div class="chart"><div class="axis">{ends}</div>
 <div id="chart" tabindex="0" role="application" aria-label="{text(title)}">
-<canvas id="chart-cells"></canvas>
+<img id="chart-cells" src="{image}" alt="{text(title)}">
 <svg id="chart-lines" viewBox="0 0 {n} {m}" preserveAspectRatio="none" aria-hidden="true">{drawn}
 </svg><div id="chart-cursor" hidden></div></div>
 <div class="ends"><span>0</span><span>cutter point</span><span>{n - 1}</span></div></div>

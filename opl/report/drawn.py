@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 
 from opl.cell.drawn_cell import DrawnChain, DrawnSolid
+from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Box, Cylinder
@@ -24,7 +26,7 @@ FRAME, LIFT = 0.012, 4e-4  # [m] length of a drawn axis; how far lines are above
 def drawn_cell(
     chain: DrawnChain | None, solids: Sequence[DrawnSolid], packer: Packer
 ) -> dict[str, Any]:
-    """Return arm and solids; a mesh of very many triangles is drawn with fewer, and says so."""
+    """Return arm and solids, without a chain solids alone; large meshes thinned."""
     return {
         "joints": []
         if chain is None
@@ -38,6 +40,8 @@ def drawn_cell(
                 "name": solid.body.name,
                 "joint": solid.joint,
                 "robot": solid.of_robot,
+                "around": _is_around(solid),
+                "colour": _colour(solid),
                 "T": flat(solid.body.T_parent_body),
                 **_shape(solid.body.shape, packer),
             }
@@ -46,13 +50,46 @@ def drawn_cell(
     }
 
 
+def thinned_meshes(solids: Sequence[DrawnSolid]) -> list[str]:
+    """Return the names of what is drawn with fewer triangles than it is proven with."""
+    return [
+        solid.body.name
+        for solid in solids
+        if isinstance(solid.body.shape, TriangleMesh)
+        and len(solid.body.shape.faces) > MOST_TRIANGLES
+    ]
+
+
+def views(wheel: ContactWheel) -> dict[str, list[list[float]]]:
+    """Return from where a cell is looked at: eye and what it looks at, by name, in [m]."""
+    T = wheel.T_base_contact0
+    x, y, z, p = (T[:3, k] for k in range(4))
+    near = 3.0 * max(wheel.radius, wheel.width)
+    middle = p / 2.0 + np.array([0.0, 0.0, 0.25])
+    eyes = {
+        "cell": (middle + np.array([2.0, -2.6, 1.4]), middle),
+        "contact": (p + near * (0.75 * x - 0.35 * z + 0.55 * y), p),
+        "axle": (p + 1.6 * near * x, p),
+        "top": (p + np.array([0.0, -0.01, 3.4]), p),
+    }
+    return {name: [flat(eye), flat(target)] for name, (eye, target) in eyes.items()}
+
+
+def views_of_part(part: TriangleMesh, normal: Array) -> dict[str, list[list[float]]]:
+    """Return from where a part is looked at; its surface faces along a normal, shape (3,)."""
+    low, high = part.vertices.min(axis=0), part.vertices.max(axis=0)
+    centre, size = (low + high) / 2.0, float(np.linalg.norm(high - low))
+    up = normal / (np.linalg.norm(normal) or 1.0)
+    aside = np.cross(up, np.eye(3)[np.abs(up).argmin()])
+    oblique = up + 0.8 * aside + 0.5 * np.cross(up, aside)
+    eyes = {"part": oblique / np.linalg.norm(oblique), "top": up + 1e-3 * aside, "side": aside}
+    return {name: [flat(centre + 1.7 * size * eye), flat(centre)] for name, eye in eyes.items()}
+
+
 def drawn_wheel(wheel: ContactWheel) -> dict[str, Any]:
     """Return what the viewer needs to know of a wheel."""
     return {
         "flat_end": wheel.flat_end,
-        "last": wheel.last_position,
-        "radius": wheel.radius,
-        "width": wheel.width,
         "T_base_contact0": flat(wheel.T_base_contact0),
     }
 
@@ -83,10 +120,38 @@ def drawn_passes(
     }
 
 
+def painted(values: Array, unit: str, packer: Packer) -> dict[str, Any]:
+    """Return colours for a value of each cutter point, grey for NaN, and what their ends stand for.
+
+    From dark to light evenly, so that they are told apart without hue and in print.
+    """
+    known = values[~np.isnan(values)]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
+    parts = (values - low) / (high - low or 1.0)
+    colours = colormaps["viridis"](np.nan_to_num(parts))[:, :3]
+    colours[np.isnan(values)] = 0.5
+    return {
+        "low": f"{low:.2f}" if len(known) else "",
+        "high": f"{high:.2f} {unit}" if len(known) else "not known",
+        "colours": packer.counts(np.rint(255.0 * colours)),
+    }
+
+
 def flat(T: Array) -> list[float]:
-    """Return the sixteen numbers of a pose, row by row."""
+    """Return the numbers of an array, row by row."""
     numbers: list[float] = np.round(T, 9).ravel().tolist()
     return numbers
+
+
+def _is_around(solid: DrawnSolid) -> bool:
+    return solid.joint == 0 and not solid.of_robot and solid.body.name != WHEEL
+
+
+def _colour(solid: DrawnSolid) -> int:
+    if solid.of_robot:  # neighbours differ
+        return 0xE6A13C if solid.joint % 2 else 0xD2D7DB
+    known = {WHEEL: 0x6B5B4B, PART: 0x9FB4C4}
+    return known.get(solid.body.name, 0x5B6670 if solid.joint else 0x8FA0AD)
 
 
 def _shape(shape: Box | Cylinder | TriangleMesh, packer: Packer) -> dict[str, Any]:
@@ -97,7 +162,6 @@ def _shape(shape: Box | Cylinder | TriangleMesh, packer: Packer) -> dict[str, An
     mesh = thinned(shape, MOST_TRIANGLES)
     return {
         "kind": "mesh",
-        "vertices": packer.rounded(mesh.vertices.T),
+        "vertices": packer.floats(mesh.vertices),
         "faces": packer.counts(mesh.faces),
-        "triangles": len(shape.faces),
     }

@@ -22,8 +22,40 @@ def page(title: str, body: str, data: Mapping[str, Any], block: str) -> str:
         block: The arrays of the data, packed.
     """
     plain = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    carried = (
+        f'<script type="application/json" id="page-data">{plain}</script>\n'
+        f'<script type="text/plain" id="page-block">{block}</script>'
+    )
+    return _whole(title, f"{body}\n{carried}", "viewer.js")
+
+
+def batch_page(
+    title: str, told: str, heads: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]
+) -> str:
+    """Return a page with one table that is sorted by a click on a heading.
+
+    Args:
+        title: What the page is called.
+        told: A line below it.
+        heads: Of the columns.
+        rows: First cell and others of each row, as HTML.
+    """
+    head = "".join(f'<th scope="col">{text(one)}</th>' for one in heads)
+    lines = "\n".join(
+        f'<tr><th scope="row">{first}</th>{"".join(f"<td>{cell}</td>" for cell in cells)}</tr>'
+        for first, cells in rows
+    )
+    body = (
+        f"<header><h1>{text(title)}</h1><p>{text(told)}</p></header>\n"
+        f'<div class="scroll"><table class="words sortable"><thead><tr>{head}</tr></thead>\n'
+        f"<tbody>\n{lines}\n</tbody></table></div>"
+    )
+    return _whole(title, body, "batch.js")
+
+
+def _whole(title: str, body: str, script: str) -> str:
     style = (_VIEWER / "page.css").read_text(encoding="utf-8")
-    script = (_VIEWER / "viewer.js").read_text(encoding="utf-8")
+    code = (_VIEWER / script).read_text(encoding="utf-8")
     return f"""<!doctype html>
 <html lang="en">
 <head>
@@ -36,10 +68,8 @@ def page(title: str, body: str, data: Mapping[str, Any], block: str) -> str:
 </head>
 <body>
 {body}
-<script type="application/json" id="page-data">{plain}</script>
-<script type="text/plain" id="page-block">{block}</script>
 <script>
-{script}</script>
+{code}</script>
 </body>
 </html>
 """
@@ -62,10 +92,20 @@ def section(name: str, heading: str, *content: str) -> str:
     )
 
 
-def bullets(lines: Iterable[str], kind: str = "") -> str:
-    """Return lines as a list; nothing if there are none."""
-    items = "\n".join(f"<li>{text(line)}</li>" for line in lines)
-    return f'<ul class="{kind}">\n{items}\n</ul>' if items else ""
+def bullets(lines: Iterable[str], marks: Sequence[str | None] = ()) -> str:
+    """Return lines as a list, nothing if there are none; marks as of `table`."""
+    items = "\n".join(
+        f"<li>{marked(line, marks[k] if k < len(marks) else None)}</li>"
+        for k, line in enumerate(lines)
+    )
+    return f"<ul>\n{items}\n</ul>" if items else ""
+
+
+def marked(said: object, mark: str | None) -> str:
+    """Return text, as a button if it leads to a place in the viewer."""
+    if mark is None:
+        return text(said)
+    return f'<button type="button" data-mark="{text(mark)}">{text(said)}</button>'
 
 
 def table(
@@ -88,10 +128,7 @@ def table(
         return ""
     lines = []
     for k, row in enumerate(rows):
-        mark = marks[k] if k < len(marks) else None
-        first = text(row[0])
-        if mark is not None:
-            first = f'<button type="button" data-mark="{text(mark)}">{first}</button>'
+        first = marked(row[0], marks[k] if k < len(marks) else None)
         cells = "".join(f"<td>{text(cell)}</td>" for cell in row[1:])
         lines.append(f'<tr><th scope="row">{first}</th>{cells}</tr>')
     head = "".join(f'<th scope="col">{text(one)}</th>' for one in heads)

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
-from opl.report.chart import chart_frame
-from opl.report.html import page, section, text
+import re
+from pathlib import Path
+
+import numpy as np
+
+from opl.cell.drawn_cell import drawn_solids
+from opl.motion.motion import Motion
+from opl.planning.survey import NodeSurvey
+from opl.report.chart import NEAR_SINGULAR, chart_frame, chart_image, measured_clearance
+from opl.report.drawn import thinned_meshes
+from opl.report.html import bullets, page, section, text
 from opl.report.packing import Packer
+from opl.report.view_frame import BOXES, choice, hover, view_frame
 from opl.run import page_text
 from opl.run.page_data import blocked_place, move_to, moves_at, run_data
 from opl.run.result import Report
@@ -18,15 +28,9 @@ CURVES = {
     "feed": "feed and contact position",
     "clearance": "clearance",
 }
-PAINTS = {
-    "none": "nothing",
-    "t": "contact position",
-    "clearance": "clearance",
-    "feed": "feed",
-    "ridge": "ridge height",
-    "pass": "pass",
-}
-VIEWS = {"cell": "whole cell", "contact": "contact", "axle": "along the axle", "top": "from above"}
+
+# of a line in a program, as readers name it: job or file, line, and more
+_PLACE = re.compile(r"(?P<source>.+?) line (?P<line>\d+)")
 
 
 def run_page(run: Written | Refused, report: Report) -> str:
@@ -43,68 +47,53 @@ def run_page(run: Written | Refused, report: Report) -> str:
     data = run_data(prepared, found, packer)
     data["marks"] = _marks(run, prepared, found, report)
     job, survey = run.surfaced.job, (prepared if found is None else found).survey
-    chart = chart_frame(
-        f"{job.name}: what each cutter point is at each contact position",
-        prepared.problem.field.contact_positions,
-        run.surfaced.points.pass_index,
-        job.cell.wheel.flat_end,
-        None if found is None else found.timing.timed.motion,
-        prepared.fixed.q is not None,
-        page_text.legend(survey),
-    )
-    told = '<p class="told" id="hover" aria-live="polite">&nbsp;</p>'
+    data["program"] = _program(run, packer)
+    motion = None if found is None else found.timing.timed.motion
     body = "\n".join(
         [
-            page_text.verdict(report, job),
-            view_section(found is not None),
+            page_text.verdict(report, job, data["marks"]),
+            view_frame("The cell", data["views"], data["paints"], BOXES, found is not None),
+            bullets(
+                f"{name} is drawn with fewer triangles than it is proven with"
+                for name in thinned_meshes(drawn_solids(job.cell))
+            ),
             section(
                 "chart-section",
                 "Contact chart",
                 '<p class="screen">Point to see what a cell is; click, or use the arrow keys, to '
                 "pose the robot there.</p>",
-                chart,
-                told,
+                _chart(prepared, survey, motion),
+                hover(),
                 page_text.causes(survey),
             ),
             "" if found is None else _curves_section(),
             page_text.tables(report, job, found),
+            _program_section(run),
             page_text.files(report),
         ]
     )
     return page(f"{job.name}: report", body, data, packer.block())
 
 
-def view_section(moving: bool) -> str:
-    """Return the view of the cell with its controls."""
-    boxes = [
-        ("section", "section through the wheel", False),
-        ("line", "line to the nearest pair", True),
-        ("frames", "frames", False),
-        ("surroundings", "surroundings", True),
-    ]
-    player = f"""<div class="controls"{"" if moving else " hidden"}>
-<button type="button" id="play">play</button>
-<input type="range" id="time" min="0" max="1" step="any" value="0" aria-label="time">
-<output id="clock"></output>
-<label>speed <input type="range" id="speed" min="0" max="6" step="1" value="2">
-<output id="speed-text"></output></label></div>"""
-    controls = "".join(
-        f'<label><input type="checkbox" id="{name}"{" checked" if on else ""}> {label}</label>'
-        for name, label, on in boxes
+def _chart(prepared: Prepared, survey: NodeSurvey, motion: Motion | None) -> str:
+    job = prepared.surfaced.job
+    title = f"{job.name}: what each cutter point is at each contact position"
+    clearance = measured_clearance(survey.measured, survey.clearance)
+    image = chart_image(
+        survey.states,
+        survey.singularity < NEAR_SINGULAR,
+        clearance,
+        (survey.columns, survey.positions),
     )
-    scale = (
-        '<span id="scale" hidden><output id="scale-low"></output><i></i>'
-        '<output id="scale-high"></output></span>'
-    )
-    return section(
-        "cell",
-        "The cell",
-        '<canvas id="view" tabindex="0" role="img" aria-label="the cell in three dimensions; drag '
-        'or use the arrow keys to look around; what it shows is said below"></canvas>',
-        '<p id="posture" role="status"></p><p id="angles" class="mono"></p>',
-        player,
-        f'<div class="controls">{_choice("look", "view", VIEWS)}{controls}'
-        f"{_choice('paint', 'colour of the passes', PAINTS)}{scale}</div>",
+    return chart_frame(
+        title,
+        image,
+        prepared.problem.field.contact_positions,
+        prepared.surfaced.points.pass_index,
+        job.cell.wheel.flat_end,
+        motion,
+        prepared.fixed.q is not None,
+        page_text.legend(survey),
     )
 
 
@@ -112,16 +101,36 @@ def _curves_section() -> str:
     return section(
         "curves-section",
         "Curves",
-        f'<div class="controls">{_choice("curves-of", "show", CURVES)}</div>',
+        f'<div class="controls">{choice("curves-of", "show", CURVES)}</div>',
         '<div id="curves"></div>',
     )
 
 
-def _choice(name: str, label: str, options: dict[str, str]) -> str:
-    inside = "".join(
-        f'<option value="{key}">{text(said)}</option>' for key, said in options.items()
+def _program(run: Written | Refused, packer: Packer) -> dict[str, object] | None:
+    """Return the texts of a program, and the move that each of their lines ends."""
+    if not isinstance(run, Written) or run.read_back is None:
+        return None
+    names = run.read_back.files
+    by_source = {Path(name).stem: k for k, name in enumerate(names)}
+    by_source |= {name: k for k, name in enumerate(names)}
+    lines = []
+    for move, place in zip(run.program.moves, run.read_back.places, strict=True):
+        found = _PLACE.match(place)
+        if found is not None and found["source"] in by_source:
+            lines.append((by_source[found["source"]], int(found["line"]), move.motion_index))
+    texts = [packer.text(run.files[name]) for name in names]
+    return {"texts": texts, "lines": packer.counts(np.array(lines).reshape(-1, 3))}
+
+
+def _program_section(run: Written | Refused) -> str:
+    if not isinstance(run, Written) or run.read_back is None:
+        return ""
+    listings = "".join(
+        f'<h3>{text(name)}</h3><pre id="program-{k}" tabindex="0"></pre>'
+        for k, name in enumerate(run.read_back.files)
     )
-    return f'<label>{label} <select id="{name}">{inside}</select></label>'
+    told = "<p>A click on the line of a move poses the robot at its end; what is played is marked."
+    return section("program", "Program", f"{told}</p>", listings)
 
 
 def _marks(
@@ -138,16 +147,15 @@ def _marks(
             findings = run.cause.findings
             moves = moves_at(motion, [finding.where for finding in findings])
             for k, (finding, move) in enumerate(zip(findings, moves, strict=True)):
-                if move is None:
-                    continue
-                hit = finding.message.split(": ")[0].split(" and ")
-                marks[f"finding-{k}"] = {"move": move, "text": str(finding), "hit": hit}
-            first = next((mark for name, mark in marks.items() if "finding" in name), None)
-            if first is not None:
-                marks["start"] = first
+                if move is not None:
+                    hit = finding.message.split(": ")[0].split(" and ")
+                    marks[f"reason-{k}"] = {"move": move, "text": str(finding), "hit": hit}
     else:
-        place = blocked_place(report.reasons, prepared.survey, prepared.problem.wheel_distance)
-        if place is not None:
-            t = float(prepared.problem.field.contact_positions[place.pop("position")])
-            marks["start"] = {**place, "t": t}
-    return marks
+        t = prepared.problem.field.contact_positions
+        for k, reason in enumerate(report.reasons):
+            place = blocked_place(reason, prepared.survey, prepared.problem.wheel_distance)
+            if place is not None:
+                point, position = place
+                marks[f"reason-{k}"] = {"point": point, "t": float(t[position]), "text": reason}
+    first = next((mark for name, mark in marks.items() if name.startswith("reason-")), None)
+    return marks if first is None else {**marks, "start": first}

@@ -15,34 +15,50 @@ from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.scallop import ridge_height
 from opl.motion.motion import Motion, MoveKind, TimedMotion
-from opl.planning.survey import CODES, NodeState, NodeSurvey
+from opl.planning.survey import NodeState, NodeSurvey
 from opl.report import curves
 from opl.report.chart import chart_cells
-from opl.report.drawn import drawn_cell, drawn_passes, drawn_wheel
+from opl.report.drawn import drawn_cell, drawn_passes, drawn_wheel, painted, views
 from opl.report.packing import Packer
 from opl.run.values import Planned, Prepared, Surfaced
 
 MM, MICRONS = 1e3, 1e6
+# of a page: what a viewer without a run, an arm or a part goes without
+EMPTY: dict[str, Any] = {
+    "joints": [],
+    "home": None,
+    "wheel": None,
+    "points": None,
+    "field": None,
+    "motion": None,
+    "clearance": None,
+    "curves": {},
+    "paints": {},
+    "program": None,
+    "marks": {},
+}
 MOST_LOOKS = 600  # at the nearest pair along the motion, evenly in time, beside those on the wheel
 KINDS = tuple(MoveKind)
+NEARLY_FREE = (
+    NodeState.FREE,
+    NodeState.COLLISION,
+    NodeState.WHEEL,
+    NodeState.LIMITS,
+    NodeState.REACH,
+)
 
 Data = dict[str, Any]
 
 
-def cell_data(cell: WorkCell, home: Array | None, packer: Packer) -> Data:
-    """Return a page's data with the cell and nothing else, robot at home."""
+def cell_data(cell: WorkCell, home: Array, packer: Packer) -> Data:
+    """Return a page's data with a cell and nothing else, the robot at home."""
     return {
+        **EMPTY,
         "joints": joints_data(cell.robot),
         "cell": drawn_cell(drawn_chain(cell.robot), drawn_solids(cell), packer),
-        "home": None if home is None else home.tolist(),
+        "views": views(cell.wheel),
+        "home": home.tolist(),
         "wheel": drawn_wheel(cell.wheel),
-        "points": None,
-        "field": None,
-        "motion": None,
-        "clearance": None,
-        "curves": {},
-        "paints": {},
-        "marks": {},
     }
 
 
@@ -58,8 +74,8 @@ def passes_data(surfaced: Surfaced, packer: Packer) -> tuple[Data, Data]:
     across = surfaced.laid.bending[:, 1, 1]
     ridge = MICRONS * ridge_height(across, job.passes.pitch, job.cell.wheel.radius)
     paints = {
-        "pass": {"unit": "pass", "values": packer.floats(points.pass_index + 1)},
-        "ridge": {"unit": "micrometres of ridge", "values": packer.floats(ridge)},
+        "ridge": painted(ridge, "micrometres of ridge", packer),
+        "pass": painted(points.pass_index.astype(np.float64) + 1.0, "pass", packer),
     }
     missed = surfaced.inspection.uncovered.points
     return drawn_passes(points, job.passes.pitch, missed, packer), paints
@@ -69,7 +85,7 @@ def run_data(prepared: Prepared, planned: Planned | None, packer: Packer) -> Dat
     """Return the data of a page of a run, as far as it came."""
     surfaced = prepared.surfaced
     job = surfaced.job
-    data = cell_data(job.cell, job.process.home, packer)
+    data = {"name": job.name, **cell_data(job.cell, job.process.home, packer)}
     data["points"], data["paints"] = passes_data(surfaced, packer)
     data["field"] = _field(prepared, prepared.survey if planned is None else planned.survey, packer)
     if planned is not None:
@@ -91,43 +107,29 @@ def run_data(prepared: Prepared, planned: Planned | None, packer: Packer) -> Dat
             "feed": curves.feed_panels(timing, job.process.feed, robot, packer),
             "clearance": curves.clearance_panels(times, nearest, packer),
         }
-        data["paints"] |= _paints(planned, times, nearest, packer)
+        data["paints"] = {**_paints(planned, times, nearest, packer), **data["paints"]}
     return data
 
 
-def blocked_place(reasons: Sequence[str], survey: NodeSurvey, distance: Array) -> Data | None:
-    """Return the place that the first reason names, as a mark; None if it names no cutter point.
+def blocked_place(reason: str, survey: NodeSurvey, distance: Array) -> tuple[int, int] | None:
+    """Return the cutter point that a reason begins with, and a contact position of it.
 
-    Of its contact positions the one that comes nearest to being free.
+    It is the middle one of a run of cutter points, at the contact position that comes nearest to
+    being free; None if the reason begins with no cutter point.
 
     Args:
-        reasons: Why there is no path, one line each.
+        reason: Why there is no path.
         survey: The nodes.
         distance: Of part and wheel at each node in [m], shape (N, M).
     """
-    for reason in reasons:
-        found = re.match(r"cutter points? (\d+)(?: to (\d+))?", reason)
-        if found is not None:
-            first, last = int(found[1]), int(found[2] or found[1])
-            return blocked_mark((first + last) // 2, survey, distance)
-    return None
-
-
-def blocked_mark(point: int, survey: NodeSurvey, distance: Array) -> Data:
-    """Return the cell of a cutter point that comes nearest to being free, as a mark."""
-    states = survey.states[point]
-    for state in (
-        NodeState.FREE,
-        NodeState.COLLISION,
-        NodeState.WHEEL,
-        NodeState.LIMITS,
-        NodeState.REACH,
-    ):
-        rows = np.flatnonzero(states == CODES[state])
-        if len(rows):
-            row = int(rows[distance[point, rows].argmax()])
-            return {"point": point, "position": row, "text": f"cutter point {point}"}
-    raise ValueError(f"cutter point {point} has no nodes")
+    found = re.match(r"cutter points? (\d+)(?: to (\d+))?", reason)
+    if found is None:
+        return None
+    point = (int(found[1]) + int(found[2] or found[1])) // 2
+    ranks = [NEARLY_FREE.index(state) for state in NodeState]
+    rank = np.array(ranks)[survey.states[point]]
+    rows = np.flatnonzero(rank == rank.min())
+    return point, int(rows[distance[point, rows].argmax()])
 
 
 def moves_at(motion: Motion, wheres: Sequence[str]) -> list[int | None]:
@@ -191,13 +193,13 @@ def _paints(planned: Planned, times: Array, nearest: Nearest, packer: Packer) ->
     speed = MM * timing.surface_distance[rows] / np.maximum(duration[rows], curves.SHORTEST)
     near = MM * np.interp(moments[rows], times, nearest.distance)
 
-    def painted(values: Array, unit: str) -> Data:
+    def at_points(values: Array, unit: str) -> Data:
         every = np.full(len(planned.surfaced.points), np.nan)
         every[point] = values
-        return {"unit": unit, "values": packer.floats(every)}
+        return painted(every, unit, packer)
 
     return {
-        "t": painted(motion.contact_position[rows], "mm or deg of t"),
-        "clearance": painted(near, "mm of clearance"),
-        "feed": painted(speed, "mm/s"),
+        "t": at_points(motion.contact_position[rows], "mm or deg of t"),
+        "clearance": at_points(near, "mm of clearance"),
+        "feed": at_points(speed, "mm/s"),
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 
 import numpy as np
 
@@ -32,8 +32,11 @@ NEVER_PROVEN = (
 )
 
 
-def verdict(report: Report, job: Job) -> str:
-    """Return what became of the job, what was proven, assumed and not proven."""
+def verdict(report: Report, job: Job, marks: Container[str]) -> str:
+    """Return what became of the job, what was proven, assumed and not proven.
+
+    A reason for which there is a mark leads to it.
+    """
     proven = report.status == "ok"
     said = {
         "ok": "Proven: the program may be tried, slowly, away from the belt, first",
@@ -51,8 +54,13 @@ def verdict(report: Report, job: Job) -> str:
         ("Not proven", iter(NEVER_PROVEN)),
     ]
     if not proven:
-        columns[:1] = [("Why not", iter([*report.reasons])), ("What would help", _help(report))]
-    lists = "".join(f"<div><h3>{text(name)}</h3>{bullets(lines)}</div>" for name, lines in columns)
+        columns[:1] = [("Why not", iter(report.reasons)), ("What would help", _help(report))]
+    names = [f"reason-{k}" for k in range(len(report.reasons))]
+    reasons = [name if name in marks else None for name in names]
+    lists = "".join(
+        f"<div><h3>{text(name)}</h3>{bullets(lines, reasons if name == 'Why not' else ())}</div>"
+        for name, lines in columns
+    )
     return head + section("verdict", "What was found", f'<div class="columns">{lists}</div>')
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from opl.geometry.frames import roll_pitch_yaw
 from opl.geometry.passes import LaidPasses
 from opl.report.part_view import part_view
+from opl.run.other_pages import points_page
 from opl.run.values import Surfaced
 
 MM = 1e3
@@ -70,11 +71,11 @@ def report_points(surfaced: Surfaced) -> PointsReport:
 
 
 def points_files(surfaced: Surfaced) -> dict[str, str]:
-    """Return a table of cutter points and a picture of part, passes and frames, by file name."""
-    job = surfaced.job
+    """Return a table of cutter points, a picture and a page of part and passes, by file name."""
+    job, told = surfaced.job, str(report_points(surfaced))
     picture = part_view(
         title=f"{job.name}: what will be ground",
-        subtitle=str(report_points(surfaced)),
+        subtitle=told,
         part=job.cell.part,
         points=surfaced.points,
         inspection=surfaced.inspection,
@@ -82,6 +83,7 @@ def points_files(surfaced: Surfaced) -> dict[str, str]:
     return {
         f"{job.name}_points.csv": points_table(surfaced.laid),
         f"{job.name}_points.svg": picture,
+        f"{job.name}_points.html": points_page(surfaced, told),
     }
 
 

@@ -9,12 +9,14 @@ import numpy as np
 from opl.cell.inverse_kinematics import ik_branch_name
 from opl.cell.robot import Robot
 from opl.files.digests import digest
+from opl.job.search import Objective
 from opl.motion.feed import SlowStretch
 from opl.program.moves import CycleTime
 from opl.proof.read_back import FileProof
 from opl.run import result
 from opl.run.result import Report
 from opl.run.values import Planned, Prepared, Proven, Refused, Written
+from opl.verification.extremes import Extreme
 from opl.verification.replay import Verification
 from opl.version import VERSION
 
@@ -88,7 +90,12 @@ def _compared(planned: Planned) -> dict[str, result.FiguresReport]:
 
 def _path(planned: Planned) -> result.PathReport:
     plan, search = planned.plan, planned.surfaced.job.search
-    path, weighted = plan.path, plan.weighted
+    path, known = plan.path, plan.objective
+    objective = None
+    if known is not None:
+        objective = result.ObjectiveReport(
+            *map(_rounded, (known.value, known.lower_bound, known.gap))
+        )
     return result.PathReport(
         method=search.method.value,
         objective=search.objective.value,
@@ -101,11 +108,8 @@ def _path(planned: Planned) -> result.PathReport:
         intermediate_nodes=path.n_intermediate,
         lower_bound_rad=_rounded(plan.lower_bound),
         gap=_rounded(plan.gap),
-        weighted=None
-        if weighted is None
-        else result.WeightedReport(
-            *map(_rounded, (weighted.value, weighted.lower_bound, weighted.gap))
-        ),
+        weighted=objective if search.objective is Objective.WEIGHTED else None,
+        objective_value=objective,
     )
 
 
@@ -184,7 +188,16 @@ def replay_report(found: Verification, proof: FileProof | None) -> result.Verifi
             round(proof.largest_difference * MM, 4),
             proof.replayed,
         ),
+        0.0 if found.deepest is None else round(found.deepest.amount * MM, 3),
+        round(found.allowed_penetration * MM, 3),
+        *map(_place, (found.nearest, found.worst_contact, found.deepest)),
     )
+
+
+def _place(one: Extreme | None) -> result.PlaceReport | None:
+    if one is None:
+        return None
+    return result.PlaceReport(one.subject, one.place, np.rad2deg(one.q).round(3).tolist())
 
 
 def _program(written: Written) -> result.ProgramReport:

@@ -33,8 +33,8 @@ class FixedReport:
 
 
 @dataclass(frozen=True)
-class WeightedReport:
-    """The weighted sum of the path, and its lower bound."""
+class ObjectiveReport:
+    """Travel in rad, time in s or weighted sum of the path, and its lower bound."""
 
     value: float
     lower_bound: float
@@ -68,7 +68,8 @@ class PathReport:
     intermediate_nodes: int
     lower_bound_rad: float | None  # no path has a smaller sum, whatever its contact positions
     gap: float | None  # fraction by which the sum may be above the least there is
-    weighted: WeightedReport | None
+    weighted: ObjectiveReport | None
+    objective_value: ObjectiveReport | None  # of travel, time or weighted sum
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,15 @@ class FileReport:
 
 
 @dataclass(frozen=True)
+class PlaceReport:
+    """Where something is least or largest."""
+
+    subject: str  # the pair of bodies
+    place: str  # pass and cutter point, or which move
+    joints_deg: Sequence[float]
+
+
+@dataclass(frozen=True)
 class VerificationReport:
     """What the replay found."""
 
@@ -152,6 +162,11 @@ class VerificationReport:
     max_contact_error_mm: float
     limit_violations: int
     file: FileReport | None  # None if nothing was read back
+    max_belt_penetration_mm: float  # deepest that the part was in the belt
+    allowed_belt_penetration_mm: float
+    min_clearance_at: PlaceReport | None  # None if it is the farthest that is measured
+    max_contact_error_at: PlaceReport | None
+    max_belt_penetration_at: PlaceReport | None
 
 
 @dataclass(frozen=True)

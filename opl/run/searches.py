@@ -12,9 +12,10 @@ from opl.planning.borders import Nameable, clear_of_borders
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import ObjectiveWeights
 from opl.planning.equals import quickest_of_equals
+from opl.planning.least_cost import least_cost
 from opl.planning.multi_start import Start, plan_recursive, try_recursive
 from opl.planning.optimal import plan_optimal
-from opl.planning.plan import Found, Plan
+from opl.planning.plan import Found, ObjectiveValue, Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.weighted import plan_weighted
 from opl.run.values import Prepared
@@ -75,7 +76,10 @@ def _search_best(search: Search, problem: GrindingProblem, recursive: Plan) -> P
     # the cheapest at the cutter points need not be so between them
     alone = ObjectiveWeights(0.0, travel, time)
     plans = (plan_cheapest(problem, costs, change), recursive)
-    return min(plans, key=lambda plan: alone.value(_figures(problem, plan)))
+    values = [alone.value(_figures(problem, plan)) for plan in plans]
+    value = min(values)
+    known = ObjectiveValue(value, min(least_cost(problem, travel, time), value))
+    return replace(plans[values.index(value)], objective=known)
 
 
 def compare(prepared: Prepared, found: FoundPaths) -> Mapping[str, Figures]:

@@ -15,11 +15,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.search.bounding import distance, least_box, tighten
+from opl.search.bounding import distance, tighten, trim
 from opl.search.cells import END, FIRST, WALL, Cells
+from opl.search.relaxation import least_box
 from opl.search.walls import Image, Piece, Wall
 
 SETTLED = 0.1  # of the gap wanted: what the bend of the spans may lose where none is split further
+MOST_TRIMS = 6  # of spans, before one is split
+TRIMMED = 0.9  # of the cells: more left, and trimming goes on no longer
 PROBE_EVERY = 16  # subproblems: how often a box is shown that is not settled
 
 
@@ -192,20 +195,30 @@ class BoxProof:
         ]
         spans = np.concatenate([node.spans, *new])
         low, high, sizes = node.low.copy(), node.high.copy(), np.empty(n_walls)
-        arguments = spans, cells.pass_index, cells.n_keys, low, high, closing, sizes
-        left = tighten(cells.table, *arguments)
-        if left == 0:
-            return False
-        node.spans, node.n_walls, node.low, node.high = spans[:left], n_walls, low, high
-        alone = np.flatnonzero(np.bincount(node.spans[:, WALL], minlength=n_walls) == 1)
-        only = node.spans[np.isin(node.spans[:, WALL], alone)]
-        box, k = np.empty((2, 6)), len(alone)
-        x, lost, missed, prices = np.empty(k), np.empty(k), np.empty(k), np.empty((k, 6, 2))
-        filled = box[0], box[1], x, lost, missed, prices
-        bound = least_box(cells.table, only, low, high, *filled)
+        box, table = np.empty((2, 6)), cells.table
+        for _ in range(MOST_TRIMS):
+            arguments = spans, cells.pass_index, cells.n_keys, low, high, closing, sizes
+            left = tighten(table, *arguments)
+            if left == 0:
+                return False
+            spans = spans[:left]
+            alone = np.flatnonzero(np.bincount(spans[:, WALL], minlength=n_walls) == 1)
+            at = np.isin(spans[:, WALL], alone)
+            only, k = spans[at], len(alone)
+            x, lost, missed, prices = np.empty(k), np.empty(k), np.empty(k), np.empty((k, 6, 2))
+            filled = box[0], box[1], x, lost, missed, prices
+            bound = least_box(table, only, low, high, *filled)
+            before = (only[:, END] - only[:, FIRST]).sum()
+            bound = max(bound, trim(table, only, prices, low, high, closing), float(sizes.max()))
+            node.bound = max(node.bound, bound)
+            if node.bound >= closing:
+                return False
+            spans[at] = only
+            if (only[:, END] - only[:, FIRST]).sum() > TRIMMED * before:
+                break
+        node.spans, node.n_walls, node.low, node.high = spans, n_walls, low, high
         node.found = Relaxation(alone, box[0], box[1], x, np.maximum(lost, missed), prices)
-        node.bound = max(node.bound, bound, float(sizes.max()))
-        return node.bound < closing
+        return True
 
     def _where_to_split(self, node: Subproblem) -> tuple[int, float] | None:
         """Return the wall to be split, and where along its span; None if that gains nothing."""

@@ -13,6 +13,7 @@ from opl.motion.collision_check import RESOLUTION, densify
 from opl.motion.figures import figures_of_path
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import ObjectiveWeights
+from opl.planning.least_cost import least_cost
 from opl.planning.multi_start import plan_recursive
 from opl.planning.optimal import plan_optimal
 from opl.planning.weighted import plan_weighted
@@ -276,11 +277,11 @@ def sum_of(problem, plan, weights):
 def test_a_weighted_sum_is_what_the_motion_has_and_no_more_than_other_methods_have():
     problem = one_row()
     plan = weighted(problem, WEIGHTS, recursive(one_row))
-    assert plan.weighted.value == pytest.approx(sum_of(problem, plan, WEIGHTS), abs=1e-12)
-    assert 0.0 < plan.weighted.lower_bound <= plan.weighted.value
+    assert plan.objective.value == pytest.approx(sum_of(problem, plan, WEIGHTS), abs=1e-12)
+    assert 0.0 < plan.objective.lower_bound <= plan.objective.value
     travel = plan_cheapest(problem, ONLY_TRAVEL, SETTINGS.max_contact_change)
     for other in (recursive(one_row), travel):
-        assert plan.weighted.value <= sum_of(problem, other, WEIGHTS) + 1e-12
+        assert plan.objective.value <= sum_of(problem, other, WEIGHTS) + 1e-12
     again = weighted(problem, WEIGHTS, recursive(one_row))
     assert again.motion.q.tobytes() == plan.motion.q.tobytes()
 
@@ -299,14 +300,45 @@ def test_no_track_of_a_tiny_field_has_less_than_the_bound_of_the_weighted_sum(fi
         seconds = np.maximum(np.maximum(arc, sliding), (turned / robot.max_speed).max(axis=1))
         total = np.ptp(q, axis=0).sum() + 0.5 * turned[on].sum() + 0.05 * seconds[on].sum()
         least = min(least, total)
-    assert plan.weighted.lower_bound <= least + 1e-9
-    assert plan.weighted.value >= least - 1e-9
+    assert plan.objective.lower_bound <= least + 1e-9
+    assert plan.objective.value >= least - 1e-9
 
 
 def test_one_part_alone_has_the_bound_of_that_part():
     problem = one_row()
     only_range = weighted(problem, ObjectiveWeights(1.0, 0.0, 0.0), recursive(one_row))
-    assert only_range.weighted.lower_bound == optimal(one_row).lower_bound
+    assert only_range.objective.lower_bound == optimal(one_row).lower_bound
     only_travel = weighted(problem, ObjectiveWeights(0.0, 1.0, 0.0), recursive(one_row))
-    bound = shortest(problem, lambda a, b, *_: np.abs(b - a).sum(axis=1))
-    assert only_travel.weighted.lower_bound == pytest.approx(bound, abs=1e-9)
+    assert only_travel.objective.lower_bound == least_cost(problem, 1.0, 0.0)
+
+
+# travel and time at any contact positions
+
+
+def test_least_travel_lies_below_a_shortest_path_over_a_fine_grid_and_not_far():
+    fine = problem_of(with_positions(one_row_job(), 200), slice(20, 40))
+    shortest_way = shortest(fine, lambda a, b, *_: np.abs(b - a).sum(axis=1))
+    bound = least_cost(one_row(), 1.0, 0.0)
+    assert 0.8 * shortest_way < bound <= shortest_way
+
+
+def test_least_time_is_that_of_the_feed_or_of_slow_joints():
+    problem = one_row()
+    arc = np.abs(np.diff(problem.points.arc_length)).sum() / problem.process.feed
+    assert least_cost(problem, 0.0, 1.0) == pytest.approx(arc)
+    slow = replace(problem.cell.robot, max_speed=problem.cell.robot.max_speed / 200.0)
+    slowed = with_scene(problem, cell=replace(problem.cell, robot=slow))
+    assert least_cost(slowed, 0.0, 1.0) > 1.05 * arc
+    plan = plan_cheapest(slowed, ONLY_TIME, SETTINGS.max_contact_change)
+    figures = figures_of_path(plan.path, plan.motion, slowed.points, slowed.process, slow)
+    assert least_cost(slowed, 0.0, 1.0) <= figures.seconds
+
+
+def test_prices_scale_and_are_added_up():
+    problem = two_rows()
+    travel = least_cost(problem, 1.0, 0.0)
+    assert least_cost(problem, 3.0, 0.0) == pytest.approx(3.0 * travel)
+    plan = plan_cheapest(problem, ONLY_TRAVEL, SETTINGS.max_contact_change)
+    assert travel <= plan.path.joint_travel
+    both = sum_of(problem, plan, ObjectiveWeights(0.0, 1.0, 1.0))
+    assert 0.0 < least_cost(problem, 1.0, 1.0) <= both

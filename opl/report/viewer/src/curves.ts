@@ -1,6 +1,8 @@
 // Curves against time, one panel under the other, with one cursor through all of them.
 
-import { type Block, type CurveLine, type Panel } from "./data";
+import type { Block, Panel, Unpacked } from "./data";
+
+type Line = { name: string; kind: string; xs: Unpacked; ys: Unpacked };
 
 const [WIDTH, HEIGHT] = [1000, 120];
 
@@ -30,7 +32,7 @@ export class Curves {
   }
 
   private figure(panel: Panel): HTMLElement {
-    const lines = panel.lines.map((line) => ({ ...line, xs: this.block.array(line.x), ys: this.block.array(line.y) }));
+    const lines = panel.lines.map((line) => ({ name: line.name, kind: line.kind, xs: this.block.array(line.x), ys: this.block.array(line.y) }));
     let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
     for (const line of lines.filter(({ kind }) => kind !== "limit")) {
       for (const y of line.ys) if (!Number.isNaN(y)) [low, high] = [Math.min(low, y), Math.max(high, y)];
@@ -44,10 +46,11 @@ export class Curves {
     const margin = 0.06 * Math.max(high - low, 1e-3);
     const up = (y: number) => HEIGHT - (HEIGHT * (y - low + margin)) / (high - low + 2 * margin);
     const svg = shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", role: "img", "aria-label": title });
-    for (const { kind, xs, ys, name } of lines) {
+    for (const line of lines) {
+      const { kind, ys, name } = line;
       const drawn = kind === "range"
         ? shape("rect", { x: "0", y: `${up(ys[1])}`, width: `${WIDTH}`, height: `${up(ys[0]) - up(ys[1])}`, class: kind })
-        : shape("path", { d: this.path(kind, xs, ys, up), class: kind, "vector-effect": "non-scaling-stroke" });
+        : shape("path", { d: this.path(line, up), class: kind, "vector-effect": "non-scaling-stroke" });
       const tip = shape("title", {});
       tip.textContent = name;
       drawn.append(tip);
@@ -56,8 +59,7 @@ export class Curves {
     const cursor = shape("line", { x1: "0", x2: "0", y1: "0", y2: `${HEIGHT}`, class: "cursor", "vector-effect": "non-scaling-stroke" });
     this.cursors.push(cursor);
     svg.append(cursor);
-    const caption = document.createElement("figcaption");
-    caption.textContent = title;
+    const caption = Object.assign(document.createElement("figcaption"), { textContent: title });
     const figure = document.createElement("figure");
     figure.append(caption, svg);
     const time = (event: MouseEvent) => {
@@ -69,7 +71,7 @@ export class Curves {
     return figure;
   }
 
-  private path(kind: string, xs: ArrayLike<number>, ys: ArrayLike<number>, up: (y: number) => number): string {
+  private path({ kind, xs, ys }: Line, up: (y: number) => number): string {
     const step = kind.includes("step");
     let d = "";
     for (let k = step ? 1 : 0; k < ys.length; k++) {
@@ -81,7 +83,7 @@ export class Curves {
     return d;
   }
 
-  private tell(panel: Panel, lines: (CurveLine & { xs: ArrayLike<number>; ys: ArrayLike<number> })[], time: number): string {
+  private tell(panel: Panel, lines: Line[], time: number): string {
     const parts = lines.filter(({ kind }) => !/limit|range|blame/.test(kind)).map(({ name, kind, xs, ys }) => {
       const k = after(xs, time);
       const part = k > 0 && xs[k] > xs[k - 1] ? (time - xs[k - 1]) / (xs[k] - xs[k - 1]) : 1;

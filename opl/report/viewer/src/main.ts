@@ -1,18 +1,12 @@
 // One page of one run: whatever is clicked, the robot is posed there, and everything else follows.
 
 import { CellView, contactFrame, matrix } from "./cell";
-import { type Cell, ContactChart, scaleColour } from "./chart";
+import { type Cell, ContactChart } from "./chart";
 import { after, Curves } from "./curves";
-import { Block, degrees, element, type Mark, type Page } from "./data";
+import { Block, degrees, element, type Mark, type Page, type Unpacking } from "./data";
 
-interface Shown {
-  q: ArrayLike<number> | null; // null where the arm does not reach
-  time: number | null;
-  point: number | null;
-  t: number | null;
-  hit: string[];
-  text: string;
-}
+// without q where the arm does not reach
+type Shown = { q: ArrayLike<number> | null; time: number | null; point: number | null; t: number | null; hit: string[]; text: string };
 
 const SPEEDS = [0.25, 0.5, 1, 2, 5, 10, 20];
 
@@ -21,20 +15,22 @@ class Viewer {
   readonly chart: ContactChart | null;
   shown: Shown | null = null;
   private curves: Curves | null = null;
-  private readonly motion: Record<"q" | "time" | "t" | "point" | "pass" | "kind", ArrayLike<number>> | null;
-  private readonly near: Record<"time" | "distance" | "pair" | "points", ArrayLike<number>> | null;
+  private readonly motion: Unpacking<NonNullable<Page["motion"]>> | null;
+  private readonly near: Unpacking<NonNullable<Page["clearance"]>> | null;
+  private readonly lines = new Map<number, HTMLElement>(); // of the program, by the move they end
+  private now: HTMLElement | undefined;
   private time = 0;
   private playing = 0; // when the last picture was made; 0 at rest
 
   constructor(private readonly page: Page, private readonly block: Block) {
     const { motion, clearance: near } = page;
-    const unpack = (packed: Page["points"] & object) => Object.fromEntries(Object.entries(packed).filter(([, value]) => !Array.isArray(value)).map(([name, value]) => [name, block.array(value)]));
-    this.motion = motion && (unpack(motion as never) as never);
-    this.near = near && (unpack(near as never) as never);
+    this.motion = motion && block.all(motion);
+    this.near = near && block.all(near);
     this.view = this.open();
     this.chart = page.field === null ? null : new ContactChart(page, block, (cell) => this.showCell(cell), tell);
     if (this.motion !== null) this.connectPlayer();
     this.connectControls();
+    this.listProgram();
     for (const [id, mark] of Object.entries(page.marks)) {
       for (const row of document.querySelectorAll(`[data-mark="${id}"]`)) row.addEventListener("click", () => this.showMark(mark));
     }
@@ -50,6 +46,7 @@ class Viewer {
   show(shown: Shown): void {
     const { page, view } = this;
     this.shown = shown;
+    if (shown.time === null) this.stop();
     this.chart?.cursor(shown.point, shown.t);
     this.curves?.cursor(shown.time);
     write("posture", shown.text);
@@ -63,9 +60,10 @@ class Viewer {
     if (element<HTMLInputElement>("section").checked) view.show("section", true);
   }
 
-  showTime(time: number): void {
+  showTime(time: number, playing = false): void {
     const { motion, page } = this;
     if (motion === null) return;
+    if (!playing) this.stop();
     this.time = Math.max(0, Math.min(time, this.end));
     const move = Math.max(1, after(motion.time, this.time));
     const length = motion.time[move] - motion.time[move - 1];
@@ -87,6 +85,35 @@ class Viewer {
     let last = move - 1;
     while (last > 0 && Number.isNaN(motion.point[last])) last--;
     this.view?.ground(onWheel ? point : motion.point[last]);
+    this.tellLine(move);
+  }
+
+  private listProgram(): void {
+    const { page: { program }, block } = this;
+    if (program === null) return;
+    const lines = block.array(program.lines);
+    program.texts.forEach((packed, file) => {
+      const rows = block.text(packed).split(/\r?\n/).map((text) => Object.assign(document.createElement("span"), { textContent: `${text}\n` }));
+      for (let k = 0; k < lines.length; k += 3) {
+        const [row, move] = [rows[lines[k + 1] - 1], lines[k + 2]];
+        if (lines[k] !== file || row === undefined) continue;
+        row.className = "move";
+        row.addEventListener("click", () => this.motion !== null && this.showTime(this.motion.time[move]));
+        this.lines.set(move, row);
+      }
+      element(`program-${file}`).replaceChildren(...rows);
+    });
+  }
+
+  // The line of the program that is being played, marked and in sight.
+  private tellLine(move: number): void {
+    while (move > 0 && !this.lines.has(move)) move--;
+    const line = this.lines.get(move);
+    if (line === this.now) return;
+    this.now?.classList.remove("now");
+    this.now = line;
+    line?.classList.add("now");
+    if (line?.parentElement) line.parentElement.scrollTop = line.offsetTop - line.parentElement.offsetTop - 100;
   }
 
   // The clearance at the moment of its measure nearest to this one, and its line in the view.
@@ -101,13 +128,11 @@ class Viewer {
   }
 
   private showCell(cell: Cell): void {
-    this.stop();
     const missing = cell.q === null ? "; the part is shown where it would have to be, the arm does not reach" : "";
     this.show({ q: cell.q, time: null, point: cell.point, t: cell.t, hit: cell.hit, text: cell.text + missing });
   }
 
   private showMark(mark: Mark): void {
-    this.stop();
     const { motion, chart } = this;
     if (mark.move !== undefined && motion !== null) this.showTime(motion.time[mark.move]);
     else if (mark.q !== undefined) this.show({ time: null, point: null, t: null, hit: [], ...mark, q: mark.q });
@@ -135,27 +160,16 @@ class Viewer {
   private connectPlayer(): void {
     const scrubber = element<HTMLInputElement>("time");
     scrubber.max = String(this.end);
-    scrubber.addEventListener("input", () => this.goTo(Number(scrubber.value)));
-    const turn = () => (this.playing ? this.stop() : this.play());
-    element<HTMLElement>("play").addEventListener("click", turn);
-    document.addEventListener("keydown", (event) => {
-      if (event.key !== " " || event.target !== document.body) return;
-      event.preventDefault();
-      turn();
-    });
+    scrubber.addEventListener("input", () => this.showTime(Number(scrubber.value)));
+    element("play").addEventListener("click", () => (this.playing ? this.stop() : this.play()));
     const choice = element<HTMLSelectElement>("curves-of");
     const draw = () => {
       const panels = this.page.curves[choice.value];
-      this.curves = new Curves(element<HTMLElement>("curves"), panels, this.end, this.block, (time) => this.goTo(time), tell);
+      this.curves = new Curves(element("curves"), panels, this.end, this.block, (time) => this.showTime(time), tell);
       this.curves.cursor(this.shown?.time ?? null);
     };
     choice.addEventListener("change", draw);
     draw();
-  }
-
-  private goTo(time: number): void {
-    this.stop();
-    this.showTime(time);
   }
 
   private play(): void {
@@ -166,7 +180,7 @@ class Viewer {
       if (!this.playing) return;
       const next = this.time + (Math.max(0, now - this.playing) / 1000) * SPEEDS[Number(element<HTMLInputElement>("speed").value)];
       this.playing = now;
-      this.showTime(next);
+      this.showTime(next, true);
       if (next < this.end) requestAnimationFrame(step);
       else this.stop();
     };
@@ -180,50 +194,43 @@ class Viewer {
 
   private connectControls(): void {
     const speed = element<HTMLInputElement>("speed");
-    const told = () => write("speed-text", `${SPEEDS[Number(speed.value)]} x`);
-    speed.addEventListener("input", told);
-    told();
+    speed.addEventListener("input", () => write("speed-text", `${SPEEDS[Number(speed.value)]} x`));
     const look = element<HTMLSelectElement>("look");
     look.addEventListener("change", () => this.view?.look(look.value));
-    for (const what of ["section", "frames", "surroundings"] as const) {
+    for (const what of ["section", "frames", "surroundings", "robot"] as const) {
       const box = element<HTMLInputElement>(what);
       box.addEventListener("change", () => this.view?.show(what, box.checked));
     }
     element<HTMLInputElement>("line").addEventListener("change", () => this.shown?.time != null && this.showTime(this.time));
+    element("save").addEventListener("click", async () => {
+      const saved = await this.view?.save();
+      const link = { href: URL.createObjectURL(saved ?? new Blob()), download: `${this.page.name}.glb` };
+      Object.assign(document.createElement("a"), link).click();
+    });
     const paint = element<HTMLSelectElement>("paint");
     paint.addEventListener("change", () => this.paintPasses(paint.value));
     this.paintPasses(paint.value);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-      this.view?.recolour();
-      this.chart?.drawCells();
-    });
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.view?.recolour());
   }
 
   // Colours along the passes in the view, with a scale beside it.
   private paintPasses(what: string): void {
     const paint = this.page.paints[what];
-    element<HTMLElement>("scale").hidden = paint === undefined;
-    if (paint === undefined) return this.view?.colourPasses(null);
-    const values = this.block.array(paint.values);
-    let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
-    for (const value of values) if (!Number.isNaN(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
-    const colours = new Float32Array(3 * values.length).fill(0.5);
-    values.forEach((value: number, k: number) => !Number.isNaN(value) && colours.set(scaleColour((value - low) / (high - low || 1)), 3 * k));
-    write("scale-low", low > high ? "" : low.toFixed(2));
-    write("scale-high", low > high ? "not known" : `${high.toFixed(2)} ${paint.unit}`);
-    return this.view?.colourPasses(colours);
+    element("scale").hidden = paint === undefined;
+    write("scale-low", paint?.low ?? "");
+    write("scale-high", paint?.high ?? "");
+    this.view?.colourPasses(paint === undefined ? null : Float32Array.from(this.block.array(paint.colours), (value) => value / 255));
   }
 }
 
-const write = (id: string, text: string) => {
-  element<HTMLElement>(id).textContent = text;
-};
+const write = (id: string, text: string) => Object.assign(element(id), { textContent: text });
 const tell = (text: string) => write("hover", text);
 
 async function start(): Promise<void> {
-  const page: Page = JSON.parse(element<HTMLElement>("page-data").textContent ?? "");
-  const block = await Block.inflate((element<HTMLElement>("page-block").textContent ?? "").trim());
+  const page: Page = JSON.parse(element("page-data").textContent ?? "");
+  const block = await Block.inflate((element("page-block").textContent ?? "").trim());
   Object.assign(window, { opl: new Viewer(page, block) }); // for whoever asks at the console, as tests do
+  document.body.classList.add("ready");
 }
 
 start().catch((error) => {

@@ -1,0 +1,84 @@
+"""Where along a wall the robot surely collides, whatever the posture within the pads of a cell.
+
+A cell counts as forbidden only if at its middle bodies are nearer than allowed by more than any
+point of them can move within the cell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from opl.cell.collision import CollisionScene
+from opl.geometry.frames import Array
+from opl.planning.cut_cells import halved
+from opl.planning.images import Images
+from opl.search.walls import Piece
+
+MOVED = np.array([0.0, 0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064])  # [m] within a cell
+
+
+class Obstructions:
+    """Leaves out of walls where the robot collides.
+
+    Args:
+        collision: The scene; motions that come nearer than its clearances do not count.
+        images: The images of each posture: those with the wrist flipped are looked at as well.
+    """
+
+    def __init__(self, collision: CollisionScene, images: Images) -> None:
+        self._levers = collision.levers()
+        self._scenes = [collision.less(moved) for moved in MOVED]
+        self._flips = images.flips
+
+    def clear(self, piece: Piece) -> list[Piece]:
+        """Return what is left of a piece."""
+        pads = np.maximum(piece.pad_high, -piece.pad_low)
+        step = np.diff(piece.corners, axis=0)
+
+        def surely(_: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
+            cell = ((low + high) / 2.0).astype(int)
+            away = ((low + high) / 2.0 - cell)[:, None]
+            q = piece.corners[cell] + step[cell] * away
+            turned = np.abs(step[cell]) * (high - low)[:, None] / 2.0 + pads[cell]
+            return self._collide(q, turned @ self._levers)
+
+        n = len(pads)
+        first = np.arange(n, dtype=float)
+        _, low, high, cuts = halved(np.zeros(n, dtype=int), first, first + 1.0, surely)
+        if not cuts.any():
+            return [piece]
+        cell = ((low + high) / 2.0).astype(int)
+        ends = np.append(low, high[-1])
+        places = np.arange(n + 1)
+        corners = np.stack([np.interp(ends, places, joint) for joint in piece.corners.T], axis=1)
+        at = np.interp(ends, places, piece.at)
+        finer = Piece(
+            piece.family, piece.line, at, corners, piece.pad_low[cell], piece.pad_high[cell]
+        )
+        breaks = np.flatnonzero(np.diff(cuts)) + 1
+        starts = [0, *breaks.tolist()]
+        return [
+            finer.part(start, end)
+            for start, end in zip(starts, [*starts[1:], len(cuts)], strict=True)
+            if not cuts[start]
+        ]
+
+    def _collide(self, q: Array, moved: Array) -> tuple[np.ndarray, np.ndarray]:
+        """Return where postures collide however they move, and where they do as they are.
+
+        Args:
+            q: In [rad], shape (n, 6).
+            moved: How far any point can move in [m], shape (n,).
+        """
+        surely, near = np.ones(len(q), dtype=bool), np.ones(len(q), dtype=bool)
+        less = np.searchsorted(MOVED, moved)
+        for sign, shift in self._flips:
+            flipped = q * sign + shift
+            now = np.flatnonzero(near)
+            near[now] = self._scenes[0].collides(flipped[now])
+            surely &= near
+            for level, scene in enumerate(self._scenes):
+                now = np.flatnonzero(surely & (less == level))
+                surely[now] = scene.collides(flipped[now])
+            surely[less == len(MOVED)] = False
+        return surely, near & (moved < MOVED[-1] * len(MOVED))
