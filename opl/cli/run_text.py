@@ -162,6 +162,11 @@ def _times(report: opl.Report, robot: str) -> Iterator[str]:
             )
     elif feed is not None:
         yield f"feed: {feed.set_mm_s:g} mm/s all over"
+    if feed is not None:
+        yield (
+            "the belt is met and left in motion; speeds of neighbouring moves on the wheel and "
+            f"next to it differ by a factor of {feed.largest_speed_ratio:.2f} at most"
+        )
     if cycle is None:
         return
     waits = f", {cycle.waits_s:.1f} s waiting" if cycle.waits_s else ""

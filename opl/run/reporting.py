@@ -122,6 +122,7 @@ def _feed(planned: Planned) -> result.FeedReport:
         longest_dwell_s=0.0 if dwell is None else round(dwell.dwell, 3),
         longest_dwell_at=None if dwell is None or not dwell.dwell else round(dwell.dwell_at, 3),
         max_dwell_s=process.max_dwell,
+        largest_speed_ratio=round(planned.timing.speed_ratio, 3),
     )
 
 

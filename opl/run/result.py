@@ -104,6 +104,7 @@ class FeedReport:
     longest_dwell_s: float
     longest_dwell_at: float | None
     max_dwell_s: float
+    largest_speed_ratio: float  # of neighbouring moves of a pass and its leads
 
 
 @dataclass(frozen=True)
