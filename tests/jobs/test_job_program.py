@@ -29,7 +29,8 @@ def settings(tmp_path, text, robot=ROBOT):
     path.write_text(text)
     source = Source.of_file(path)
     section = read(path, ProgramSection)
-    return section.in_si(source, "SAMPLE", section.robot_as_counted(source, robot), HOME)
+    counted = section.robot_as_counted(source, robot)
+    return section.in_si(source, "SAMPLE", counted, HOME, np.eye(4))
 
 
 def test_nothing_asked_for_is_a_pulse_job_of_joint_moves(tmp_path):
