@@ -102,7 +102,9 @@ def test_the_good_job_has_its_files_and_the_impossible_one_its_page_only(mixed):
     made = {
         path.name: sorted(file.name for file in path.iterdir())
         for path in (home / "made").iterdir()
+        if path.is_dir()
     }
+    assert "TROUGH/report.html" in (home / "made" / "report.html").read_text(encoding="utf-8")
     assert made == {
         "GOOD": [
             "GOOD.JBI",
