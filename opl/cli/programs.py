@@ -66,7 +66,8 @@ def verify(job: Path, programs: tuple[Path, ...], as_json: bool, quiet: bool) ->
     if as_json:
         click.echo(opl.to_json(proof.report))
     elif not quiet:
-        show_proof(proof.report, loaded.cell.robot.title)
+        robot = loaded.cell.robot
+        show_proof(proof.report, robot.title, robot.joint_names)
     if not proof.proven:
         raise opl.UnsafeError("\n".join(["not proven", *map(str, proof.findings)]))
 

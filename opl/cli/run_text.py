@@ -84,6 +84,7 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
     yield f"search with its collision checks: {spent:.2f} s"
     if found is not None:
         yield f"verified in {_REPLAYED.format(**vars(found))}"
+        yield from _extremes(vars(found), job.cell.robot.joint_names)
         if found.file is not None and found.file.proven:
             yield (
                 f"read back from {', '.join(found.file.files)}: {found.file.postures} "
@@ -161,6 +162,11 @@ def _times(report: opl.Report, robot: str) -> Iterator[str]:
             )
     elif feed is not None:
         yield f"feed: {feed.set_mm_s:g} mm/s all over"
+    if feed is not None:
+        yield (
+            "the belt is met and left in motion; speeds of neighbouring moves on the wheel and "
+            f"next to it differ by a factor of {feed.largest_speed_ratio:.2f} at most"
+        )
     if cycle is None:
         return
     waits = f", {cycle.waits_s:.1f} s waiting" if cycle.waits_s else ""
@@ -193,12 +199,35 @@ def _parts(report: opl.Report) -> Iterator[str]:
         yield f"  {_PARTS[one.part].format(one.pass_)}: {one.seconds:.2f} s of the cycle"
 
 
-def show_proof(report: Mapping[str, Any], robot: str) -> None:
+def _extremes(found: Mapping[str, Any], joint_names: Sequence[str]) -> Iterator[str]:
+    """Yield where the replay came nearest to what must not be."""
+    amounts = {
+        "smallest clearance": ("min_clearance_at", f"{found['min_clearance_mm']:.2f} mm"),
+        "largest contact error": (
+            "max_contact_error_at",
+            f"{found['max_contact_error_mm']:.3f} mm",
+        ),
+        "deepest in the belt": (
+            "max_belt_penetration_at",
+            f"{found['max_belt_penetration_mm']:.3f} mm of "
+            f"{found['allowed_belt_penetration_mm']:g} mm allowed",
+        ),
+    }
+    for what, (key, amount) in amounts.items():
+        place = found[key]
+        if place is not None:
+            joints = zip(joint_names, place.joints_deg, strict=True)
+            angles = " ".join(f"{name} {angle:.1f}" for name, angle in joints)
+            yield f"  {what}: {amount}, {place.subject}, {place.place}, at {angles} deg"
+
+
+def show_proof(report: Mapping[str, Any], robot: str, joint_names: Sequence[str]) -> None:
     """Print what was proven of a program, or how far the proof came.
 
     Args:
         report: What was found out.
         robot: The robot, for people.
+        joint_names: Of the robot.
     """
     lines = [f"read {path}" for path in report["files"]]
     lines += [f"calls {name}, which was not looked at" for name in report["calls_not_looked_at"]]
@@ -208,6 +237,7 @@ def show_proof(report: Mapping[str, Any], robot: str) -> None:
             f"{report['cutter_points_ground']} of {report['cutter_points']} cutter points "
             f"recognised in order, {report['passes']} passes",
             f"replayed in {_REPLAYED.format(**report)}",
+            *_extremes(report, joint_names),
         ]
     lines += _caution(report["unverified_pulse_ratios"], robot, "the proof rests on them")
     if report["as_written"] is None:

@@ -60,15 +60,15 @@ def _first_moves(job: Job, playback: Playback, reader: Reader) -> Iterator[Findi
 def _rounded_ends(
     job: Job, motion: Motion, playback: Playback, reader: Reader
 ) -> Iterator[Finding]:
-    """Look at how far corners may be rounded, and for stops in a pass: there the belt digs in."""
-    corners, stops = reader.corners(job.program), motion.ends_phase
+    """Look at how far corners may be rounded, and for stops on the wheel: the belt digs in."""
+    corners, stops = reader.corners(job.program), motion.ends_phase & ~motion.on_wheel
     runs_on = corners.on_wheel.size > 0.0
     for k, move in enumerate(playback.moves):
         limit = corners.stop if stops[k] else corners.of(Purpose.of(motion.phase[k]))
         if move.corner.size > limit.size * (1.0 + ROUND_OFF):
             message = f"must be {limit.text} at most, got {move.corner.text}"
             yield _error("level", f"{motion.place(k)} ({move.place})", message)
-        if move.corner.exact_stop and runs_on and motion.on_wheel[k] and not stops[k]:
+        if move.corner.exact_stop and runs_on and motion.on_wheel[k]:
             message = f"stops on the wheel: {move.corner.text}"
             yield _error("level", f"{motion.place(k)} ({move.place})", message)
 

@@ -16,6 +16,7 @@ from opl.proof.read_back import FileProof
 from opl.run import result
 from opl.run.result import Report
 from opl.run.values import Planned, Prepared, Proven, Refused, Written
+from opl.verification.extremes import Extreme
 from opl.verification.replay import Verification
 from opl.version import VERSION
 
@@ -121,6 +122,7 @@ def _feed(planned: Planned) -> result.FeedReport:
         longest_dwell_s=0.0 if dwell is None else round(dwell.dwell, 3),
         longest_dwell_at=None if dwell is None or not dwell.dwell else round(dwell.dwell_at, 3),
         max_dwell_s=process.max_dwell,
+        largest_speed_ratio=round(planned.timing.speed_ratio, 3),
     )
 
 
@@ -187,7 +189,16 @@ def replay_report(found: Verification, proof: FileProof | None) -> result.Verifi
             round(proof.largest_difference * MM, 4),
             proof.replayed,
         ),
+        0.0 if found.deepest is None else round(found.deepest.amount * MM, 3),
+        round(found.allowed_penetration * MM, 3),
+        *map(_place, (found.nearest, found.worst_contact, found.deepest)),
     )
+
+
+def _place(one: Extreme | None) -> result.PlaceReport | None:
+    if one is None:
+        return None
+    return result.PlaceReport(one.subject, one.place, np.rad2deg(one.q).round(3).tolist())
 
 
 def _program(written: Written) -> result.ProgramReport:

@@ -104,6 +104,7 @@ class FeedReport:
     longest_dwell_s: float
     longest_dwell_at: float | None
     max_dwell_s: float
+    largest_speed_ratio: float  # of neighbouring moves of a pass and its leads
 
 
 @dataclass(frozen=True)
@@ -143,6 +144,15 @@ class FileReport:
 
 
 @dataclass(frozen=True)
+class PlaceReport:
+    """Where something is least or largest."""
+
+    subject: str  # the pair of bodies
+    place: str  # pass and cutter point, or which move
+    joints_deg: Sequence[float]
+
+
+@dataclass(frozen=True)
 class VerificationReport:
     """What the replay found."""
 
@@ -153,6 +163,11 @@ class VerificationReport:
     max_contact_error_mm: float
     limit_violations: int
     file: FileReport | None  # None if nothing was read back
+    max_belt_penetration_mm: float  # deepest that the part was in the belt
+    allowed_belt_penetration_mm: float
+    min_clearance_at: PlaceReport | None  # None if it is the farthest that is measured
+    max_contact_error_at: PlaceReport | None
+    max_belt_penetration_at: PlaceReport | None
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion, MoveKind, TimedMotion, VerifiedMotion
+from opl.verification.extremes import Extreme, Least
 from opl.verification.kinematic_checks import limit_findings, missing_points
 from opl.verification.world import World
 
@@ -49,13 +50,18 @@ class Verification:
         engine: The software that replayed the motion.
         poses: Number of poses checked.
         collisions: Number of poses in which some pair was too near.
-        min_clearance: Smallest distance of any pair that needs clearance in [m], part on wheel
-            aside; `HORIZON` if nothing came nearer than that.
+        min_clearance: Smallest distance of any pair that counts in [m], links of the arm among
+            themselves included, part on wheel aside; `HORIZON` if nothing came nearer than that.
         max_contact_error: Largest distance of the ground point from the wheel's surface in [m].
         limit_violations: Number of configurations beyond a joint limit or moves beyond a joint
             speed.
         findings: What is wrong, worst of each kind and place.
         verified: The motion with its clearances, or None if anything is wrong.
+        nearest: Where the smallest distance was, None if that is `HORIZON`.
+        worst_contact: Where the largest contact error was, None without contact.
+        deepest: Where the part was deepest in the belt, None if it never was. On the wheel the
+            distance of solids is known to `GAP_ACCURACY`.
+        allowed_penetration: How deep it may be in [m].
     """
 
     engine: str
@@ -66,6 +72,10 @@ class Verification:
     limit_violations: int
     findings: tuple[Finding, ...]
     verified: VerifiedMotion | None
+    nearest: Extreme | None = None
+    worst_contact: Extreme | None = None
+    deepest: Extreme | None = None
+    allowed_penetration: float = 0.0
 
 
 def replay(
@@ -101,10 +111,14 @@ def replay(
         poses=run.poses,
         collisions=run.collisions,
         min_clearance=float(min(HORIZON, np.min(run.clearance))),
-        max_contact_error=run.max_contact_error,
+        max_contact_error=max(0.0, -run.contact.amount),
         limit_violations=len(limits),
         findings=findings,
         verified=None if findings else VerifiedMotion(timed, run.clearance),
+        nearest=run.nearest.found(),
+        worst_contact=run.contact.found(-1.0),
+        deepest=run.gap.found(-1.0),
+        allowed_penetration=cell.max_belt_penetration,
     )
 
 
@@ -121,7 +135,9 @@ class _Run:
     ) -> None:
         self.poses = 0
         self.collisions = 0
-        self.max_contact_error = 0.0
+        self.nearest = Least(motion, HORIZON)
+        self.contact = Least(motion, 0.0)  # of the negative errors
+        self.gap = Least(motion, 0.0)  # between part and wheel where they may touch
         # the worst finding of each kind, place and subject, and by how much it is wrong
         self.worst: dict[tuple[str, str, int, str], tuple[float, Finding]] = {}
         # of the move that ends at each configuration
@@ -179,18 +195,19 @@ class _Run:
         # nearest first: it leaves the least to measure of the others
         for k in self._apart.argsort(kind="stable"):
             pair = self._pairs[k]
-            wanted = max(pair.clearance, self.clearance[move] if pair.clearance > 0.0 else 0.0)
+            wanted = max(pair.clearance, self.clearance[move] if pair.counts else 0.0)
             if self._apart[k] > wanted:
                 continue
             within = wanted + AHEAD
             distance = self._world.distance(pair.first, pair.second, within + pair.rounding)
             distance -= pair.rounding
             self._apart[k] = min(distance, within)
-            if pair.clearance > 0.0:
+            names = f"{pair.first.name} and {pair.second.name}"
+            if pair.counts:
                 self.clearance[move] = min(self.clearance[move], distance)
+                self.nearest.note(distance, names, move, q)
             if distance < pair.clearance or distance <= 0.0:
                 hit = True
-                names = f"{pair.first.name} and {pair.second.name}"
                 self._too_near(move, names, distance, pair.clearance)
         hit |= self._check_wheel(move)
         self.collisions += hit
@@ -205,6 +222,8 @@ class _Run:
         needed = off_wheel if free else -cell.max_belt_penetration
         farthest = self._allowed_error + GAP_ACCURACY if grinding and not touching_down else np.inf
         gap = self._world.gap(farthest if farthest < np.inf else max(needed, 0.0))
+        if not free:
+            self.gap.note(gap, f"{PART} and {WHEEL}", move, self._q)
         if gap < needed:
             self._too_near(move, f"{PART} and {WHEEL}", gap, needed)
             return True
@@ -231,7 +250,7 @@ class _Run:
         after = min(before + 1, len(points) - 1)
         point = points[before] + (place - before) * (points[after] - points[before])
         error = abs(self._world.distance_to_wheel(transform(T_base_workpiece, point)))
-        self.max_contact_error = max(self.max_contact_error, error)
+        self.contact.note(-error, "ground point", move, self._q)
         if error > self._allowed_error:
             self._contact_lost(move, error, "ground point")
 

@@ -57,6 +57,14 @@ class SolidPair:
     clearance: float
     rounding: float = 0.0
 
+    @property
+    def counts(self) -> bool:
+        """Whether its distance counts as a clearance, beyond that the two must not touch.
+
+        Solids of the arm with one or two joints between them are near each other by their build.
+        """
+        return self.clearance > 0.0 or abs(self.first.moved_by - self.second.moved_by) > 2
+
     def moved_by(self, joint: int) -> bool:
         """Return whether a joint moves one of them against the other."""
         less, more = sorted((self.first.moved_by, self.second.moved_by))

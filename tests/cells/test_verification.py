@@ -11,11 +11,12 @@ import pytest
 import opl
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import part_tree, signed_wheel_distance
 from opl.findings import Level
 from opl.geometry.frames import pose
 from opl.geometry.shapes import Body, Cylinder
 from opl.motion.motion import MoveKind, TimedMotion, VerifiedMotion
-from opl.verification.replay import HORIZON, STEP, TURN, replay
+from opl.verification.replay import GAP_ACCURACY, HORIZON, STEP, TURN, replay
 from opl.verification.world import World
 from tests.support.bare_cells import (
     NO_POINTS,
@@ -196,6 +197,22 @@ def test_the_v_motion_is_proven():
     assert verification.max_contact_error <= v_job().search.max_contact_error
     assert verification.min_clearance >= v_job().cell.required_clearance
     assert verification.engine.startswith("PyBullet ")
+
+
+def test_every_extreme_names_its_pair_its_place_and_its_joints():
+    found, cell = replay_tiny(), tiny_problem().cell
+    assert found.nearest.amount == found.min_clearance
+    assert found.worst_contact.amount == found.max_contact_error
+    assert "cutter point" in found.worst_contact.place
+    assert " and " in found.nearest.subject and found.deepest.subject == "part and wheel"
+    assert (found.nearest.q >= cell.robot.lower).all()
+    # the closed form sees the same depth there, and nowhere more
+    Ts_base_flange = forward_kinematics(cell.robot, np.vstack([found.deepest.q, tiny_motion().q]))
+    Ts_contact0_workpiece = cell.Ts_contact0_workpiece(Ts_base_flange)
+    exact = signed_wheel_distance(part_tree(cell.part), cell.wheel, Ts_contact0_workpiece, 0.1)
+    assert found.deepest.amount == pytest.approx(-exact[0], abs=GAP_ACCURACY)
+    assert -exact.min() <= found.deepest.amount + GAP_ACCURACY
+    assert found.allowed_penetration == cell.max_belt_penetration >= found.deepest.amount
 
 
 def test_the_verified_motion_is_the_motion_with_its_clearances():

@@ -12,6 +12,8 @@ from opl.program.inform import TEMPLATE
 from opl.proof.digest import other_inputs
 from opl.proof.events import event_findings, expected_events, name_findings
 from opl.proof.prove import prove
+from tests.attacks.faults import KINDS
+from tests.attacks.inject import case_of, outcome
 from tests.support.small_programs import ARMS, small_program
 
 # how each language writes what is asked for, and what is not
@@ -205,3 +207,20 @@ def test_labels_differ_by_their_places_not_by_their_numbers():
     assert meanings(one) != meanings(["*WAIT7", "JUMP *WAIT1 IF IN#(3)=OFF"])
     assert meanings(["LBL[4]", "JMP LBL[6]"]) == meanings(["LBL[1]", "JMP LBL[3]"])
     assert meanings(["TIMER T=0.50"]) == meanings(["TIMER  T=0.5"]) != meanings(["TIMER T=5.0"])
+
+
+# a sample of the attacks; `python -m tests.attacks.inject` makes all of them
+
+
+def test_a_sample_of_all_kinds_of_faults_is_caught(program):
+    first = list(ARMS).index(controller(program))
+    case = case_of(program)
+    for kind in list(KINDS.values())[first::71]:
+        found = outcome(kind, program, case)
+        assert not found.bad, f"{kind.name}: {found}"
+
+
+def test_the_attacks_put_a_program_together_as_it_was(program):
+    case = case_of(program)
+    assert case.render(case.script) == program.text
+    assert sum(not kind.harmless for kind in KINDS.values()) >= 100

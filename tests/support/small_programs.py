@@ -1,13 +1,21 @@
 """Small programs in every language, with actions around their passes, planned and proven once.
 
-Two short rows of the V part from a home near the wheel, on an arm of the language's maker.
+Two short rows of the V part from a home near the wheel, on an arm of the language's maker; rows of
+the S part; and of a bar with an arched top, which is no part that comes with opl.
 """
 
+import copy
+import runpy
+import shutil
 import tempfile
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import yaml
+
+from opl.files.digests import digest
+from opl.files.resources import folder
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job, load_job
 from opl.motion.motion import Motion
@@ -18,6 +26,7 @@ from opl.run.surfacing import cut_surface
 from opl.run.values import Written
 from tests.support.jobs import GONE, write_job
 
+EXAMPLE = Path(__file__).parents[2] / "examples" / "03_surface_from_python.py"
 # robot and home in [deg]
 ARMS = {
     "DX200": ("mh24", (20, -30, -55, -5, 48, 120)),
@@ -40,6 +49,19 @@ ACTIONS = {
     "program.after_pass": [{"output": 12, "state": False}, {"wait_input": 4, "state": False}],
     "program.at_end": [{"output": 5, "state": False}, {"call": "PARK"}],
 }
+# of the S part instead of the V part
+S_PART = {
+    "passes.end_margin_mm": 40,
+    "search.contact_positions": 45,
+    "process.approach_mm": 20,
+    "process.home_deg": [25, -20, -66, 84, -85, -69],
+}
+# what attacks take: a controller, and a part
+PROGRAMS = {
+    **{name: {"controller": name} for name in ARMS},
+    "S part": {"controller": "DX200", "part": "s_shape"},
+    "arch": {"controller": "DX200", "part": "arch"},
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +83,11 @@ class SmallProgram:
     text: str
 
     @property
+    def digest(self) -> str:
+        """Digest of its file."""
+        return digest(self.text.encode("ascii"))
+
+    @property
     def motion(self) -> Motion:
         """The proven configurations that are written, one for each move."""
         rows = [move.motion_index for move in self.run.program.moves]
@@ -72,31 +99,18 @@ class SmallProgram:
         return reader_of(self.job).read(files, self.job.cell.robot, self.job.program)
 
 
-def small_program(controller, changes=()):
-    """Return the small program of a controller, its job changed by values of dotted key paths."""
-    return _made(controller, tuple(dict(changes).items()))
+def small_program(controller, part="v_shape"):
+    """Return the small program of a controller: of a part that comes with opl, or ``arch``."""
+    return _made(controller, part)
 
 
 @cache
-def _made(controller, changes):
-    robot, home = ARMS[controller]
-    keys = {
-        "robot": robot,
-        "search.method": "recursive",
-        "passes.rows": 2,
-        "passes.end_margin_mm": 70,
-        "process.home_deg": list(home),
-        "program.controller": controller,
-        **ACTIONS,
-        **dict(changes),
-    }
-    if controller != "DX200":
-        keys["program.accept_unverified_pulses"] = GONE
+def _made(controller, part):
     drawn = stages.draw_charts
     stages.draw_charts = lambda planned: {}  # pictures take longer than all the rest
     try:
         with tempfile.TemporaryDirectory() as folder:
-            job = load_job(write_job(Path(folder), keys))
+            job = _arch() if part == "arch" else _shipped(controller, part, Path(folder))
             run = run_job(job)
     finally:
         stages.draw_charts = drawn
@@ -104,3 +118,43 @@ def _made(controller, changes):
     suffix = reader_of(job).suffix
     ((name, text),) = ((n, t) for n, t in run.files.items() if n.endswith(suffix))
     return SmallProgram(job, cut_surface(job).points, run, name, text)
+
+
+def _shipped(controller, part, home):
+    robot, home_deg = ARMS[controller]
+    keys = {
+        "robot": robot,
+        "search.method": "recursive",
+        "passes.rows": 2,
+        "passes.end_margin_mm": 75,
+        "passes.max_step_mm": 12,
+        "passes.max_chord_error_mm": 0.05,
+        "search.max_contact_error_mm": 0.1,
+        "wheel.max_belt_penetration_mm": 0.5,
+        "process.home_deg": list(home_deg),
+        "program.controller": controller,
+        **ACTIONS,
+    }
+    if controller != "DX200":
+        keys["program.accept_unverified_pulses"] = GONE
+    if part == "v_shape":
+        return load_job(write_job(home, keys))
+    shutil.copytree(folder("workpieces") / part, home, dirs_exist_ok=True)
+    content = yaml.safe_load((home / "job.yaml").read_text())
+    for path, value in {**keys, **S_PART}.items():
+        section, key = path.split(".") if "." in path else (None, path)
+        (content if section is None else content[section])[key] = value
+    (home / "job.yaml").write_text(yaml.safe_dump(content))
+    return load_job(home / "job.yaml")
+
+
+def _arch():
+    """Return the job of the example with a surface from Python, with the actions of the others."""
+    example = runpy.run_path(str(EXAMPLE))
+    content = copy.deepcopy(example["JOB"])
+    content["passes"].update(end_margin_mm=25, max_chord_error_mm=0.05)
+    content["search"]["max_contact_error_mm"] = 0.1
+    content["search"]["method"] = "recursive"
+    for path, value in ACTIONS.items():
+        content["program"][path.split(".")[1]] = value
+    return load_job(content, surface=example["arched_top"](), part=example["bar"]())

@@ -1,0 +1,192 @@
+"""Puts every kind of fault into small programs of every language and says what became of it.
+
+    python -m tests.attacks.inject [--write docs/faults.md] [PROGRAM ...]
+
+A fault is caught if the program is refused or not proven. It is looked for as `opl verify` looks
+without a result.json, and never with one: beside its result every changed byte is found, as is a
+byte changed in a program that still holds the digest of itself; both are asserted for every fault.
+Ends with status 1 if a fault is missed that is not below what is resolved, or if what does no harm
+is refused.
+"""
+
+import argparse
+import sys
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import opl.proof.prove as proving
+from opl.cell.robot import forward_kinematics
+from opl.errors import OplError
+from opl.files.digests import keeps_stamp
+from opl.geometry.frames import transform
+from opl.proof.digest import changed_since
+from opl.proof.prove import prove
+from opl.verification.replay import Verification
+from tests.attacks.faults import KINDS, Case
+from tests.support.small_programs import PROGRAMS, small_program
+
+# what a fault may do and not be seen: the part of a millimetre that a ground point is elsewhere,
+# and the part of a time that a move or a pass takes more or less
+CONTACT = 1e-4  # [m]
+PLACE = 2.5e-4  # [m] along the pass, between two cutter points, at a contact that is kept
+SPEED = 0.02  # of a pass
+WORDS = ("caught", "below", "missed", "proven", "refused", "-")
+NOTHING = Verification("", 0, 0, 0.0, 0.0, 0, (), None)
+
+
+INTRODUCTION = """# Faults that are caught, and what cannot be
+
+Written by `python -m tests.attacks.inject --write docs/faults.md`, which puts each of these faults
+into small programs of every language, as somebody with an editor would, and holds the file against
+its job as `opl verify` does. DX200 to URSCRIPT are rows of the V part on an arm of the maker, then
+rows of the S part, and of a bar that does not come with opl.
+
+- **caught** (by what): refused, or not proven. **-**: the language has no place for it.
+- **below**: what it does is less than is resolved, so the program is proven as it stands: the
+  contact stays within the limit of the job (0.1 mm here), a ground point that is no cutter point
+  is less than 0.25 mm from where it was along its pass, or the time of a pass is within 2 %, that
+  of a move within its last digit and 0.25 mm of the feed (where joints limit it, 1.3 times).
+- **proven**: it does no harm, and must be proven.
+
+All of this is without `result.json`. Beside the `result.json` of its run every changed byte is
+refused, and a program tells by the digest in it that it was changed; both are asserted for every
+fault here.
+
+What no file can tell: whether the wheel, the part and the tool of the cell are where the job says,
+whether pulse ratios are those of the arm, what the controller does in corners beyond the limits
+given, what programs do that are called and are the user's own, and what a person changes at the
+pendant after the program was verified. Nobody has proven the move to the first configuration.
+"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a fault: one of `WORDS`, and by what or how much."""
+
+    word: str
+    why: str = ""
+
+    @property
+    def bad(self):
+        return self.word in ("missed", "refused")
+
+    def __str__(self):
+        return f"{self.word}: {self.why}" if self.why else self.word
+
+
+def case_of(program):
+    motion = program.motion
+    labels = [kind.name for kind in motion.kind]
+    return Case(program.job.program.controller, program.text, labels, list(motion.pass_index))
+
+
+def findings_of(program, text):
+    """Return the kinds of what is found, the cheap half of the proof first."""
+    files = {program.name: text.encode("utf-8")}
+    real = proving.replay
+    proving.replay = lambda *arguments: NOTHING
+    try:
+        found = prove(program.job, program.points, files).findings
+    except OplError as error:
+        return ["refused"], str(error)
+    finally:
+        proving.replay = real
+    found = found or prove(program.job, program.points, files).findings
+    return [one.kind for one in found], str(found[0]) if found else ""
+
+
+def outcome(kind, program, case):
+    """Return what becomes of a kind of fault in a program."""
+    text = kind.apply(case)
+    if text is None or text == program.text:
+        return Outcome("-")
+    content = text.encode("utf-8")
+    assert changed_since(program.name, content, [program.digest]), kind.name
+    assert keeps_stamp(content) is not True, kind.name
+    kinds, first = findings_of(program, text)
+    if kind.harmless:
+        return Outcome("refused", first) if kinds else Outcome("proven")
+    if kinds:
+        return Outcome("caught", ", ".join(dict.fromkeys(kinds)))
+    return _missed(program, text)
+
+
+def _missed(program, text):
+    """Say by how much a program that is proven differs from what was written."""
+    before, after = program.read(program.text).playback, program.read(text).playback
+    if len(before.stations) != len(after.stations):
+        return Outcome("missed", "other moves")
+    if len(before.q) != len(after.q):
+        return Outcome("below", "straight, and replayed so")
+    moved = _ground_points(program, after) - _ground_points(program, before)
+    far = float(np.linalg.norm(moved, axis=-1).max())
+    late = abs(after.duration.sum() - before.duration.sum())
+    slow = float(np.abs(after.duration - before.duration).max())
+    if far > 0.0:
+        why = f"{1e3 * far:.3f} mm"
+        return Outcome("below" if far < PLACE else "missed", why)
+    if slow > 0.0:
+        run = before.duration[program.motion.grinding].sum() / program.points.n_passes
+        why = f"{100.0 * late / run:.2f} % of a pass"
+        return Outcome("below" if late <= SPEED * run else "missed", why)
+    return Outcome("missed", "nothing that moves")
+
+
+def _ground_points(program, playback):
+    """Return where the cutter points of the moves on the wheel are, shape (n, 3)."""
+    motion, points = program.motion, program.points.Ts_workpiece_cutter[:, :3, 3]
+    rows = np.flatnonzero(motion.on_wheel)
+    cell = program.job.cell
+    Ts = forward_kinematics(cell.robot, playback.q[playback.stations][rows])
+    nearest = points[np.clip(np.round(motion.cutter_point[rows]).astype(int), 0, len(points) - 1)]
+    return transform((Ts @ cell.T_flange_workpiece)[:, None], nearest[:, None])[:, 0]
+
+
+def outcomes_in(name):
+    """Return what becomes of each kind of fault in a program, by the name of the kind."""
+    program = small_program(**PROGRAMS[name])
+    case = case_of(program)
+    found = {kind.name: outcome(kind, program, case) for kind in KINDS.values()}
+    for kind, one in found.items():
+        if one.bad:
+            print(f"{name}: {kind}: {one}", flush=True)
+    return found
+
+
+def page(found):
+    """Return the table as Markdown, given the outcomes of each program by the name of the kind."""
+    words = Counter(one.word for own in found.values() for one in own.values())
+    total = ", ".join(f"{words[word]} {word}" for word in WORDS if words[word])
+    kinds = sum(not kind.harmless for kind in KINDS.values())
+    lines = [INTRODUCTION, f"{kinds} kinds of faults, put into {len(found)} programs: {total}."]
+    group = None
+    for kind in KINDS.values():
+        if kind.group != group:
+            group = kind.group
+            lines += ["", f"## {group.capitalize()}", ""]
+            lines += [f"| fault | {' | '.join(found)} |", "|---" * (len(found) + 1) + "|"]
+        cells = (str(own[kind.name]) for own in found.values())
+        lines.append(f"| {kind.name} | {' | '.join(cells)} |")
+    return "\n".join([*lines, ""])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--write", type=Path, help="write the table as Markdown")
+    parser.add_argument("programs", nargs="*", help=f"of {', '.join(PROGRAMS)}")
+    arguments = parser.parse_args()
+    found = {}
+    for name in arguments.programs or PROGRAMS:
+        found[name] = outcomes_in(name)
+        words = Counter(one.word for one in found[name].values())
+        print(f"{name}: {', '.join(f'{words[word]} {word}' for word in WORDS)}", flush=True)
+        if arguments.write:
+            arguments.write.write_text(page(found), encoding="utf-8")
+    sys.exit(any(one.bad for own in found.values() for one in own.values()))
+
+
+if __name__ == "__main__":
+    main()
