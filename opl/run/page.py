@@ -141,6 +141,9 @@ def _marks(
     marks: dict[str, dict[str, object]] = {"home": {"q": home, "text": "home"}}
     if planned is not None:
         motion = planned.timing.timed.motion
+        for name, said, extreme in page_text.extremes(report):
+            q = np.deg2rad(extreme.joints_deg).tolist()
+            marks[name] = {"q": q, "text": said, "hit": extreme.subject.split(" and ")}
         for name, point in page_text.slow_marks(report):
             marks[name] = {"move": move_to(motion, point), "text": name}
         if isinstance(run, Refused) and isinstance(run.cause, Verification):

@@ -13,7 +13,7 @@ from opl.job.load import Job
 from opl.planning.survey import NodeState, NodeSurvey
 from opl.report.html import bars, bullets, section, table, text
 from opl.run.descriptions import pendant_figures
-from opl.run.result import FiguresReport, Report
+from opl.run.result import FiguresReport, PlaceReport, Report
 from opl.run.values import Planned
 
 MM = 1e3
@@ -77,9 +77,11 @@ def files(report: Report) -> str:
 def tables(report: Report, job: Job, planned: Planned | None) -> str:
     """Return the comparison, the cycle, slow stretches, and what is typed in at the controller."""
     names = job.cell.robot.joint_names
+    extreme = extremes(report)
     return section(
         "figures",
         "Figures",
+        bullets([said for _, said, _ in extreme], [mark for mark, _, _ in extreme]),
         _comparison(report, names),
         "" if report.path is None else bullets(_certified(report)),
         _cycle(report),
@@ -113,6 +115,25 @@ def legend(survey: NodeSurvey) -> list[tuple[int, str, float]]:
         (code, state.value, float(counts[code] / survey.states.size))
         for code, state in enumerate(NodeState)
         if counts[code]
+    ]
+
+
+def extremes(report: Report) -> list[tuple[str, str, PlaceReport]]:
+    """Return marks, words and places of what the replay found least or largest."""
+    found = report.verification
+    if found is None:
+        return []
+    belt = f"deepest in the belt, {found.max_belt_penetration_mm:.3f} mm"
+    belt += f" of {found.allowed_belt_penetration_mm:g} mm allowed"
+    places = [
+        ("nearest", f"least clearance, {found.min_clearance_mm:.3f} mm", found.min_clearance_at),
+        ("off", f"contact error, {found.max_contact_error_mm:.4f} mm", found.max_contact_error_at),
+        ("deepest", belt, found.max_belt_penetration_at),
+    ]
+    return [
+        (mark, f"{said}: {place.subject}, {place.place}", place)
+        for mark, said, place in places
+        if place is not None
     ]
 
 
