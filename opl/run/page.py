@@ -16,7 +16,14 @@ from opl.report.html import bullets, page, section, text
 from opl.report.packing import Packer
 from opl.report.view_frame import BOXES, choice, hover, view_frame
 from opl.run import page_text
-from opl.run.page_data import blocked_place, move_to, moves_at, run_data
+from opl.run.page_data import (
+    blocked_place,
+    extremes,
+    move_to,
+    moves_at,
+    run_data,
+    slow_marks,
+)
 from opl.run.result import Report
 from opl.run.values import Planned, Prepared, Proven, Refused, Written
 from opl.verification.replay import Verification
@@ -141,10 +148,10 @@ def _marks(
     marks: dict[str, dict[str, object]] = {"home": {"q": home, "text": "home"}}
     if planned is not None:
         motion = planned.timing.timed.motion
-        for name, said, extreme in page_text.extremes(report):
+        for name, said, extreme in extremes(report):
             q = np.deg2rad(extreme.joints_deg).tolist()
             marks[name] = {"q": q, "text": said, "hit": extreme.subject.split(" and ")}
-        for name, point in page_text.slow_marks(report):
+        for name, point in slow_marks(report):
             marks[name] = {"move": move_to(motion, point), "text": name}
         if isinstance(run, Refused) and isinstance(run.cause, Verification):
             findings = run.cause.findings

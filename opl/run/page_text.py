@@ -13,7 +13,8 @@ from opl.job.load import Job
 from opl.planning.survey import NodeState, NodeSurvey
 from opl.report.html import bars, bullets, section, table, text
 from opl.run.descriptions import pendant_figures
-from opl.run.result import FiguresReport, PlaceReport, Report
+from opl.run.page_data import extremes, slow_marks
+from opl.run.result import FiguresReport, Report
 from opl.run.values import Planned
 
 MM = 1e3
@@ -116,31 +117,6 @@ def legend(survey: NodeSurvey) -> list[tuple[int, str, float]]:
         for code, state in enumerate(NodeState)
         if counts[code]
     ]
-
-
-def extremes(report: Report) -> list[tuple[str, str, PlaceReport]]:
-    """Return marks, words and places of what the replay found least or largest."""
-    found = report.verification
-    if found is None:
-        return []
-    belt = f"deepest in the belt, {found.max_belt_penetration_mm:.3f} mm"
-    belt += f" of {found.allowed_belt_penetration_mm:g} mm allowed"
-    places = [
-        ("nearest", f"least clearance, {found.min_clearance_mm:.3f} mm", found.min_clearance_at),
-        ("off", f"contact error, {found.max_contact_error_mm:.4f} mm", found.max_contact_error_at),
-        ("deepest", belt, found.max_belt_penetration_at),
-    ]
-    return [
-        (mark, f"{said}: {place.subject}, {place.place}", place)
-        for mark, said, place in places
-        if place is not None
-    ]
-
-
-def slow_marks(report: Report) -> list[tuple[str, float]]:
-    """Return the marks of the slow stretches and the cutter points they lead to."""
-    lowered = () if report.feed is None else report.feed.lowered
-    return [(f"slow-{k}", one.lowest_at) for k, one in enumerate(lowered)]
 
 
 def _proven(report: Report) -> Iterator[str]:
