@@ -149,7 +149,7 @@ def pretend(path, out):
     values = {
         "cutter_points": 7,
         "seconds": {"total": 1.25},
-        "path": made_of(PathReport, {"joint_range_sum_rad": 2.0}),
+        "path": made_of(PathReport, {"joint_ranges_rad": [0.5, 1.5], "joint_range_sum_rad": 2.0}),
     }
     return BatchRow(path, "ok", 0, out / path.stem, "", made_of(Report, values))
 
