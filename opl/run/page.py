@@ -115,9 +115,9 @@ def _curves_section() -> str:
 
 def _program(run: Written | Refused, packer: Packer) -> dict[str, object] | None:
     """Return the texts of a program, and the move that each of their lines ends."""
-    if not isinstance(run, Written) or run.read_back is None:
+    names = _listed(run)
+    if not names or not isinstance(run, Written) or run.read_back is None:
         return None
-    names = run.read_back.files
     by_source = {Path(name).stem: k for k, name in enumerate(names)}
     by_source |= {name: k for k, name in enumerate(names)}
     lines = []
@@ -130,14 +130,21 @@ def _program(run: Written | Refused, packer: Packer) -> dict[str, object] | None
 
 
 def _program_section(run: Written | Refused) -> str:
-    if not isinstance(run, Written) or run.read_back is None:
-        return ""
     listings = "".join(
         f'<h3>{text(name)}</h3><pre id="program-{k}" tabindex="0"></pre>'
-        for k, name in enumerate(run.read_back.files)
+        for k, name in enumerate(_listed(run))
     )
-    told = "<p>A click on the line of a move poses the robot at its end; what is played is marked."
-    return section("program", "Program", f"{told}</p>", listings)
+    if not listings:
+        return ""
+    told = "A click on the line of a move poses the robot at its end; what is played is marked."
+    return section("program", "Program", f"<p>{told}</p>", listings)
+
+
+def _listed(run: Written | Refused) -> list[str]:
+    """Return the names of the program files that were read back and are delivered."""
+    if not isinstance(run, Written) or run.read_back is None:
+        return []
+    return [name for name in run.read_back.files if name in run.files]
 
 
 def _marks(
