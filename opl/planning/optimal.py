@@ -1,9 +1,8 @@
 """The least joint range sum, proven for every contact position, and the motion that attains it.
 
 The proof works on boxes of joint space and few walls; a box that it proposes is held against all
-cutter points, and one that no posture of some cutter point lies in makes that cutter point a wall.
-In a box that misses none the smoothest motion is sought. The proof ends when nothing is left that
-could be smaller than the best motion by more than the gap.
+cutter points, and a cutter point that it misses becomes a wall. In a box that misses none the
+smoothest motion is sought, until nothing can be smaller than the best by more than the gap.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from opl.planning.box_track import BoxTracks
 from opl.planning.columns import ColumnWalls, Sweep
 from opl.planning.costs import CostWeights
 from opl.planning.families import Families, few_columns, grown
+from opl.planning.holders import Holder, holders
 from opl.planning.images import Images, seams_of
 from opl.planning.obstructed import Obstructions
 from opl.planning.plan import Plan
@@ -49,8 +49,7 @@ class OptimalSettings:
             smoother track.
         max_contact_change: Largest change of t between neighbouring columns in belt units.
         costs: What a track is charged for inside the box.
-        max_subproblems: How much is tried: subproblems of the proof, and places held against a
-            box, some of which cost as much as a subproblem.
+        max_subproblems: How much is tried: subproblems, and places held against a box.
     """
 
     widen: float
@@ -131,6 +130,10 @@ class OptimalSearch:
         """No motion has a smaller joint range sum, in [rad]."""
         return min(max(self._proven, self.proof.lower_bound), self._value)
 
+    def holders(self) -> tuple[Holder, ...]:
+        """Return what holds the least box over the walls up."""
+        return holders(self.proof.walls, self._walls.images.of, self._walls.finer, self._value)
+
     def step(self) -> None:
         """Work on one subproblem."""
         if self.proof.closed:
@@ -172,7 +175,6 @@ class OptimalSearch:
         elif candidate.bound < self.proof.closing and not self._sampler.collisions:
             self._mind_collisions()
         elif candidate.bound < self.proof.closing:
-            # the bound cannot rise further; the path may still come nearer to it
             self._given_up += 1
             self.proof.give_up()
 
@@ -250,10 +252,9 @@ class OptimalSearch:
                     more.append(np.array([(begin + stop) / 2.0]))
         for wall in self._walls.sweeps(walls) if walls else ():
             self.proof.add(wall)
-        grown = np.union1d(self._columns, np.round(np.concatenate(more), PLACE_DIGITS))
-        new = len(grown) > len(self._columns) or len(self._rows) > known or bool(walls)
-        self._columns = grown
-        return new
+        before = len(self._columns)
+        self._columns = np.union1d(self._columns, np.round(np.concatenate(more), PLACE_DIGITS))
+        return len(self._columns) > before or len(self._rows) > known or bool(walls)
 
     def _try(self, columns: Columns, rows: list[Row], box: JointBox) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
@@ -283,8 +284,7 @@ def plan_optimal(
     Args:
         problem: What is to be planned.
         settings: What is wanted.
-        fallback: The motion to return if no better one is found, if one is known. Joints and
-            contact should not travel further than along it.
+        fallback: A motion that is known, if one is: joints and contact should travel no further.
         report: Given how much of the work allowed is done, after every step; may raise.
 
     Returns:
@@ -296,5 +296,5 @@ def plan_optimal(
         report(min(search.work_share, 1.0))
     if search.plan is None:
         return None
-    bound, because = search.lower_bound, search.open_because
-    return replace(search.plan, lower_bound=bound, open_because=because)
+    bound, why, held = search.lower_bound, search.open_because, search.holders()
+    return replace(search.plan, lower_bound=bound, open_because=why, holders=held)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from opl.job.search import Method, Objective, Search
 from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.motion.short_ways import shortened
+from opl.planning.borders import Nameable, clear_of_borders
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import ObjectiveWeights
 from opl.planning.equals import quickest_of_equals
@@ -39,13 +40,17 @@ class FoundPaths:
 
 
 def search_path(
-    search: Search, problem: GrindingProblem, report: Callable[[float], None] = lambda _: None
+    search: Search,
+    problem: GrindingProblem,
+    nameable: Nameable | None = None,
+    report: Callable[[float], None] = lambda _: None,
 ) -> FoundPaths:
     """Search the path by the method and for the objective of a job.
 
     Args:
         search: What the job wants.
         problem: What is to be planned.
+        nameable: Which configurations the program names without doubt; None for all.
         report: Given how much of the work allowed is done, often; may raise.
 
     Raises:
@@ -58,17 +63,21 @@ def search_path(
             # what it proposes collides again and again: the proof knows better where not to look
             best = plan_optimal(problem, search.optimal, None, report)
             if best is not None:
-                return FoundPaths(_finished(search, problem, best), best)
+                return FoundPaths(_finished(search, problem, best, nameable), best)
     recursive = first.plan if isinstance(first, Found) else plan_recursive(problem, search.start)
     plan = recursive
     if search.method is Method.OPTIMAL:
         plan = _search_best(search, problem, recursive, report)
-    return FoundPaths(_finished(search, problem, plan), recursive)
+    return FoundPaths(_finished(search, problem, plan, nameable), recursive)
 
 
-def _finished(search: Search, problem: GrindingProblem, plan: Plan) -> Plan:
+def _finished(
+    search: Search, problem: GrindingProblem, plan: Plan, nameable: Nameable | None
+) -> Plan:
     """Return the quickest of the equals of a plan, its leads no longer than they need be."""
-    quickest = quickest_of_equals(problem, plan, search.counts_ranges)
+    quickest = quickest_of_equals(problem, plan, search.counts_ranges, nameable)
+    if nameable is not None:
+        quickest = clear_of_borders(problem, quickest, nameable)
     motion = shortened(quickest.motion, problem.scene.free_moves.joined)
     return replace(quickest, motion=motion)
 
