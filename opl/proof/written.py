@@ -15,10 +15,12 @@ from opl.motion.timing import time_motion
 from opl.program.moves import Purpose
 from opl.program.played import Playback
 from opl.program.posts import Reader
+from opl.program.settings import PositionForm
 from opl.proof.events import event_findings
 from opl.proof.speeds import speed_findings
 
 HOME_SLACK = 1e-4  # [rad] that the ends may be from home: a pulse or two
+CARRIED_HOME = np.deg2rad(5.0)  # the same where a user frame that is touched up takes home along
 ROUND_OFF = 1e-9  # of a number that was read from a file, as a fraction
 
 
@@ -42,7 +44,7 @@ def written_findings(
         *_rounded_ends(job, motion, playback, reader),
         *_ramps(job, motion, playback, reader),
         *event_findings(job, motion, playback),
-        *_ends_away_from_home(job, motion),
+        *_ends_away_from_home(job, motion, reader),
     ]
 
 
@@ -82,14 +84,18 @@ def _ramps(job: Job, motion: Motion, playback: Playback, reader: Reader) -> Iter
             yield _error("ramp", f"{motion.place(k)} ({move.place})", message)
 
 
-def _ends_away_from_home(job: Job, motion: Motion) -> Iterator[Finding]:
+def _ends_away_from_home(job: Job, motion: Motion, reader: Reader) -> Iterator[Finding]:
     names = job.cell.robot.joint_names
+    (home,) = reader.rounded(job.process.home[None], job.cell.robot, job.program)
+    # a user frame that was touched up takes home along
+    carried = job.program.positions is PositionForm.USER
+    slack = CARRIED_HOME if carried else HOME_SLACK
     for configuration, place in (
         (0, "free move from home"),
         (len(motion) - 1, "free move to home"),
     ):
-        away: Array = np.abs(motion.q[configuration] - job.process.home)
-        if away.max() > HOME_SLACK:
+        away: Array = np.abs(motion.q[configuration] - home)
+        if away.max() > slack:
             joint = int(away.argmax())
             message = f"{np.rad2deg(away[joint]):.3f} deg from home"
             yield _error("home", place, f"joint {names[joint]}: {message}")

@@ -330,7 +330,8 @@ def test_states_say_what_rules_a_node_out():
     q[6, 4, branch] = np.nan
     nodes = next(n for n in problem.field.matrices if n.ik_branch == branch and n.exists.any())
     column, row = np.argwhere(nodes.exists)[len(np.argwhere(nodes.exists)) // 2]
-    haunted = with_scene(problem, collision=Ghosts(nodes.q[column, row], radius=1e-3))
+    ghost = Ghosts(nodes.q[column, row], 1e-3, haunted=problem.scene.collision)
+    haunted = with_scene(problem, collision=ghost)
     changed = replace(haunted, wheel_distance=layer, field=replace(problem.field, q=q))
     states = survey_nodes(changed, branch, np.zeros(6)).states
     assert states.shape == layer.shape
