@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 import opl
+from opl.cli.bound_text import bound_lines
 from opl.cli.progress import STAGES
 
 FILE_WIDTH = 120  # columns
@@ -78,7 +79,7 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
         f"path: {report.cutter_points} cutter points in {report.passes} passes, "
         f"{path.intermediate_nodes} intermediate nodes, branch {path.branch}"
     )
-    yield from _certified(report)
+    yield from bound_lines(report)
     # the clearance layer is part of the collision checks
     spent = report.seconds["clearance"] + report.seconds["search"]
     yield f"search with its collision checks: {spent:.2f} s"
@@ -104,40 +105,6 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
             job.cell.robot.title,
             "compare a configuration at the pendant before playing",
         )
-
-
-# what every bound covers, and what it is not about
-COVERED = (
-    "at any contact positions, each pass on one IK branch and count of full turns (approach, links "
-    "and retract not counted)"
-)
-OBJECTIVES = {
-    "travel": ("joint travel", "{:.4f} rad"),
-    "time": ("time on the wheel", "{:.2f} s"),
-    "weighted": ("weighted sum", "{:.4f}"),
-}
-
-
-def _certified(report: opl.Report) -> Iterator[str]:
-    """Yield what the lower bounds say of the path."""
-    path = report.path
-    if path is None:
-        return
-    known = path.objective_value
-    if known is not None:
-        name, form = OBJECTIVES[path.objective]
-        yield (
-            f"no motion along these passes has a {name} below {form.format(known.lower_bound)}, "
-            f"{COVERED}: the one found has {form.format(known.value)}, at most "
-            f"{100.0 * known.gap:.1f} % of it too much"
-        )
-    bound, gap = path.lower_bound_rad, path.gap
-    if bound is None or gap is None:
-        return
-    yield (
-        f"no motion along these passes has a joint range sum below {bound:.4f} rad, "
-        f"{COVERED}: the one found is within {100.0 * gap:.3f} % of the least there is"
-    )
 
 
 def _times(report: opl.Report, robot: str) -> Iterator[str]:

@@ -61,6 +61,7 @@ def draw_charts(planned: Planned) -> Mapping[str, str]:
         pass_index=pass_index,
         flat_end=job.cell.wheel.flat_end,
         path=path,
+        held_at=[one.place for one in planned.plan.holders],
     )
     joints = joint_chart(
         title=f"{job.name}: joint angles along the path",
