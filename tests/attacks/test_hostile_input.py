@@ -6,6 +6,7 @@ import random
 import re
 import shutil
 import struct
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,8 @@ from opl.files.resources import folder
 from opl.program.layout import fill
 from tests.attacks.attacked import attacked
 from tests.conftest import GOLDEN
-from tests.support.jobs import V_SHAPE, document
+from tests.support.jobs import V_SHAPE, document, write_job
+from tests.support.jobs import opl as in_this_process
 
 SEED = 17
 LANGUAGES = {
@@ -25,6 +27,15 @@ LANGUAGES = {
     "src": "KRL/joint/SAMPLE.src", "LS": "FANUC/joint/SAMPLE.LS",
     "script": "URSCRIPT/joint/SAMPLE.script",
 }  # fmt: skip
+
+
+@pytest.fixture(scope="module", autouse=True)
+def loaded(tmp_path_factory):
+    """Load what commands use, once for all processes that are forked from this one."""
+    assert in_this_process("check", write_job(tmp_path_factory.mktemp("job"))).status == 0
+    assert in_this_process("show", GOLDEN / LANGUAGES["LS"]).status == 0
+    for name in ("opl.run.programs", "opl.cell.urdf_import"):
+        import_module(name)
 
 
 def opl(*arguments):
