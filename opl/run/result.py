@@ -116,7 +116,9 @@ class FeedReport:
     longest_dwell_s: float
     longest_dwell_at: float | None
     max_dwell_s: float
-    largest_speed_ratio: float  # of neighbouring moves of a pass and its leads
+    # of neighbouring moves of a pass and its leads, along the surface; a speed below a fifth of the
+    # feed counts as that, and not at all where pivoting alone makes it so slow
+    largest_speed_ratio: float
 
 
 @dataclass(frozen=True)

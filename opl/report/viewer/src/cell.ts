@@ -1,8 +1,8 @@
 // The cell in three dimensions: posed, looked at from somewhere, cut open, coloured.
 
 import {
-  AmbientLight, BoxGeometry, BufferAttribute, BufferGeometry, Color, CylinderGeometry, DirectionalLight, DoubleSide, EdgesGeometry, Group, Line,
-  LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial, PerspectiveCamera, Plane, Points, PointsMaterial, Scene,
+  AmbientLight, BoxGeometry, BufferAttribute, BufferGeometry, Color, CylinderGeometry, DirectionalLight, DoubleSide, EdgesGeometry, Group, Light, Line,
+  LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial, Object3D, PerspectiveCamera, Plane, Points, PointsMaterial, Scene,
   SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
@@ -155,10 +155,12 @@ export class CellView {
   // The cell as it is posed, as binary glTF.
   async save(): Promise<Blob> {
     const copy = this.scene.clone();
-    copy.remove(...copy.children.filter((child) => child instanceof AmbientLight)); // glTF has none
+    const left: Object3D[] = []; // what glTF has no words for
     copy.traverse((one) => {
       if (one instanceof Mesh) one.material = new MeshStandardMaterial({ color: one.material.color, opacity: one.material.opacity, transparent: one.material.transparent });
+      else if (one instanceof Light || one instanceof Line || one instanceof Points) left.push(one);
     });
+    for (const one of left) one.removeFromParent();
     return new Blob([(await new GLTFExporter().parseAsync(copy, { binary: true })) as ArrayBuffer], { type: "model/gltf-binary" });
   }
 
