@@ -107,6 +107,7 @@ class SearchSection(Document):
     }
     retired: ClassVar[Mapping[str, str]] = {
         "refine_tolerance_percent": "the search finds contact positions between the given ones",
+        "seconds": "the search is bounded by counted work, see max_subproblems",
         "time_limit_s": "the search is bounded by counted work, see max_subproblems",
     }
 

@@ -46,8 +46,8 @@ class Plan:
         path: Configurations on the wheel.
         motion: The whole motion, free of collision as far as the planner knows.
         checks: How many motions were checked, this one included.
-        lower_bound: No motion through the cutter points has a smaller joint range sum, whatever the
-            contact positions, in [rad]; None if no bound was wanted.
+        lower_bound: No motion along the passes that keeps the clearances of the plan has a smaller
+            joint range sum, whatever the contact positions, in [rad]; None if no bound was wanted.
         open_because: Why the bound is further off than wanted, in words; None if it is not.
         objective: What was kept small, where that is not the joint range sum alone.
         holders: What keeps the joint range sum from being smaller, what could gain most first.
