@@ -44,6 +44,7 @@ Results
     `deliver`           `Run` -> program, table, pictures, page and ``result.json`` in a folder
     `run_page`          `Run` -> its page: HTML that opens from disk; `find_page` finds one
     `claim_folder`      keeps a folder for the run of one job, from before its work
+    `release_folders`   of this process, where a signal ends it
     `report_points`     `Surfaced` -> figures of its cutter points
     `points_files`      `Surfaced` -> table and picture of its cutter points, as texts
     `to_json`           any of these figures -> JSON text
@@ -94,6 +95,7 @@ if TYPE_CHECKING:
     from opl.errors import NoPathError as NoPathError
     from opl.errors import OplError as OplError
     from opl.errors import UnsafeError as UnsafeError
+    from opl.files.claiming import release_folders as release_folders
     from opl.files.claiming import write_files as write_files
     from opl.files.resources import start_job as start_job
     from opl.files.writing import check_folder as check_folder
@@ -160,7 +162,7 @@ _HOMES = {
     "opl.cell.robot_file": "read_robot_file",
     "opl.cell.urdf_import": "import_urdf",
     "opl.errors": "Cancelled InputError NoFreeMoveError NoPathError OplError UnsafeError",
-    "opl.files.claiming": "write_files",
+    "opl.files.claiming": "release_folders write_files",
     "opl.files.resources": "start_job",
     "opl.files.writing": "check_folder write_file",
     "opl.findings": "Finding",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from opl.cli.programs import show, templates, verify
 from opl.cli.progress import progress_bar
 from opl.cli.robots import robots
 from opl.cli.run_text import show_batch, show_run
+from opl.cli.stopping import STATUS, Stopped, stopped_at_once, stopped_by_raising
 
 METHODS = ("recursive", "optimal")
 
@@ -25,7 +27,8 @@ class _Group(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
+            with stopped_at_once():
+                return super().invoke(ctx)
         except opl.OplError as error:
             click.echo("error: " + str(error).replace("\n", "\n  "), err=True)
             sys.exit(error.exit_status)
@@ -125,7 +128,8 @@ def batch(
 ) -> None:
     """Run many jobs in worker processes; a folder means every job file in it.
 
-    Ends with a table, and with a status other than 0 if any job failed.
+    Ends with a table, and with a status other than 0 if any job failed. Stopped by Ctrl-C or
+    SIGTERM, the table has the jobs that ended.
 
     Example: opl batch workpieces --out programs --workers 2
     """
@@ -133,18 +137,35 @@ def batch(
     opl.check_folder(out)
     count = min(workers or os.cpu_count() or 1, len(jobs))
 
+    ended: list[opl.BatchRow] = []
+
     def done(row: opl.BatchRow) -> None:
+        ended.append(row)
         if not (quiet or as_json):
             click.echo(f"{row.status}: {row.job}", err=True)
 
-    rows = opl.run_batch(jobs, out, count, done)
+    run_batch = opl.run_batch  # loaded before signals raise
+    try:
+        with stopped_by_raising():
+            try:
+                rows = run_batch(jobs, out, count, done)
+            except Stopped:
+                _show_rows(ended, as_json)
+                raise
+    except Stopped:
+        click.echo(f"error: stopped; {len(jobs) - len(ended)} jobs have not ended", err=True)
+        sys.exit(STATUS)
     out.mkdir(parents=True, exist_ok=True)
     opl.write_file(out / "report.html", opl.batch_page(rows, out))
+    _show_rows(rows, as_json)
+    sys.exit(max(row.exit_status for row in rows))
+
+
+def _show_rows(rows: Sequence[opl.BatchRow], as_json: bool) -> None:
     if as_json:
         click.echo(opl.to_json(rows))
     else:
         show_batch(rows)
-    sys.exit(max(row.exit_status for row in rows))
 
 
 @main.command()

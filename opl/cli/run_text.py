@@ -12,7 +12,9 @@ from rich.table import Table
 from rich.text import Text
 
 import opl
+from opl.cli.bound_text import bound_lines
 from opl.cli.progress import STAGES
+from opl.cli.time_text import feed_and_cycle, parts_of_cycle
 
 FILE_WIDTH = 120  # columns
 
@@ -38,7 +40,7 @@ def show_run(report: opl.Report, job: opl.Job, written: Sequence[Path], verbose:
     if report.path is not None:
         lines += _facts(report, job)
     if verbose:
-        lines += _parts(report)
+        lines += parts_of_cycle(report)
         for stage, label in STAGES.items():
             if stage in report.seconds:
                 lines.append(f"  {label}: {report.seconds[stage]:.3f} s")
@@ -78,7 +80,7 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
         f"path: {report.cutter_points} cutter points in {report.passes} passes, "
         f"{path.intermediate_nodes} intermediate nodes, branch {path.branch}"
     )
-    yield from _certified(report)
+    yield from bound_lines(report)
     # the clearance layer is part of the collision checks
     spent = report.seconds["clearance"] + report.seconds["search"]
     yield f"search with its collision checks: {spent:.2f} s"
@@ -98,100 +100,12 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
             )
         worst = max((abs(one.error_percent) for one in program.passes), default=0.0)
         yield f"program: {program.moves} moves, passes within {worst:.2f} % of their time"
-        yield from _times(report, job.cell.robot.title)
+        yield from feed_and_cycle(report, job.cell.robot.title)
         yield from _caution(
             report.robot.unverified_pulse_ratios,
             job.cell.robot.title,
             "compare a configuration at the pendant before playing",
         )
-
-
-# what every bound covers, and what it is not about
-COVERED = (
-    "at any contact positions, each pass on one IK branch and count of full turns (approach, links "
-    "and retract not counted)"
-)
-OBJECTIVES = {
-    "travel": ("joint travel", "{:.4f} rad"),
-    "time": ("time on the wheel", "{:.2f} s"),
-    "weighted": ("weighted sum", "{:.4f}"),
-}
-
-
-def _certified(report: opl.Report) -> Iterator[str]:
-    """Yield what the lower bounds say of the path."""
-    path = report.path
-    if path is None:
-        return
-    known = path.objective_value
-    if known is not None:
-        name, form = OBJECTIVES[path.objective]
-        yield (
-            f"no motion along these passes has a {name} below {form.format(known.lower_bound)}, "
-            f"{COVERED}: the one found has {form.format(known.value)}, at most "
-            f"{100.0 * known.gap:.1f} % of it too much"
-        )
-    bound, gap = path.lower_bound_rad, path.gap
-    if bound is None or gap is None:
-        return
-    yield (
-        f"no motion along these passes has a joint range sum below {bound:.4f} rad, "
-        f"{COVERED}: the one found is within {100.0 * gap:.3f} % of the least there is"
-    )
-
-
-def _times(report: opl.Report, robot: str) -> Iterator[str]:
-    """Yield where the feed is not kept, and how long the program takes."""
-    feed, cycle = report.feed, report.cycle
-    if feed is not None and feed.lowered:
-        worst = min(feed.lowered, key=lambda one: one.lowest_mm_s)
-        why = ", ".join(
-            limit.kind if limit.joint is None else f"{limit.kind} of joint {limit.joint}"
-            for limit in worst.limits
-        )
-        yield (
-            f"feed: {feed.set_mm_s:g} mm/s, less on {len(feed.lowered)} stretches, which take "
-            f"{sum(one.longer_s for one in feed.lowered):.1f} s longer; {worst.lowest_mm_s:.1f} "
-            f"mm/s at the least, pass {worst.pass_} cutter points {worst.from_cutter_point:.1f} to "
-            f"{worst.to_cutter_point:.1f} ({why})"
-        )
-        if feed.longest_dwell_at is not None:
-            yield (
-                f"longest dwell on one spot: {feed.longest_dwell_s:.2f} s at cutter point "
-                f"{feed.longest_dwell_at:.1f}, {feed.max_dwell_s:g} s allowed"
-            )
-    elif feed is not None:
-        yield f"feed: {feed.set_mm_s:g} mm/s all over"
-    if cycle is None:
-        return
-    waits = f", {cycle.waits_s:.1f} s waiting" if cycle.waits_s else ""
-    open_end = "; and as long as inputs and other programs take" if cycle.open_ended else ""
-    yield (
-        f"cycle time: {cycle.total_s:.1f} s, of it {cycle.passes_s:.1f} s on the wheel, "
-        f"{cycle.approach_and_retract_s:.1f} s to it and away, {cycle.air_s:.1f} s in the air"
-        f"{waits}{open_end}"
-    )
-    if cycle.accelerations_assumed:
-        yield (
-            f"joint accelerations of {robot} are assumed, and these times with them; "
-            f"{opl.keys.PROCESS_MAX_ACCELERATION} knows better"
-        )
-
-
-_PARTS = {
-    "from_home": "from home to pass {}",
-    "approach": "approach of pass {}",
-    "pass": "pass {}",
-    "retract": "retract of pass {}",
-    "link": "link to pass {}",
-    "to_home": "to home",
-}
-
-
-def _parts(report: opl.Report) -> Iterator[str]:
-    """Yield how long each part of the cycle takes."""
-    for one in () if report.cycle is None else report.cycle.parts:
-        yield f"  {_PARTS[one.part].format(one.pass_)}: {one.seconds:.2f} s of the cycle"
 
 
 def _extremes(found: Mapping[str, Any], joint_names: Sequence[str]) -> Iterator[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import fcntl
 import os
-from collections.abc import Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +15,9 @@ from opl.files.switching import recover, switch
 from opl.files.writing import HIDDEN, check_folder, told
 
 LOCK = HIDDEN + "lock"
+
+# what this process holds: folders, and which of them were made for it, by the open lock
+_HELD: dict[int | None, tuple[Path, list[Path]]] = {}
 
 
 @dataclass(frozen=True)
@@ -72,15 +75,32 @@ def claimed(folder: Path) -> Iterator[Claim]:
             recover(place)
         except OSError as error:
             raise told(folder, error) from error
+        _HELD[lock] = (place, missing)
         yield Claim(folder, place)
     finally:
+        _HELD.pop(lock, None)
         if lock is not None:
-            with suppress(OSError):
-                (place / LOCK).unlink(missing_ok=True)
+            _unlock(place)
             os.close(lock)
-        for one in missing:
-            with suppress(OSError):  # it is not empty
-                one.rmdir()
+        _remove_empty(missing)
+
+
+def release_folders() -> None:
+    """Release all folders that this process holds, because it ends here and now."""
+    for place, missing in _HELD.values():
+        _unlock(place)
+        _remove_empty(missing)
+
+
+def _unlock(place: Path) -> None:
+    with suppress(OSError):
+        (place / LOCK).unlink(missing_ok=True)
+
+
+def _remove_empty(folders: Sequence[Path]) -> None:
+    for folder in folders:
+        with suppress(OSError):  # it is not empty
+            folder.rmdir()
 
 
 def write_files(folder: Path, texts: Mapping[str, str]) -> list[Path]:

@@ -170,11 +170,13 @@ def _read(path: Path) -> trimesh.Trimesh:
         mesh = trimesh.load_mesh(BytesIO(content), file_type=path.suffix.lower()[1:])
         if len(mesh.faces) > MOST_TRIANGLES:
             raise ValueError(f"has {len(mesh.faces)} triangles, at most {MOST_TRIANGLES} are taken")
+        if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
+            raise ValueError(f"its triangles name corners beyond its {len(mesh.vertices)}")
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
     # trimesh lets whatever its parsers stumble over through: ValueError, KeyError, struct.error ...
     except Exception as error:
         raise InputError(str(path), f"is not a mesh: {error}") from error
-    if mesh.is_empty:
+    if mesh.is_empty or not len(mesh.faces):
         raise InputError(str(path), "holds no triangles")
     if not np.isfinite(mesh.vertices).all():
         raise InputError(str(path), "has corners that are not finite")

@@ -58,6 +58,14 @@ class CutterPoints:
         """Return the number of passes."""
         return int(self.pass_index[-1]) + 1 if len(self) else 0
 
+    def direction_at(self, column: int) -> float:
+        """Return 1 if a pass runs along x of the cutter frame at a point, -1 if backwards."""
+        on_pass = np.flatnonzero(self.pass_index == self.pass_index[column])
+        before, after = max(column - 1, on_pass[0]), min(column + 1, on_pass[-1])
+        T = self.Ts_workpiece_cutter
+        along = (T[after, :3, 3] - T[before, :3, 3]) @ T[column, :3, 0]
+        return -1.0 if along < 0.0 else 1.0
+
     def frames_at(self, place: Array) -> Array:
         """Return cutter frames at fractional cutter points, shape (..., 4, 4)."""
         before = np.clip(place.astype(int), 0, len(self) - 1)

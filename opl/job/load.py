@@ -130,6 +130,7 @@ def _in_si(file: JobFile, source: Source, method: str | None,
     search = file.search.in_si(file.passes.max_chord_error_mm)
     if method is not None:
         search = replace(search, method=Method(method))
+    home = file.program.home_as_written(robot, around.home)
     return Job(
         source=source,
         name=file.name,
@@ -138,6 +139,6 @@ def _in_si(file: JobFile, source: Source, method: str | None,
         surface=surface,
         passes=file.passes.in_si(source, surface, cell.wheel.radius),
         search=search,
-        process=file.process.in_si(around.home),
-        program=file.program.in_si(source, file.name, robot, around.home),
+        process=file.process.in_si(home),
+        program=file.program.in_si(source, file.name, robot, home, cell.wheel.T_base_contact0),
     )

@@ -46,8 +46,21 @@ class ProcessSection(Document):
         description="0 for an approach straight along the contact normal; else the angle of an arc "
         "along the belt, from -y to +y of the contact frame.",
     )
+    approach_run_mm: Annotated[float, between(1.0, 1000.0)] = Field(
+        default=5.0,
+        description="How far the part moves on along the pass while it lifts off the wheel, in "
+        "feed, on a quarter of a circle of this radius; likewise before it touches. Half or a "
+        "quarter of it where that is not free. The belt never sees a stop.",
+    )
+    approach_slow_mm: Annotated[float, between(0.01, 2000.0)] = Field(
+        default=10.0,
+        description="Within this way of the contact approach_mm_s is kept; farther off the leads "
+        "are as fast as free moves.",
+    )
     approach_mm_s: Annotated[float, between(0.01, 10_000.0)] = Field(
-        default=50.0, description="Speed of approach and retract."
+        default=50.0,
+        description="Largest speed of approach and retract near the contact; the feed if that is "
+        "more. The belt is met and left at the feed.",
     )
     free_move_speed_percent: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
         default=10.0,
@@ -81,6 +94,8 @@ class ProcessSection(Document):
             feed=self.feed_mm_s * MM,
             approach_length=self.approach_mm * MM,
             approach_turn=float(np.deg2rad(self.approach_turn_deg)),
+            approach_run=self.approach_run_mm * MM,
+            approach_slow=self.approach_slow_mm * MM,
             approach_speed=self.approach_mm_s * MM,
             air_speed=self.free_move_speed_percent / 100.0,
             contact_speed=self.max_contact_speed,

@@ -21,10 +21,12 @@ from opl.job.refusals import keys_named
 from opl.job.source import Source
 from opl.program.actions import Actions
 from opl.program.export import try_out
+from opl.program.inform.cartesian import beside_half_turns
 from opl.program.posts import Post, find_post, known_posts
 from opl.program.ratios import with_ratios
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
 
+HOME_MARGIN = np.deg2rad(3.0)  # of home from half a turn, in a user frame
 _MAY_COUNT_PULSES = ("Yaskawa", "unknown")  # makers
 _YASKAWA_ONLY = (
     *("positions", "user_frame"),
@@ -70,13 +72,18 @@ class _UserFrame(Document):
 
     model_config = ConfigDict(title="User frame")
 
-    number: Annotated[int, between(1, 999)] = Field(description="Number of the user frame.")
-    T_base_user_mm: Matrix = Field(
-        description="Pose of the user frame in the robot's base frame, 4x4 with its origin in mm."
+    number: Annotated[int, between(1, 999)] = Field(
+        default=1, description="Number of the user frame."
+    )
+    T_base_user_mm: Matrix | None = Field(
+        default=None,
+        description="Pose of the user frame in the robot's base frame, 4x4 with its origin in mm; "
+        "else contact frame 0 of the wheel.",
     )
 
-    def in_si(self) -> UserFrame:
-        return UserFrame(self.number, pose_of(self.T_base_user_mm))
+    def in_si(self, T_base_contact0: Array) -> UserFrame:
+        given = self.T_base_user_mm
+        return UserFrame(self.number, T_base_contact0 if given is None else pose_of(given))
 
 
 class ProgramSection(Document):
@@ -109,7 +116,9 @@ class ProgramSection(Document):
         "For Yaskawa controllers.",
     )
     user_frame: _UserFrame | None = Field(
-        default=None, description="The frame of `positions: user`; needed there, and only there."
+        default=None,
+        description="The frame of `positions: user`, else user frame 1 at the wheel: touched up, "
+        "it takes the whole program along, home included.",
     )
     pulse_ratios: str | None = Field(
         default=None,
@@ -152,8 +161,8 @@ class ProgramSection(Document):
 
     @model_validator(mode="after")
     def _fits(self) -> ProgramSection:
-        if (self.positions == "user") != (self.user_frame is not None):
-            raise ValueError("user_frame goes with positions: user, and only there")
+        if self.positions != "user" and self.user_frame is not None:
+            raise ValueError("user_frame goes with positions: user only")
         cartesian = self.positions != "pulses" or self.motion == "straight"
         if cartesian and self.tool and self.T_flange_tool_mm is None:
             raise ValueError(
@@ -175,7 +184,20 @@ class ProgramSection(Document):
         except InputError as error:
             raise InputError(source.at(keys.PROGRAM_PULSE_RATIOS), str(error)) from error
 
-    def in_si(self, source: Source, name: str, robot: Robot, home: Array) -> ProgramSettings:
+    def home_as_written(self, robot: Robot, home: Array) -> Array:
+        """Return home as the program leads to it, joint positions in [rad], shape (6,).
+
+        In a user frame, R, T and S stand clear of half a turn: a frame that is touched up moves the
+        joints, and beyond it the same position is another one, a full turn away.
+        """
+        if self.positions != "user":
+            return home
+        clear: Array = beside_half_turns(home[None], robot, HOME_MARGIN, HOME_MARGIN)[0]
+        return clear
+
+    def in_si(
+        self, source: Source, name: str, robot: Robot, home: Array, T_base_contact0: Array
+    ) -> ProgramSettings:
         """Return the settings, tried out on a program that only goes home.
 
         Args:
@@ -183,6 +205,7 @@ class ProgramSection(Document):
             name: The program's name.
             robot: Whose program.
             home: Joint positions in [rad], shape (6,).
+            T_base_contact0: Contact frame 0 of the wheel, shape (4, 4).
 
         Raises:
             InputError: If something in it is unknown, or the controller does not take it.
@@ -193,7 +216,7 @@ class ProgramSection(Document):
                 if joint not in robot.joint_names:
                     known = ", ".join(robot.joint_names)
                     raise SettingError("accepted_pulses", f"no such joint {joint!r}; have: {known}")
-            settings = self._settings(source)
+            settings = self._settings(source, T_base_contact0)
             try:
                 try_out(name, home, robot, settings)
             except SettingError:
@@ -202,8 +225,11 @@ class ProgramSection(Document):
                 raise InputError(source.label, str(error)) from error
         return settings
 
-    def _settings(self, source: Source) -> ProgramSettings:
-        levels, frame, tool = self.position_levels, self.user_frame, self.T_flange_tool_mm
+    def _settings(self, source: Source, T_base_contact0: Array) -> ProgramSettings:
+        levels, tool = self.position_levels, self.T_flange_tool_mm
+        frame = (
+            (self.user_frame or _UserFrame.model_validate({})) if self.positions == "user" else None
+        )
         actions = (self.at_start, self.before_pass, self.after_pass, self.at_end)
         return ProgramSettings(
             controller=self.controller,
@@ -211,7 +237,7 @@ class ProgramSection(Document):
             T_flange_tool=np.eye(4) if tool is None else pose_of(tool),
             motion=MotionForm(self.motion),
             positions=PositionForm(self.positions),
-            user_frame=None if frame is None else frame.in_si(),
+            user_frame=None if frame is None else frame.in_si(T_base_contact0),
             levels=ByKind(levels.on_wheel, levels.lead, levels.free_move),
             acceleration=self.acceleration_percent.in_si(),
             deceleration=self.deceleration_percent.in_si(),

@@ -63,7 +63,7 @@ class SlowStretch:
 def slow_stretches(timing: Timing, process: ProcessSettings) -> tuple[SlowStretch, ...]:
     """Return the parts of the passes that are slower than the feed by a hundredth or more.
 
-    The ramps at both ends of a pass are not among them: the robot has to rest there.
+    The approaches and retracts are not among them.
     """
     slow = np.array([cause is not Cause.NONE for cause in timing.cause])
     index = timing.timed.motion.pass_index

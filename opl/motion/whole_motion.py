@@ -14,7 +14,6 @@ from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.free_move_search import BlockedMoveError, FreeMoveSearch
-from opl.motion.leads import lead_offsets
 from opl.motion.motion import Motion, MoveKind
 from opl.motion.path import GrindingPath
 from opl.motion.process_settings import ProcessSettings
@@ -49,24 +48,36 @@ class BlockedMotionError(Exception):
 
 
 def whole_motion(
-    cell: WorkCell, points: CutterPoints, path: GrindingPath, process: ProcessSettings
+    cell: WorkCell,
+    points: CutterPoints,
+    path: GrindingPath,
+    process: ProcessSettings,
+    runs: Array | None = None,
 ) -> Motion:
     """Join the passes of a path into one motion from home to home, its free moves straight.
+
+    Args:
+        cell: The cell.
+        points: The cutter points.
+        path: The path.
+        process: How the part comes to the wheel and leaves it.
+        runs: How far it moves on along each pass in its approach and retract in [m], shape
+            (n_passes, 2); as the process says by default.
 
     Raises:
         UnreachableApproachError: If an approach or retract leaves reach or limits.
     """
-
-    def lead_at(k: int, kind: MoveKind) -> Array:
-        column, t = int(path.cutter_point[k]), path.contact_position[k]
-        return lead(cell, points, process, kind, path.ik_branch, column, t, path.q[k])
+    if runs is None:
+        runs = np.full((points.n_passes, 2), process.approach_run)
 
     home = Motion.off_wheel(process.home[None], MoveKind.HOME, -1)
     parts = [home]
     for index in range(points.n_passes):
         on_pass = np.flatnonzero(path.pass_index == index)
-        lead_in = lead_at(on_pass[0], MoveKind.APPROACH)
-        lead_out = lead_at(on_pass[-1], MoveKind.RETRACT)
+        lead_in, lead_out = (
+            lead_at(cell, points, path, process, kind, index, run)
+            for kind, run in zip((MoveKind.APPROACH, MoveKind.RETRACT), runs[index], strict=True)
+        )
         free = MoveKind.HOME if index == 0 else MoveKind.LINK
         place = path.cutter_point[on_pass]
         parts += [
@@ -102,6 +113,26 @@ def linked(motion: Motion, search: FreeMoveSearch) -> Motion:
     return motion.with_inserted(before, np.concatenate(inserted)) if len(before) else motion
 
 
+def lead_at(
+    cell: WorkCell,
+    points: CutterPoints,
+    path: GrindingPath,
+    process: ProcessSettings,
+    kind: MoveKind,
+    pass_index: int,
+    run: float,
+) -> Array:
+    """Return an approach or retract of a path, as `lead` does; its run is in [m].
+
+    Raises:
+        UnreachableApproachError: If it leaves reach or limits.
+    """
+    on_pass = np.flatnonzero(path.pass_index == pass_index)
+    k = int(on_pass[0] if kind is MoveKind.APPROACH else on_pass[-1])
+    column, t = int(path.cutter_point[k]), float(path.contact_position[k])
+    return lead(cell, points, process, kind, path.ik_branch, column, t, path.q[k], run)
+
+
 def lead(
     cell: WorkCell,
     points: CutterPoints,
@@ -111,15 +142,17 @@ def lead(
     column: int,
     contact_position: float,
     q_contact: Array,
+    run: float | None = None,
 ) -> Array:
     """Return configurations from just off the wheel to the far end of a lead, shape (k, 6).
 
     `q_contact` in [rad], shape (6,), grinds the cutter point of the column at the contact position.
+    The part moves on along the pass by the run in [m], that of the process by default.
 
     Raises:
         UnreachableApproachError: If it leaves reach or limits.
     """
-    offsets = lead_offsets(process.approach_length, process.approach_turn, kind)
+    offsets = process.lead_shape(run).offsets(kind, points.direction_at(column))
     T_contact_away = np.tile(np.eye(4), (len(offsets), 1, 1))
     T_contact_away[:, :3, 3] = offsets
     T_base_contact = cell.wheel.T_base_contact(contact_position)

@@ -17,6 +17,7 @@ from opl.geometry.frames import Array
 from opl.motion.motion import Motion, Phase
 from opl.motion.path import GrindingPath
 from opl.motion.timing import air_seconds
+from opl.planning.borders import TOUCH_UP, Nameable
 from opl.planning.images import wrist_flips
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
@@ -52,32 +53,40 @@ class _Way:
         return self.near_limit, time, self.flip, turned, self.turns.ravel().tolist()
 
 
-def quickest_of_equals(problem: GrindingProblem, plan: Plan, keeps_ranges: bool) -> Plan:
+def quickest_of_equals(
+    problem: GrindingProblem, plan: Plan, keeps_ranges: bool, nameable: Nameable | None = None
+) -> Plan:
     """Return the plan with its motion made where the free moves take the least time.
 
     The motions compared have the same contact positions, joint travel, time on the wheel and, to
-    `SAME_SUM`, joint range sum. Those that keep `CLEAR_OF_LIMITS` come first; among these the time
-    of the free moves decides, as they lead around obstacles. Ties go to the fewest full turns.
+    `SAME_SUM`, joint range sum. Those whose configurations a program can name come first, then
+    those that keep `CLEAR_OF_LIMITS`; among these the time of the free moves decides, as they lead
+    around obstacles. Ties go to the fewest full turns.
 
     Args:
         problem: What was planned.
         plan: A plan whose motion is free.
         keeps_ranges: Whether the joint range sum counts; if not, each pass may have any count of
             full turns within the limits.
+        nameable: Which configurations the program names without doubt; None for all.
     """
-    best, least = plan, (True, np.inf)
-    ways = sorted(_ways(problem, plan, keeps_ranges), key=lambda way: way.rank)
-    for way in ways[:MOST_CHECKS]:
-        if (way.near_limit, way.seconds + SAME_TIME) > least:
-            break
+    best, least = plan, (len(plan.path.q) + 1, True, np.inf)
+    ways = []
+    for way in _ways(problem, plan, keeps_ranges):
         path = _image(problem, plan.path, way)
+        unnamed = 0 if nameable is None else int(np.count_nonzero(~nameable(path.q, TOUCH_UP)))
+        ways.append((unnamed, way.rank, way, path))
+    ways.sort(key=lambda item: item[:2])
+    for unnamed, _, way, path in ways[:MOST_CHECKS]:
+        if (unnamed, way.near_limit, way.seconds + SAME_TIME) > least:
+            break
         found = check_path(problem, path)
         if not isinstance(found, Free):
             continue
         seconds = air_seconds(found.motion, problem.cell.robot, problem.process)
-        if (way.near_limit, seconds + SAME_TIME) < least:
+        if (unnamed, way.near_limit, seconds + SAME_TIME) < least:
             best = replace(plan, path=path, motion=found.motion)
-            least = way.near_limit, seconds
+            least = unnamed, way.near_limit, seconds
     return best
 
 

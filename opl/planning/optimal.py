@@ -18,6 +18,7 @@ from opl.planning.box_track import BoxTracks, Bulges
 from opl.planning.columns import ColumnWalls, Sweep
 from opl.planning.costs import CostWeights
 from opl.planning.families import Families, Fit, Placement, grown
+from opl.planning.holders import Holder, holders
 from opl.planning.images import Images, seams_of
 from opl.planning.obstructed import Obstructions
 from opl.planning.plan import Plan
@@ -110,6 +111,10 @@ class OptimalSearch:
     def lower_bound(self) -> float:
         """No motion has a smaller joint range sum, in [rad]."""
         return min(max(self._proven, self.proof.lower_bound), self._value)
+
+    def holders(self) -> tuple[Holder, ...]:
+        """Return what holds the least box over the walls up."""
+        return holders(self.proof.walls, self._walls.images.of, self._walls.finer, self._value)
 
     def step(self) -> None:
         """Work on one subproblem."""
@@ -290,4 +295,4 @@ def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: 
     search = OptimalSearch(problem, settings, fallback)
     while not search.finished:
         search.step()
-    return replace(search.plan, lower_bound=search.lower_bound)
+    return replace(search.plan, lower_bound=search.lower_bound, holders=search.holders())

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
 from opl.planning.blocking import block
+from opl.planning.holders import Holder
 from opl.planning.open_matrix import OpenMatrix, Track
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import no_path
@@ -48,6 +49,7 @@ class Plan:
         lower_bound: No motion through the cutter points has a smaller joint range sum, whatever the
             contact positions, in [rad]; None if no bound was wanted.
         objective: What was kept small, where that is not the joint range sum alone.
+        holders: What keeps the joint range sum from being smaller, what could gain most first.
     """
 
     path: GrindingPath
@@ -55,6 +57,7 @@ class Plan:
     checks: int
     lower_bound: float | None = None
     objective: ObjectiveValue | None = None
+    holders: tuple[Holder, ...] = ()
 
     @property
     def gap(self) -> float | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.motion.collision_check import CollidingMove, colliding_moves
+from opl.motion.lead_runs import free_runs
 from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
 from opl.motion.whole_motion import (
@@ -70,8 +71,10 @@ def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -
 def check_path(problem: GrindingProblem, path: GrindingPath) -> Free | Blocked:
     """Return the motion of a path if it is free, else what blocks it."""
     scene = problem.scene
+    cell, points, process = scene.cell, problem.points, problem.process
+    runs = free_runs(cell, scene.collision, scene.part, points, path, process)
     try:
-        motion = whole_motion(scene.cell, problem.points, path, problem.process)
+        motion = whole_motion(cell, points, path, process, runs)
     except UnreachableApproachError as error:
         return NoMotion(error)
     faults = colliding_moves(scene.cell, scene.collision, scene.part, motion)

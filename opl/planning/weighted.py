@@ -81,7 +81,7 @@ def plan_weighted(
             for entry in sweeps[index].entries([widening]):
                 heapq.heappush(queue, entry)
     known = ObjectiveValue(value, min(lower_bound, value))
-    return replace(best, lower_bound=None, objective=known)
+    return replace(best, lower_bound=None, objective=known, holders=())
 
 
 @dataclass(frozen=True)

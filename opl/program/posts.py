@@ -19,6 +19,9 @@ from datetime import datetime
 from importlib.metadata import entry_points
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from opl.cell.robot import Robot
 from opl.errors import InputError, PassTimeError, SettingError
 from opl.geometry.frames import Array
@@ -65,6 +68,9 @@ class Reader:
         describe: Says in lines what a file does, given its name, content and robot.
         differences: Says in lines what one file does and another does not, given the name and
             content of both, and whose programs they are taken for.
+        nameable: Which configurations, shape (n, 6) in [rad], a program names without doubt, even
+            if joints were off by a margin in [rad].
+        companions: Names of files that lie beside a program and are read with it.
         ramps: What a kind of move says of speeding up and slowing down, see `ReadMove`.
     """
 
@@ -75,6 +81,10 @@ class Reader:
     corners: Callable[[ProgramSettings], Corners]
     describe: Callable[[str, bytes, Robot], list[str]]
     differences: Callable[[tuple[str, bytes], tuple[str, bytes], Robot], list[str]]
+    nameable: Callable[[Array, Robot, ProgramSettings, float], NDArray[np.bool_]] = (
+        lambda q, robot, settings, margin: np.ones(len(q), dtype=bool)
+    )
+    companions: tuple[str, ...] = ()
     ramps: Callable[[Purpose, ProgramSettings], str] = lambda kind, settings: ""
 
 

@@ -7,19 +7,24 @@ import numpy as np
 from opl.motion.motion import Motion, Phase
 from opl.program.actions import Action, Actions
 
-# Sharpest turn in joint space [rad] that a move off the wheel goes through without a stop. Rounding
+# Sharpest turn in joint space [rad] that a free move goes through without a stop. Rounding
 # a corner leaves the proven path by more, the sharper it is.
 MAX_BLENDED_TURN = np.deg2rad(10.0)
 
 
 def stops_at(motion: Motion) -> list[bool]:
-    """Return at which configurations, none like the one before it, the robot comes to rest."""
-    stops = motion.ends_phase
+    """Return at which configurations, none like the one before it, the robot comes to rest.
+
+    At both ends, where leads and free moves meet, and at sharp corners of free moves; on the wheel
+    and where it is met and left, never.
+    """
+    free, on_wheel = motion.free, motion.on_wheel
+    stops = motion.ends_phase & ~on_wheel
     stops[0] = True
     steps = np.diff(motion.q, axis=0)
     directions = steps / np.linalg.norm(steps, axis=1, keepdims=True)
     cos_turn = np.sum(directions[:-1] * directions[1:], axis=1)
-    stops[1:-1] |= ~motion.on_wheel[1:-1] & (cos_turn < np.cos(MAX_BLENDED_TURN))
+    stops[1:-1] |= free[1:-1] & free[2:] & (cos_turn < np.cos(MAX_BLENDED_TURN))
     return [bool(stop) for stop in stops]
 
 

@@ -82,6 +82,7 @@ def prove(
         search.interpolation.max_contact_step,
         job.process.approach_length,
         job.process.approach_turn,
+        job.process.approach_run,
     )
     found = recognise(job.cell, points, playback.q, playback.duration, playback.stations, rule)
     replayed = replay(job.cell, points, found.timed, search.max_contact_error, progress)

@@ -98,7 +98,9 @@ def read_back(
     if reader is None:
         return None
     files = {
-        name: text.encode("utf-8") for name, text in texts.items() if name.endswith(reader.suffix)
+        name: text.encode("utf-8")
+        for name, text in texts.items()
+        if name.endswith(reader.suffix) or name in reader.companions
     }
     reading = reader.read(files, job.cell.robot, job.program)
     playback, findings = reading.playback, reading.findings

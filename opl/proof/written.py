@@ -15,10 +15,12 @@ from opl.motion.timing import time_motion
 from opl.program.moves import Purpose
 from opl.program.played import Playback
 from opl.program.posts import Reader
+from opl.program.settings import PositionForm
 from opl.proof.events import event_findings
 from opl.proof.speeds import speed_findings
 
 HOME_SLACK = 1e-4  # [rad] that the ends may be from home: a pulse or two
+CARRIED_HOME = np.deg2rad(5.0)  # the same where a user frame that is touched up takes home along
 ROUND_OFF = 1e-9  # of a number that was read from a file, as a fraction
 
 
@@ -42,7 +44,7 @@ def written_findings(
         *_rounded_ends(job, motion, playback, reader),
         *_ramps(job, motion, playback, reader),
         *event_findings(job, motion, playback),
-        *_ends_away_from_home(job, motion),
+        *_ends_away_from_home(job, motion, reader),
     ]
 
 
@@ -60,15 +62,15 @@ def _first_moves(job: Job, playback: Playback, reader: Reader) -> Iterator[Findi
 def _rounded_ends(
     job: Job, motion: Motion, playback: Playback, reader: Reader
 ) -> Iterator[Finding]:
-    """Look at how far corners may be rounded, and for stops in a pass: there the belt digs in."""
-    corners, stops = reader.corners(job.program), motion.ends_phase
+    """Look at how far corners may be rounded, and for stops on the wheel: the belt digs in."""
+    corners, stops = reader.corners(job.program), motion.ends_phase & ~motion.on_wheel
     runs_on = corners.on_wheel.size > 0.0
     for k, move in enumerate(playback.moves):
         limit = corners.stop if stops[k] else corners.of(Purpose.of(motion.phase[k]))
         if move.corner.size > limit.size * (1.0 + ROUND_OFF):
             message = f"must be {limit.text} at most, got {move.corner.text}"
             yield _error("level", f"{motion.place(k)} ({move.place})", message)
-        if move.corner.exact_stop and runs_on and motion.on_wheel[k] and not stops[k]:
+        if move.corner.exact_stop and runs_on and motion.on_wheel[k]:
             message = f"stops on the wheel: {move.corner.text}"
             yield _error("level", f"{motion.place(k)} ({move.place})", message)
 
@@ -82,14 +84,18 @@ def _ramps(job: Job, motion: Motion, playback: Playback, reader: Reader) -> Iter
             yield _error("ramp", f"{motion.place(k)} ({move.place})", message)
 
 
-def _ends_away_from_home(job: Job, motion: Motion) -> Iterator[Finding]:
+def _ends_away_from_home(job: Job, motion: Motion, reader: Reader) -> Iterator[Finding]:
     names = job.cell.robot.joint_names
+    (home,) = reader.rounded(job.process.home[None], job.cell.robot, job.program)
+    # a user frame that was touched up takes home along
+    carried = job.program.positions is PositionForm.USER
+    slack = CARRIED_HOME if carried else HOME_SLACK
     for configuration, place in (
         (0, "free move from home"),
         (len(motion) - 1, "free move to home"),
     ):
-        away: Array = np.abs(motion.q[configuration] - job.process.home)
-        if away.max() > HOME_SLACK:
+        away: Array = np.abs(motion.q[configuration] - home)
+        if away.max() > slack:
             joint = int(away.argmax())
             message = f"{np.rad2deg(away[joint]):.3f} deg from home"
             yield _error("home", place, f"joint {names[joint]}: {message}")

@@ -33,6 +33,15 @@ from opl.report.canvas import (
 # one per state, free first; they differ in lightness too, for colour-blind eyes and grey printers
 STATE_COLOURS = ("#edf4ee", "#aeb5bb", "#f0da85", "#e2825c", "#8a5f9e", "#5fa3a3", "#3f4a54")
 FOUND: dict[str, Any] = {"color": "#0b4f8a", "linewidth": 2.4, "label": "found path"}
+HOLDS: dict[str, Any] = {
+    "color": FOUND["color"],
+    "marker": "o",
+    "markersize": 9.0,
+    "markerfacecolor": "white",
+    "markeredgewidth": 2.0,
+    "linestyle": "none",
+    "label": "holds the joint range sum up",
+}
 FIXED: dict[str, Any] = {
     "color": FAINT,
     "linewidth": 1.6,
@@ -57,6 +66,7 @@ def contact_chart(
     pass_index: np.ndarray,
     flat_end: float,
     path: GrindingPath,
+    held_at: Sequence[float] = (),
 ) -> str:
     """Draw what is free at every cutter point and contact position, and the path through it.
 
@@ -68,6 +78,7 @@ def contact_chart(
         pass_index: Pass of each cutter point, 0, 1, ..., shape (N,).
         flat_end: Contact position in belt units where the flat ends.
         path: The path found.
+        held_at: Cutter points that keep the joint range sum from being smaller.
 
     Returns:
         The picture as SVG text.
@@ -105,6 +116,10 @@ def contact_chart(
     axes.plot(*line, color="white", linewidth=2.0 * FOUND["linewidth"])
     axes.plot(*line, **FOUND, gid="found")
     handles.append(Line2D([], [], **FOUND))
+    if len(held_at):
+        at = np.interp(held_at, path.cutter_point, path.contact_position)
+        axes.plot(held_at, at, **HOLDS, gid="holds")
+        handles.append(Line2D([], [], **HOLDS))
     axes.set_ylim(bottom, top)
     axes.xaxis.set_major_locator(MaxNLocator(12, integer=True, min_n_ticks=1))
     axes.yaxis.set_major_locator(MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]))

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
+import signal
+import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from types import FrameType
+from typing import NoReturn
 
 from opl.cell.wheel_distance import use_threads
 from opl.errors import InputError, OplError
 from opl.files import documents
+from opl.files.apart import end_with_parent
+from opl.files.claiming import release_folders
 from opl.job import keys
 from opl.job.load import load_job
 from opl.run.delivery import claim_folder, deliver
@@ -21,6 +29,7 @@ from opl.run.result import Report
 from opl.run.stages import run_job
 from opl.run.values import Refused
 
+GRACE = 0.7  # [s] for workers to leave their folders in order
 BUG = 1  # exit status of a job that ended with an error that is not opl's own
 
 
@@ -112,17 +121,20 @@ def _rows(jobs: Sequence[Path], out: Path, workers: int) -> Iterator[BatchRow]:
     """Yield the row of each job as it ends."""
     bereft = []
     with _pool(workers) as pool:
-        waiting = {pool.submit(_run_one, job, out): job for job in jobs}
-        for future in as_completed(waiting):
-            try:
-                yield future.result()
-            except BrokenProcessPool:
-                bereft.append(waiting[future])
+        waiting = _submitted(pool, jobs, out)
+        with _ended_with(pool):
+            for future in as_completed(waiting):
+                try:
+                    yield future.result()
+                except BrokenProcessPool:
+                    bereft.append(waiting[future])
     # a worker that dies takes the pool with it; whose fault it was shows when each has its own
     for job in bereft:
         with _pool(1) as pool:
+            (alone,) = _submitted(pool, [job], out)
             try:
-                yield pool.submit(_run_one, job, out).result()
+                with _ended_with(pool):
+                    yield alone.result()
             except BrokenProcessPool:
                 yield _failed(job, "error", BUG, f"{job}: its worker process died")
 
@@ -130,7 +142,34 @@ def _rows(jobs: Sequence[Path], out: Path, workers: int) -> Iterator[BatchRow]:
 def _pool(workers: int) -> ProcessPoolExecutor:
     # spawned, not forked: the children of a process with threads would inherit their locks
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_one_thread)
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker)
+
+
+def _submitted(
+    pool: ProcessPoolExecutor, jobs: Sequence[Path], out: Path
+) -> dict[Future[BatchRow], Path]:
+    """Hand jobs to a pool, whose processes start with the first and leave Ctrl-C to this one."""
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        return {pool.submit(_run_one, job, out): job for job in jobs}
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+
+
+@contextmanager
+def _ended_with(pool: ProcessPoolExecutor) -> Iterator[None]:
+    """End the processes of a pool with whatever ends the work on it."""
+    try:
+        yield
+    except BaseException:
+        workers = list(pool._processes.values())  # they have no public name before Python 3.14
+        for worker in workers:
+            worker.terminate()
+        deadline = time.monotonic() + GRACE
+        for worker in workers:
+            worker.join(max(0.0, deadline - time.monotonic()))
+            worker.kill()
+        raise
 
 
 def _clashes(jobs: Sequence[Path]) -> dict[Path, BatchRow]:
@@ -150,8 +189,15 @@ def _clashes(jobs: Sequence[Path]) -> dict[Path, BatchRow]:
     return rows
 
 
-def _one_thread() -> None:
+def _start_worker() -> None:
+    signal.signal(signal.SIGTERM, _stop)
+    end_with_parent()
     use_threads(1)  # the processes share the cores
+
+
+def _stop(number: int, frame: FrameType | None) -> NoReturn:
+    release_folders()
+    os._exit(1)  # nothing is raised: libraries of C++ are on the way
 
 
 def _run_one(path: Path, out: Path) -> BatchRow:

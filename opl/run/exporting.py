@@ -6,10 +6,13 @@ import os
 from collections.abc import Mapping
 from datetime import datetime, timezone
 
+import numpy as np
+
 from opl.errors import InputError
 from opl.files.digests import STAMP, stamped
 from opl.geometry.frames import transform
 from opl.geometry.mesh import box_corners
+from opl.job.load import Job
 from opl.planning.survey import NodeState
 from opl.program.export import StraightLimit, export_program
 from opl.program.moves import Program
@@ -26,7 +29,7 @@ def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
     # what the proven path leaves of the allowed contact error
     left = job.search.max_contact_error - proven.verification.max_contact_error
     limit = StraightLimit(box_corners(vertices), left)
-    comments = ["OPL", inputs_mark(job.inputs), STAMP]
+    comments = ["OPL", inputs_mark(job.inputs), STAMP, *_home_moved(job)]
     program, files = export_program(
         proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), comments
     )
@@ -34,6 +37,16 @@ def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
     return program, {name: stamped(text) for name, text in files.items()} | {
         f"{job.name}_motion.json": trace
     }
+
+
+def _home_moved(job: Job) -> list[str]:
+    """Return the lines that tell a person where home is not that of the job."""
+    asked, given = np.rad2deg(job.around.home), np.rad2deg(job.process.home)
+    return [
+        f"HOME {name} {given[k]:.2f}, NOT {asked[k]:.2f}"
+        for k, name in enumerate(job.cell.robot.joint_names)
+        if given[k] != asked[k]
+    ]
 
 
 def draw_charts(planned: Planned) -> Mapping[str, str]:
@@ -48,6 +61,7 @@ def draw_charts(planned: Planned) -> Mapping[str, str]:
         pass_index=pass_index,
         flat_end=job.cell.wheel.flat_end,
         path=path,
+        held_at=[one.place for one in planned.plan.holders],
     )
     joints = joint_chart(
         title=f"{job.name}: joint angles along the path",

@@ -16,7 +16,14 @@ from opl.report.html import bullets, page, section, text
 from opl.report.packing import Packer
 from opl.report.view_frame import BOXES, choice, hover, view_frame
 from opl.run import page_text
-from opl.run.page_data import blocked_place, move_to, moves_at, run_data
+from opl.run.page_data import (
+    blocked_place,
+    extremes,
+    move_to,
+    moves_at,
+    run_data,
+    slow_marks,
+)
 from opl.run.result import Report
 from opl.run.values import Planned, Prepared, Proven, Refused, Written
 from opl.verification.replay import Verification
@@ -108,9 +115,9 @@ def _curves_section() -> str:
 
 def _program(run: Written | Refused, packer: Packer) -> dict[str, object] | None:
     """Return the texts of a program, and the move that each of their lines ends."""
-    if not isinstance(run, Written) or run.read_back is None:
+    names = _listed(run)
+    if not names or not isinstance(run, Written) or run.read_back is None:
         return None
-    names = run.read_back.files
     by_source = {Path(name).stem: k for k, name in enumerate(names)}
     by_source |= {name: k for k, name in enumerate(names)}
     lines = []
@@ -123,14 +130,21 @@ def _program(run: Written | Refused, packer: Packer) -> dict[str, object] | None
 
 
 def _program_section(run: Written | Refused) -> str:
-    if not isinstance(run, Written) or run.read_back is None:
-        return ""
     listings = "".join(
         f'<h3>{text(name)}</h3><pre id="program-{k}" tabindex="0"></pre>'
-        for k, name in enumerate(run.read_back.files)
+        for k, name in enumerate(_listed(run))
     )
-    told = "<p>A click on the line of a move poses the robot at its end; what is played is marked."
-    return section("program", "Program", f"{told}</p>", listings)
+    if not listings:
+        return ""
+    told = "A click on the line of a move poses the robot at its end; what is played is marked."
+    return section("program", "Program", f"<p>{told}</p>", listings)
+
+
+def _listed(run: Written | Refused) -> list[str]:
+    """Return the names of the program files that were read back and are delivered."""
+    if not isinstance(run, Written) or run.read_back is None:
+        return []
+    return [name for name in run.read_back.files if name in run.files]
 
 
 def _marks(
@@ -141,7 +155,10 @@ def _marks(
     marks: dict[str, dict[str, object]] = {"home": {"q": home, "text": "home"}}
     if planned is not None:
         motion = planned.timing.timed.motion
-        for name, point in page_text.slow_marks(report):
+        for name, said, extreme in extremes(report):
+            q = np.deg2rad(extreme.joints_deg).tolist()
+            marks[name] = {"q": q, "text": said, "hit": extreme.subject.split(" and ")}
+        for name, point in slow_marks(report):
             marks[name] = {"move": move_to(motion, point), "text": name}
         if isinstance(run, Refused) and isinstance(run.cause, Verification):
             findings = run.cause.findings

@@ -20,6 +20,7 @@ from opl.report import curves
 from opl.report.chart import chart_cells
 from opl.report.drawn import drawn_cell, drawn_passes, drawn_wheel, painted, views
 from opl.report.packing import Packer
+from opl.run.result import PlaceReport, Report
 from opl.run.values import Planned, Prepared, Surfaced
 
 MM, MICRONS = 1e3, 1e6
@@ -130,6 +131,31 @@ def blocked_place(reason: str, survey: NodeSurvey, distance: Array) -> tuple[int
     rank = np.array(ranks)[survey.states[point]]
     rows = np.flatnonzero(rank == rank.min())
     return point, int(rows[distance[point, rows].argmax()])
+
+
+def extremes(report: Report) -> list[tuple[str, str, PlaceReport]]:
+    """Return marks, words and places of what the replay found least or largest."""
+    found = report.verification
+    if found is None:
+        return []
+    belt = f"deepest in the belt, {found.max_belt_penetration_mm:.3f} mm"
+    belt += f" of {found.allowed_belt_penetration_mm:g} mm allowed"
+    places = [
+        ("nearest", f"least clearance, {found.min_clearance_mm:.3f} mm", found.min_clearance_at),
+        ("off", f"contact error, {found.max_contact_error_mm:.4f} mm", found.max_contact_error_at),
+        ("deepest", belt, found.max_belt_penetration_at),
+    ]
+    return [
+        (mark, f"{said}: {place.subject}, {place.place}", place)
+        for mark, said, place in places
+        if place is not None
+    ]
+
+
+def slow_marks(report: Report) -> list[tuple[str, float]]:
+    """Return the marks of the slow stretches and the cutter points they lead to."""
+    lowered = () if report.feed is None else report.feed.lowered
+    return [(f"slow-{k}", one.lowest_at) for k, one in enumerate(lowered)]
 
 
 def moves_at(motion: Motion, wheres: Sequence[str]) -> list[int | None]:

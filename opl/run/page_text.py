@@ -13,6 +13,7 @@ from opl.job.load import Job
 from opl.planning.survey import NodeState, NodeSurvey
 from opl.report.html import bars, bullets, section, table, text
 from opl.run.descriptions import pendant_figures
+from opl.run.page_data import extremes, slow_marks
 from opl.run.result import FiguresReport, Report
 from opl.run.values import Planned
 
@@ -77,9 +78,11 @@ def files(report: Report) -> str:
 def tables(report: Report, job: Job, planned: Planned | None) -> str:
     """Return the comparison, the cycle, slow stretches, and what is typed in at the controller."""
     names = job.cell.robot.joint_names
+    extreme = extremes(report)
     return section(
         "figures",
         "Figures",
+        bullets([said for _, said, _ in extreme], [mark for mark, _, _ in extreme]),
         _comparison(report, names),
         "" if report.path is None else bullets(_certified(report)),
         _cycle(report),
@@ -114,12 +117,6 @@ def legend(survey: NodeSurvey) -> list[tuple[int, str, float]]:
         for code, state in enumerate(NodeState)
         if counts[code]
     ]
-
-
-def slow_marks(report: Report) -> list[tuple[str, float]]:
-    """Return the marks of the slow stretches and the cutter points they lead to."""
-    lowered = () if report.feed is None else report.feed.lowered
-    return [(f"slow-{k}", one.lowest_at) for k, one in enumerate(lowered)]
 
 
 def _proven(report: Report) -> Iterator[str]:

@@ -14,6 +14,7 @@ from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.job.refusals import keys_named
+from opl.program.posts import find_post
 from opl.proof.digest import changed_since, digests_in, other_inputs, read_result
 from opl.proof.prove import Proof, prove
 from opl.run.delivery import MOST_RESULT, RESULT
@@ -61,7 +62,8 @@ def prove_program(job: Job, files: Sequence[Path], watch: Watch | None = None) -
 
     Args:
         job: Cell, surface, feed and tolerances.
-        files: The files: the master and all parts of a program that is split.
+        files: The files: the master and all parts of a program that is split. Files of frames and
+            tools beside them are read with them.
         watch: Follows the work.
 
     Raises:
@@ -70,16 +72,23 @@ def prove_program(job: Job, files: Sequence[Path], watch: Watch | None = None) -
         Cancelled: If the work was cancelled.
     """
     watch = watch or Watch()
-    content = {path: read_program(path) for path in files}
+    reader = find_post(job.program.controller).reader
+    beside = [
+        path.parent / name
+        for path in files
+        for name in (() if reader is None else reader.companions)
+        if (path.parent / name).is_file()
+    ]
+    content = {path: read_program(path) for path in dict.fromkeys([*files, *beside])}
     points = cut_surface(job, watch).points
     with watch.stage(Stage.VERIFICATION) as progress, keys_named(job.source):
         found = prove(job, points, {str(path): data for path, data in content.items()}, progress)
     results = {path: _result_beside(path, job) for path in content}
     findings, as_written = _compared_with_results(content, results)
     proof = replace(found, findings=(*found.findings, *findings))
-    kept = [keeps_stamp(data) for data in content.values()]
+    kept = [keeps_stamp(content[path]) for path in files]
     changed = True if False in kept else None if None in kept else False
-    differing = [other_inputs(data, job.inputs, results[path]) for path, data in content.items()]
+    differing = [other_inputs(content[path], job.inputs, results[path]) for path in files]
     others = (
         None
         if None in differing

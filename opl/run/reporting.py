@@ -11,6 +11,7 @@ from opl.cell.robot import Robot
 from opl.files.digests import digest
 from opl.job.search import Objective
 from opl.motion.feed import SlowStretch
+from opl.planning.holders import Holder
 from opl.program.moves import CycleTime
 from opl.proof.read_back import FileProof
 from opl.run import result
@@ -90,6 +91,7 @@ def _compared(planned: Planned) -> dict[str, result.FiguresReport]:
 
 def _path(planned: Planned) -> result.PathReport:
     plan, search = planned.plan, planned.surfaced.job.search
+    robot = planned.surfaced.job.cell.robot
     path, known = plan.path, plan.objective
     objective = None
     if known is not None:
@@ -107,9 +109,20 @@ def _path(planned: Planned) -> result.PathReport:
         nodes=len(path.q) - path.n_intermediate,
         intermediate_nodes=path.n_intermediate,
         lower_bound_rad=_rounded(plan.lower_bound),
+        held_by=[_holder(one, path.joint_range_sum, robot) for one in plan.holders],
         gap=_rounded(plan.gap),
         weighted=objective if search.objective is Objective.WEIGHTED else None,
         objective_value=objective,
+    )
+
+
+def _holder(one: Holder, value: float, robot: Robot) -> result.HolderReport:
+    return result.HolderReport(
+        cutter_point=round(one.place, 3),
+        pass_=one.pass_index + 1,
+        joints=[robot.joint_names[joint] for joint in one.joints],
+        bound_without_rad=_rounded(one.bound_without),
+        most_gain_rad=_rounded(max(value - one.bound_without, 0.0)),
     )
 
 
@@ -122,6 +135,7 @@ def _feed(planned: Planned) -> result.FeedReport:
         longest_dwell_s=0.0 if dwell is None else round(dwell.dwell, 3),
         longest_dwell_at=None if dwell is None or not dwell.dwell else round(dwell.dwell_at, 3),
         max_dwell_s=process.max_dwell,
+        largest_speed_ratio=round(planned.timing.speed_ratio, 3),
     )
 
 

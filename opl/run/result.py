@@ -42,6 +42,17 @@ class ObjectiveReport:
 
 
 @dataclass(frozen=True)
+class HolderReport:
+    """A cutter point, fractional between two, that keeps the joint range sum from being smaller."""
+
+    cutter_point: float
+    pass_: int
+    joints: Sequence[str]  # whose range it holds, the dearest first
+    bound_without_rad: float  # no path has a smaller sum, even if this need not be ground
+    most_gain_rad: float  # what changing nothing else could gain at the most
+
+
+@dataclass(frozen=True)
 class FiguresReport:
     """The figures by which paths are compared; a weighted sum only if that is the objective."""
 
@@ -67,6 +78,7 @@ class PathReport:
     nodes: int
     intermediate_nodes: int
     lower_bound_rad: float | None  # no path has a smaller sum, whatever its contact positions
+    held_by: Sequence[HolderReport]
     gap: float | None  # fraction by which the sum may be above the least there is
     weighted: ObjectiveReport | None
     objective_value: ObjectiveReport | None  # of travel, time or weighted sum
@@ -104,6 +116,9 @@ class FeedReport:
     longest_dwell_s: float
     longest_dwell_at: float | None
     max_dwell_s: float
+    # of neighbouring moves of a pass and its leads, along the surface; a speed below a fifth of the
+    # feed counts as that, and not at all where pivoting alone makes it so slow
+    largest_speed_ratio: float
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from opl.job.search import Method, Objective, Search
 from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.motion.short_ways import shortened
+from opl.planning.borders import Nameable, clear_of_borders
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import ObjectiveWeights
 from opl.planning.equals import quickest_of_equals
@@ -37,12 +38,15 @@ class FoundPaths:
     recursive: Plan
 
 
-def search_path(search: Search, problem: GrindingProblem) -> FoundPaths:
+def search_path(
+    search: Search, problem: GrindingProblem, nameable: Nameable | None = None
+) -> FoundPaths:
     """Search the path by the method and for the objective of a job.
 
     Args:
         search: What the job wants.
         problem: What is to be planned.
+        nameable: Which configurations the program names without doubt; None for all.
 
     Raises:
         NoPathError: If there is none.
@@ -51,7 +55,9 @@ def search_path(search: Search, problem: GrindingProblem) -> FoundPaths:
     plan = recursive
     if search.method is Method.OPTIMAL:
         plan = _search_best(search, problem, recursive)
-    quickest = quickest_of_equals(problem, plan, search.counts_ranges)
+    quickest = quickest_of_equals(problem, plan, search.counts_ranges, nameable)
+    if nameable is not None:
+        quickest = clear_of_borders(problem, quickest, nameable)
     motion = shortened(quickest.motion, problem.scene.free_moves.joined)
     return FoundPaths(replace(quickest, motion=motion), recursive)
 

@@ -7,6 +7,8 @@ from opl.job.load import Job
 from opl.job.refusals import dwell_refusal, keys_named
 from opl.motion.feed import slow_stretches
 from opl.motion.timing import time_motion
+from opl.planning.borders import Nameable
+from opl.program.posts import find_post
 from opl.proof.read_back import in_file_digits, read_back
 from opl.run.exporting import draw_charts, job_date, render_program
 from opl.run.preparing import prepare
@@ -62,7 +64,7 @@ def _plan(surfaced: Surfaced, watch: Watch) -> Planned | Refused:
     prepared, job = prepare(surfaced, watch), surfaced.job
     try:
         with watch.stage(Stage.SEARCH):
-            found = search_path(job.search, prepared.problem)
+            found = search_path(job.search, prepared.problem, _nameable(job))
     except NoPathError as error:
         return _without_path(prepared, error, watch)
     with watch.stage(Stage.COMPARISON):
@@ -75,6 +77,14 @@ def _plan(surfaced: Surfaced, watch: Watch) -> Planned | Refused:
     planned = Planned(prepared, found.plan, compared, timing, slow)
     refusal = dwell_refusal(slow, job.process)
     return planned if refusal is None else Refused(planned, refusal, (), watch.seconds)
+
+
+def _nameable(job: Job) -> Nameable | None:
+    """Return which configurations the program of a job can name, None if nobody knows."""
+    reader, robot = find_post(job.program.controller).reader, job.cell.robot
+    return (
+        None if reader is None else lambda q, margin: reader.nameable(q, robot, job.program, margin)
+    )
 
 
 def verify_motion(planned: Planned, watch: Watch | None = None) -> Proven | Refused:

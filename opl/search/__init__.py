@@ -1,1 +1,7 @@
 """The searches: on arrays, they know no robot."""
+
+from pathlib import Path
+
+from opl.files.kernel_cache import settle_kernel_cache
+
+settle_kernel_cache(Path(__file__).parent)

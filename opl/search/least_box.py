@@ -169,6 +169,12 @@ class BoxProof:
         held_by = {k: found.prices[i] for i, k in enumerate(alone) if found.prices[i].any()}
         return Candidate(node.bound, found.low, found.high, held_by, settled)
 
+    @property
+    def kept_spans(self) -> list[tuple[int, Array]]:
+        """The wall and the cells of each span of the last candidate, as in the table of `Cells`."""
+        spans = self._kept.spans[:, [WALL, FIRST, END]].tolist()
+        return [(wall, self._cells.table[first:end]) for wall, first, end in spans]
+
     def split(self) -> None:
         """Split the subproblem of the last candidate."""
         if self._branch is not None:

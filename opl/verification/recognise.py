@@ -26,7 +26,7 @@ from opl.verification.world import World
 # [m] that a configuration may be off the contact model at the cutter point it grinds: what the
 # digits of a position leave. Farther off it is between cutter points.
 AT_POINT = 5e-5
-ASIDE = 2e-4  # [m] that a configuration of an approach may be beside the contact normal or the arc
+ASIDE = 2e-4  # [m] that a configuration of an approach may be beside its way
 FARTHER = 1e-3  # [m] than the approach is long that still is approach
 
 
@@ -41,12 +41,15 @@ class Rule:
         approach_length: Of approach and retract in [m].
         approach_turn: What they turn by in [rad]: 0 if they run along the contact normal, else they
             are arcs that begin and end along the belt, y of the contact frame.
+        approach_run: How far the part moves on along the pass at the most while it lifts off, on a
+            quarter of a circle, in [m].
     """
 
     max_contact_error: float
     max_contact_step: float
     approach_length: float
     approach_turn: float
+    approach_run: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,34 +194,41 @@ class _Labels:
         """Return the configurations off the wheel along the lead next to k, nearest first."""
         T_workpiece_cutter = self._segments.points.Ts_workpiece_cutter[point]
         T_contact_contact0 = inverse(self._segments.wheel.T_contact0_contact(t))
+        direction = self._segments.points.direction_at(point)
         farthest, found = 0.0, []
         j = int(k) + side
         while 0 <= j < len(self._kind) and self._kind[j] is MoveKind.HOME:
             T_contact0_workpiece = self._segments.Ts_contact0_workpiece[j]
             T_contact_cutter = T_contact_contact0 @ T_contact0_workpiece @ T_workpiece_cutter
-            along, aside = self._along_lead(T_contact_cutter[:3, 3], side)
+            along, aside = self._along_lead(T_contact_cutter[:3, 3], side, direction)
             turned = np.linalg.norm(T_contact_cutter[:3, :3] - np.eye(3)) / np.sqrt(2.0)
             if aside > ASIDE or turned > ALIGNED or not along > farthest:
                 break
-            if along > self._rule.approach_length + FARTHER:
+            if along > self._rule.approach_length + self._rule.approach_run + FARTHER:
                 break
             farthest = along
             found.append(j)
             j += side
         return found
 
-    def _along_lead(self, p_contact: Array, side: int) -> tuple[float, float]:
+    def _along_lead(self, p_contact: Array, side: int, direction: float) -> tuple[float, float]:
         """Return how far along approach or retract a point is and how far beside it, in [m].
 
         `p_contact` is the ground point in the contact frame, whose z points into the wheel, shape
-        (3,); `side` is -1 for the approach, which comes from -y, 1 for the retract.
+        (3,); `side` is -1 for the approach, which comes from -y, 1 for the retract; `direction` is
+        1 where the pass runs along x, else -1. What has moved on along the pass must have lifted
+        off as on the quarter of a circle, or more.
         """
         x, y, z = (float(v) for v in p_contact)
         if self._rule.approach_turn == 0.0:
-            return -z, float(np.hypot(x, y))
-        radius = self._rule.approach_length / self._rule.approach_turn
-        y, z = side * y, z + radius  # seen from the centre of the arc
-        return radius * float(np.arctan2(y, z)), float(np.hypot(x, np.hypot(y, z) - radius))
+            off, aside = -z, abs(y)
+        else:
+            radius = self._rule.approach_length / self._rule.approach_turn
+            y, z = side * y, z + radius  # seen from the centre of the arc
+            off, aside = radius * float(np.arctan2(y, z)), abs(float(np.hypot(y, z)) - radius)
+        run, on = min(self._rule.approach_run, self._rule.approach_length), -side * direction * x
+        lift = run - float(np.sqrt(max(run * run - on * on, 0.0)))
+        return off + on, max(aside, -on, on - run, lift - off)
 
     def _label_free_moves(self, firsts: list[int], lasts: list[int]) -> None:
         """Tell the free moves from and to home from the links between passes."""

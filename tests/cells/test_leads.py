@@ -1,95 +1,216 @@
-"""Approach and retract: straight along the contact normal, or an arc along the belt."""
+"""Approach and retract: in feed along the pass, then along the contact normal or an arc."""
 
 import csv
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import transform
 from opl.job.load import load_job
-from opl.motion.leads import LEAD_SPACING, LEAD_TURN, lead_count, lead_offsets
-from opl.motion.motion import MoveKind
+from opl.motion.gradual import SPEED_RATIO, gradual, largest_ratio
+from opl.motion.leads import LEAD_SPACING, LEAD_TIME, RUN_TURN, LeadShape
+from opl.motion.motion import MoveKind, Phase
 from tests.support.jobs import opl, write_job
-from tests.support.planned import small_job
+from tests.support.planned import small_job, small_problem, small_timed, tiny_problem, tiny_timed
 
 SIDES = {MoveKind.APPROACH: -1.0, MoveKind.RETRACT: 1.0}
 LENGTHS = st.floats(0.002, 0.3)
 TURNS = st.floats(np.deg2rad(0.5), np.deg2rad(90.0))
+RUNS = st.floats(0.001, 0.02)
 STRETCHES = st.sampled_from(list(SIDES))
+DIRECTIONS = st.sampled_from([1.0, -1.0])
 
-LENGTH_MM, TURN_DEG = 20.0, 60.0
+LENGTH_MM, TURN_DEG, RUN_MM = 20.0, 60.0, 4.0
 JOB = {
     "process.approach_turn_deg": TURN_DEG,
+    "process.approach_run_mm": RUN_MM,
     "process.home_deg": [20, -30, -55, -5, 48, 120],
     "search.method": "recursive",
 }
 
 
-def integrated(length, turn, side, n=4001):
-    """Return points of the arc, from its direction alone: along the belt, then turned evenly."""
-    s = np.linspace(0.0, length, n)
-    direction = np.stack([side * np.cos(turn * s / length), -np.sin(turn * s / length)], axis=-1)
-    steps = (direction[1:] + direction[:-1]) / 2.0 * (s[1] - s[0])
-    return s, np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+def shape_of(length, turn, run, feed=0.02, speed=0.05, slow=0.01):
+    return LeadShape(length, turn, run, slow, feed, speed)
 
 
-@settings(max_examples=50, deadline=None, derandomize=True)
-@given(LENGTHS, TURNS, STRETCHES)
-def test_an_arc_has_its_length_and_leaves_along_the_belt(length, turn, stretch):
-    offsets = lead_offsets(length, turn, stretch)
-    s, points = integrated(length, turn, SIDES[stretch])
-    at = length * np.arange(1, len(offsets) + 1) / len(offsets)
-    np.testing.assert_allclose(offsets[:, 0], 0.0)
-    for axis in (0, 1):
-        np.testing.assert_allclose(
-            offsets[:, axis + 1], np.interp(at, s, points[:, axis]), atol=1e-6 * length
+def integrated(shape, side, direction, n=20001):
+    """Return points of a lead from its directions alone.
+
+    Along the pass it turns evenly from all to nothing, off the wheel from nothing to all of its
+    speed; off the wheel it turns evenly from the belt's direction to the end of its arc.
+    """
+    run = min(shape.run, shape.length)
+    quarter = run * np.pi / 2.0
+    s = np.linspace(0.0, quarter + shape.length - run, n)
+    lifting = np.minimum(s / run, np.pi / 2.0)
+    steps = np.diff(s)[:, None]
+
+    def summed(slope):
+        slope = slope.reshape(n, -1)
+        return np.concatenate(
+            [
+                np.zeros((1, slope.shape[1])),
+                np.cumsum((slope[1:] + slope[:-1]) / 2.0 * steps, axis=0),
+            ]
         )
 
+    along = summed(np.cos(lifting))[:, 0]
+    off = summed(np.sin(lifting))[:, 0]
+    if shape.turn == 0.0:
+        normal = np.stack([np.zeros(n), -off], axis=1)
+    else:
+        angle = shape.turn * off / shape.length
+        speed = np.sin(lifting)
+        normal = summed(np.stack([side * speed * np.cos(angle), -speed * np.sin(angle)], axis=1))
+    return s, np.column_stack([-side * direction * along, normal])
+
 
 @settings(max_examples=50, deadline=None, derandomize=True)
-@given(LENGTHS, TURNS, STRETCHES)
-def test_chords_of_an_arc_are_short_and_even(length, turn, stretch):
-    offsets = lead_offsets(length, turn, stretch)
-    chords = np.diff(offsets, axis=0, prepend=np.zeros((1, 3)))
-    step, n = turn / len(offsets), len(offsets)
-    assert step <= LEAD_TURN * (1.0 + 1e-6)
-    assert np.linalg.norm(chords, axis=1).max() <= LEAD_SPACING
-    # the tangent at the contact is y: a chord lies half a step beyond the one where it begins
-    leaning = np.arctan2(-chords[:, 2], SIDES[stretch] * chords[:, 1])
-    np.testing.assert_allclose(leaning, (np.arange(n) + 0.5) * step, atol=1e-9)
+@given(LENGTHS, st.one_of(st.just(0.0), TURNS), RUNS, STRETCHES, DIRECTIONS)
+def test_a_lead_is_a_quarter_of_a_circle_and_then_leads_off(length, turn, run, stretch, direction):
+    shape = shape_of(length, turn, run)
+    offsets, places = shape.offsets(stretch, direction), shape.places()
+    s, points = integrated(shape, SIDES[stretch], direction)
+    assert places[-1] == pytest.approx(s[-1])
+    for axis in range(3):
+        expected = np.interp(places, s, points[:, axis])
+        np.testing.assert_allclose(offsets[:, axis], expected, atol=1e-6 * length)
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)
-@given(LENGTHS, st.one_of(st.just(0.0), TURNS), STRETCHES, st.floats(-70.0, 70.0))
-def test_the_ground_point_moves_away_from_the_wheel_all_the_way(length, turn, stretch, t):
-    wheel = small_job().cell.wheel
-    corners = np.concatenate([np.zeros((1, 3)), lead_offsets(length, turn, stretch)])
-    fraction = np.linspace(0.0, 1.0, 8, endpoint=False)[:, None]
-    on_the_way = [a + fraction * (b - a) for a, b in pairwise(corners)]
-    way = np.concatenate([*on_the_way, corners[-1:]])
-    distance = wheel.signed_distance(transform(wheel.T_contact0_contact(t), way))
-    assert distance[0] == pytest.approx(0.0, abs=1e-12)
-    assert (np.diff(distance) > 0.0).all()
+@given(LENGTHS, st.one_of(st.just(0.0), TURNS), RUNS, st.floats(0.001, 0.3), st.floats(0.01, 0.5))
+def test_configurations_of_a_lead_are_as_dense_as_speeds_and_bends_ask(
+    length, turn, run, feed, speed
+):
+    shape = shape_of(length, turn, run, feed, speed)
+    steps = np.diff(shape.places(), prepend=0.0)
+    assert (steps > 0.0).all()
+    # the last one may have taken up what is left
+    most = np.full(len(steps), LEAD_SPACING)
+    most[shape.places() - steps < shape.radius * np.pi / 2.0] = shape.radius * RUN_TURN
+    most = np.minimum(most, LEAD_SPACING)
+    most[-1] *= 1.5
+    assert (steps <= most * (1.0 + 1e-9)).all()
+    assert steps[0] <= 1.5 * feed * LEAD_TIME
+    # near the contact no move takes longer than a lead's should, and none is much shorter
+    grown = feed * SPEED_RATIO ** np.arange(len(steps))
+    assert (steps <= 1.5 * np.maximum(grown, feed) * LEAD_TIME * (1.0 + 1e-9)).all()
 
 
-@pytest.mark.parametrize("stretch", SIDES)
-@pytest.mark.parametrize(("length", "count"), [(0.05, 10), (0.0021, 1), (0.0501, 11)])
-def test_without_a_turn_a_lead_is_straight_along_the_normal(stretch, length, count):
-    offsets = lead_offsets(length, 0.0, stretch)
-    expected = np.zeros((count, 3))
-    expected[:, 2] = [-length * k / count for k in range(1, count + 1)]
-    np.testing.assert_array_equal(offsets, expected)
-
-
-@pytest.mark.parametrize(
-    ("length", "turn_deg", "count"), [(0.02, 60, 12), (0.2, 60, 40), (0.02, 61, 13), (0.01, 1, 2)]
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(
+    LENGTHS,
+    st.one_of(st.just(0.0), TURNS),
+    RUNS,
+    STRETCHES,
+    DIRECTIONS,
+    st.floats(-70.0, 70.0),
 )
-def test_an_arc_is_cut_by_length_and_turn(length, turn_deg, count):
-    assert lead_count(length, np.deg2rad(turn_deg)) == count
+def test_the_ground_point_moves_away_from_the_wheel_all_the_way(
+    length, turn, run, stretch, direction, t
+):
+    wheel = small_job().cell.wheel
+    offsets = shape_of(length, turn, run).offsets(stretch, direction)
+    corners = np.concatenate([np.zeros((1, 3)), offsets])
+    # where the point was ground, seen along the tangent plane: lifted by as much as it has moved
+    lifted = -corners[:, 2]
+    assert (np.diff(lifted) > 0.0).all()
+    # along the pass it moves on by the run at the most, and never back
+    moved_on = -SIDES[stretch] * direction * corners[:, 0]
+    assert (np.diff(moved_on) >= -1e-15).all() and moved_on[-1] == pytest.approx(min(run, length))
+    distance = wheel.signed_distance(transform(wheel.T_contact0_contact(t), corners))
+    assert (distance[1:] > 0.0).all()
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(RUNS, st.floats(1e-5, 1e-3))
+def test_the_belt_is_left_within_a_stated_way(run, penetration):
+    # what the documentation says of how far beyond the last point the belt may grind
+    run = max(run, penetration)
+    _, points = integrated(shape_of(0.3, 0.0, run), 1.0, 1.0)
+    beyond = np.interp(penetration, -points[:, 2], -points[:, 0])
+    assert beyond == pytest.approx(np.sqrt((2.0 * run - penetration) * penetration), rel=1e-2)
+
+
+# in motion
+
+
+def runs_of(timed):
+    """Yield the moves from rest to rest, the moves of a pass with both of its leads."""
+    motion = timed.motion
+    for index in range(motion.pass_index.max() + 1):
+        yield [
+            move
+            for phase, moves in motion.runs()
+            for move in moves
+            if phase is not Phase.FREE and motion.pass_index[move] == index
+        ]
+
+
+def speeds_of(problem, timed, moves):
+    """Return the speed of each move over the part or through the air, from positions alone."""
+    motion, cell = timed.motion, problem.cell
+    p = forward_kinematics(cell.robot, motion.q)[:, :3, 3]
+    arc = np.interp(motion.cutter_point, np.arange(len(problem.points)), problem.points.arc_length)
+    found = []
+    for move in moves:
+        ground = abs(arc[move] - arc[move - 1])
+        way = np.linalg.norm(p[move] - p[move - 1]) if np.isnan(ground) else ground
+        found.append(way / timed.duration[move])
+    return np.array(found)
+
+
+@pytest.mark.parametrize("of", [(small_problem, small_timed), (tiny_problem, tiny_timed)])
+def test_speeds_change_gradually_from_lift_off_to_touch_down(of):
+    problem, timed = of[0](), of[1]()
+    feed = problem.process.feed
+    for moves in runs_of(timed):
+        speed = np.maximum(speeds_of(problem, timed, moves), 0.2 * feed)
+        ratio = speed[1:] / speed[:-1]
+        # where the contact pivots faster than the ground point can follow, its speed says nothing
+        change = np.abs(np.diff(timed.motion.contact_position, prepend=np.nan))[moves]
+        pivots = (
+            change / problem.process.contact_speed * 0.2 * feed
+            > speeds_of(problem, timed, moves) * timed.duration[moves]
+        )
+        counted = ~pivots[1:] & ~pivots[:-1]
+        assert counted.sum() > 0.7 * len(counted)
+        assert np.maximum(ratio, 1.0 / ratio)[counted].max() <= SPEED_RATIO
+        phases = [timed.motion.phase[move] for move in moves]
+        onto = phases.index(Phase.GRINDING) - 1  # the move that ends on the wheel
+        off = phases.index(Phase.RETRACTING)
+        assert speed[[onto, off]].max() <= feed * (1.0 + 1e-9)
+        near = [k for k, phase in enumerate(phases) if phase is not Phase.GRINDING]
+        near = [k for k in near if min(abs(k - onto), abs(k - off)) < 4]  # within 10 mm of way
+        assert speed[near].max() <= max(feed, problem.process.approach_speed) * (1.0 + 1e-9)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(
+    st.lists(
+        st.tuples(st.floats(1e-6, 0.05), st.floats(0.004, 2.0), st.floats(0.0, 1.0)),
+        min_size=1,
+        max_size=30,
+    ),
+    st.floats(0.005, 0.3),
+)
+def test_only_the_faster_of_two_neighbours_is_slowed(moves, feed):
+    distance, seconds, counts = np.array(moves).T
+    counts = counts < 0.9
+    found = gradual(distance, seconds, counts, feed)
+    assert (found >= seconds).all() and (found[~counts] == seconds[~counts]).all()
+    assert largest_ratio(distance, found, counts, feed) <= SPEED_RATIO
+    np.testing.assert_allclose(gradual(distance, found, counts, feed), found)
+    # none is slowed that no slow one is near to: the largest speeds of all that keep the ratio
+    counted = np.where(counts, np.maximum(distance / seconds, 0.2 * feed), np.inf)
+    k = np.arange(len(moves))
+    cone = (counted[None] * 1.28 ** np.abs(k[:, None] - k)).min(axis=1)
+    expected = np.where(counts, np.maximum(seconds, distance / cone), seconds)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
 # a whole job
@@ -113,20 +234,18 @@ def test_a_program_comes_and_goes_on_arcs(planned):
         rows = list(csv.DictReader(file))
     flange = np.array([[float(row[f"{axis}_mm"]) for axis in "xyz"] for row in rows])
     kinds = [row["kind"] for row in rows]
-    radius = LENGTH_MM / np.deg2rad(TURN_DEG)
+    shape = shape_of(1e-3 * LENGTH_MM, np.deg2rad(TURN_DEG), 1e-3 * RUN_MM)
     for kind, side in (("approach", -1.0), ("retract", 1.0)):
         lead = [k for k, one in enumerate(kinds) if one == kind]
         if kind == "approach":  # from the contact away; the free move ends at the far end
             lead = [lead[0] - 1, *lead][::-1]
         touch = lead[0] - int(side)
         # cut short where the straight free move from there is free
-        assert 1 < len(lead) <= 12 and rows[touch]["kind"] == "grind"
+        assert len(lead) > 1 and rows[touch]["kind"] == "grind"
         R = wheel.T_base_contact(float(rows[touch]["t"]))[:3, :3]
-        x, y, z = ((flange[lead] - flange[touch]) @ R).T
-        angle = np.deg2rad(5.0) * np.arange(1, len(lead) + 1)
-        np.testing.assert_allclose(x, 0.0, atol=0.02)  # pulses and printed digits
-        np.testing.assert_allclose(y, side * radius * np.sin(angle), atol=0.02)
-        np.testing.assert_allclose(z, -radius * (1.0 - np.cos(angle)), atol=0.02)
+        offsets = 1e3 * shape.offsets(MoveKind(kind), 1.0)[: len(lead)]
+        # pulses and printed digits
+        np.testing.assert_allclose((flange[lead] - flange[touch]) @ R, offsets, atol=0.02)
 
 
 def test_a_program_with_arcs_is_proven_from_its_file(planned):

@@ -10,7 +10,7 @@ from opl.cell.robot import forward_kinematics
 from opl.errors import NoPathError
 from opl.motion.collision_check import RESOLUTION, colliding_moves, densify
 from opl.motion.motion import MoveKind
-from opl.motion.timing import time_motion
+from opl.motion.timing import Cause, time_motion
 from opl.motion.whole_motion import UnreachableApproachError, whole_motion
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.fixed_contact import keep_contact, runs_of
@@ -330,7 +330,8 @@ def test_states_say_what_rules_a_node_out():
     q[6, 4, branch] = np.nan
     nodes = next(n for n in problem.field.matrices if n.ik_branch == branch and n.exists.any())
     column, row = np.argwhere(nodes.exists)[len(np.argwhere(nodes.exists)) // 2]
-    haunted = with_scene(problem, collision=Ghosts(nodes.q[column, row], radius=1e-3))
+    ghost = Ghosts(nodes.q[column, row], 1e-3, haunted=problem.scene.collision)
+    haunted = with_scene(problem, collision=ghost)
     changed = replace(haunted, wheel_distance=layer, field=replace(problem.field, q=q))
     states = survey_nodes(changed, branch, np.zeros(6)).states
     assert states.shape == layer.shape
@@ -378,25 +379,34 @@ def test_the_path_is_in_the_motion_as_it_is(problem, timed):
 
 
 @MOTIONS
-def test_approach_and_retract_run_along_the_contact_normal(problem, timed):
-    cell, motion = problem().cell, timed().motion
+def test_approach_and_retract_move_on_along_the_pass_and_off_the_wheel(problem, timed):
+    cell, motion, process = problem().cell, timed().motion, problem().process
     kinds = np.array([kind.value for kind in motion.kind])
     for index in range(problem().points.n_passes):
         on_pass = motion.pass_index == index
         on_wheel = np.flatnonzero(on_pass & ~np.isnan(motion.cutter_point))
-        for kind, touch in (("approach", on_wheel[0]), ("retract", on_wheel[-1])):
+        at = problem().points.Ts_workpiece_cutter[problem().points.pass_index == index, :3, 3]
+        T = problem().points.Ts_workpiece_cutter[problem().points.pass_index == index]
+        for kind, touch, end, ahead in (
+            ("approach", on_wheel[0], 0, at[1] - at[0]),
+            ("retract", on_wheel[-1], -1, at[-1] - at[-2]),
+        ):
             lead = np.flatnonzero(on_pass & (kinds == kind))
-            if kind == "approach":
-                lead = np.concatenate([[lead[0] - 1], lead])  # the air move ends at its start
-            Ts = forward_kinematics(cell.robot, motion.q[np.append(lead, touch)])
-            into = cell.wheel.T_base_contact(motion.contact_position[touch])[:3, 2]
-            away = Ts[-1, :3, 3] - Ts[:, :3, 3]
-            np.testing.assert_allclose(away - np.outer(away @ into, into), 0.0, atol=1e-9)
-            np.testing.assert_allclose(Ts[:, :3, :3], Ts[[-1] * len(Ts), :3, :3], atol=1e-9)
-            distance = (away @ into)[:-1]
-            assert distance.max() == pytest.approx(problem().process.approach_length)
-            steps = np.diff(away @ into)
-            assert (steps[:-1] * (-1 if kind == "approach" else 1) > 0.0).all()
+            if kind == "approach":  # the free move ends at its start
+                lead = np.concatenate([[lead[0] - 1], lead])[::-1]
+            Ts = forward_kinematics(cell.robot, motion.q[np.insert(lead, 0, touch)])
+            T_base_contact = cell.wheel.T_base_contact(motion.contact_position[touch])
+            away = (Ts[:, :3, 3] - Ts[0, :3, 3]) @ T_base_contact[:3, :3]
+            np.testing.assert_allclose(Ts[:, :3, :3], Ts[[0] * len(Ts), :3, :3], atol=1e-9)
+            np.testing.assert_allclose(away[:, 1], 0.0, atol=1e-9)
+            assert -away[-1, 2] == pytest.approx(process.approach_length)
+            # what comes next on the part comes to the wheel when the part moves the other way
+            along = np.sign(ahead @ T[end, :3, 0]) * (1.0 if kind == "approach" else -1.0)
+            on, off, run = along * away[:, 0], -away[:, 2], process.approach_run
+            assert (np.diff(on) >= -1e-12).all() and (np.diff(off) > 0.0).all()
+            circle = run - np.sqrt(np.maximum(run**2 - on**2, 0.0))
+            np.testing.assert_allclose(off[off < run], circle[off < run], atol=1e-9)
+            assert on[-1] == pytest.approx(run)
 
 
 @MOTIONS
@@ -423,7 +433,8 @@ def test_the_feed_is_kept_on_the_wheel_unless_a_joint_could_not_follow(problem, 
     # what slow acceleration does to the feed is told in test_timing.py
     robot = replace(problem().cell.robot, max_acceleration=np.full(6, 1e6))
     motion = timed().motion
-    duration = time_motion(motion, points, process, robot).timed.duration
+    timing = time_motion(motion, points, process, robot)
+    duration, evened = timing.timed.duration, 0
     fastest = robot.max_speed
     arc_length = problem().points.arc_length
     arc = np.interp(motion.cutter_point, np.arange(len(arc_length)), arc_length)
@@ -435,9 +446,13 @@ def test_the_feed_is_kept_on_the_wheel_unless_a_joint_could_not_follow(problem, 
             least = (np.abs(motion.q[k] - motion.q[k - 1]) / fastest).max()
             t = motion.contact_position
             over_wheel = abs(t[k] - t[k - 1]) / process.contact_speed
-            assert duration[k] == pytest.approx(max(needed, least, over_wheel))
+            wanted = max(needed, least, over_wheel)
+            assert duration[k] >= wanted * (1.0 - 1e-6)
+            if duration[k] > wanted * 1.011:
+                assert timing.cause[k] is Cause.NEIGHBOUR
+                evened += 1
             checked += 1
-    assert checked > 100
+    assert checked > 100 and evened < checked / 8
 
 
 @MOTIONS
@@ -447,17 +462,10 @@ def test_free_moves_run_at_their_share_of_the_joint_speeds(problem, timed):
         if k and kind in (MoveKind.HOME, MoveKind.LINK):
             speed = np.abs(motion.q[k] - motion.q[k - 1]) / duration[k]
             share = (speed / problem().cell.robot.max_speed).max()
-            assert share == pytest.approx(process.air_speed)
-
-
-@MOTIONS
-def test_leads_run_at_the_approach_speed(problem, timed):
-    motion, duration, process = timed().motion, timed().duration, problem().process
-    Ts = forward_kinematics(problem().cell.robot, motion.q)
-    for k, kind in enumerate(motion.kind):
-        if kind in (MoveKind.APPROACH, MoveKind.RETRACT):
-            way = np.linalg.norm(Ts[k, :3, 3] - Ts[k - 1, :3, 3])
-            assert way / duration[k] == pytest.approx(process.approach_speed, rel=1e-6)
+            if duration[k] > 0.05:  # a shorter one is over before a robot is at its speed
+                assert share == pytest.approx(process.air_speed)
+            else:
+                assert duration[k] == 0.05 and share < process.air_speed
 
 
 def test_a_slow_robot_takes_the_time_it_needs():

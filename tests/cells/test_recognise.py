@@ -33,6 +33,7 @@ RULE = Rule(
     small_job().search.interpolation.max_contact_step,
     small_job().process.approach_length,
     0.0,
+    small_job().process.approach_run,
 )
 
 

@@ -129,12 +129,14 @@ def test_hard_limits_lower_the_feed_at_more_places_and_name_the_joints(name):
     assert sum(share.longer for share in blamed) > 1.0
 
 
-def test_without_slow_joints_only_pivoting_lowers_the_feed():
+def test_without_slow_joints_only_pivoting_and_what_is_next_to_it_lowers_the_feed():
     timing, problem, _ = timing_of("v", 1e6)
     slow = slow_stretches(timing, problem.process)
     assert len(slow) >= problem.points.n_passes
     for one in slow:
-        assert [(share.cause, share.joint) for share in one.shares] == [(Cause.PIVOTING, None)]
+        assert {share.cause for share in one.shares} <= {Cause.PIVOTING, Cause.NEIGHBOUR}
+        assert Cause.PIVOTING in {share.cause for share in one.shares}
+        assert all(share.joint is None for share in one.shares)
 
 
 # made-up passes, whose figures are known

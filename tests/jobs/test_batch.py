@@ -102,7 +102,9 @@ def test_the_good_job_has_its_files_and_the_impossible_one_its_page_only(mixed):
     made = {
         path.name: sorted(file.name for file in path.iterdir())
         for path in (home / "made").iterdir()
+        if path.is_dir()
     }
+    assert "TROUGH/report.html" in (home / "made" / "report.html").read_text(encoding="utf-8")
     assert made == {
         "GOOD": [
             "GOOD.JBI",
@@ -147,7 +149,7 @@ def pretend(path, out):
     values = {
         "cutter_points": 7,
         "seconds": {"total": 1.25},
-        "path": made_of(PathReport, {"joint_range_sum_rad": 2.0}),
+        "path": made_of(PathReport, {"joint_ranges_rad": [0.5, 1.5], "joint_range_sum_rad": 2.0}),
     }
     return BatchRow(path, "ok", 0, out / path.stem, "", made_of(Report, values))
 

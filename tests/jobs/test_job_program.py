@@ -29,7 +29,8 @@ def settings(tmp_path, text, robot=ROBOT):
     path.write_text(text)
     source = Source.of_file(path)
     section = read(path, ProgramSection)
-    return section.in_si(source, "SAMPLE", section.robot_as_counted(source, robot), HOME)
+    counted = section.robot_as_counted(source, robot)
+    return section.in_si(source, "SAMPLE", counted, HOME, np.eye(4))
 
 
 def test_nothing_asked_for_is_a_pulse_job_of_joint_moves(tmp_path):
@@ -89,7 +90,7 @@ def test_every_key_reaches_the_program_in_si(tmp_path):
             f"positions: user\nuser_frame: {{number: 64, T_base_user_mm: {EYE}}}",
             "program.user_frame.number: must be 1 to 63, got 64",
         ),
-        ("positions: user", "user_frame goes with positions: user, and only there"),
+        ("user_frame: {number: 2}", "user_frame goes with positions: user only"),
         ("tool: 2\nmotion: straight", "need T_flange_tool_mm, the data of tool 2"),
         (
             "controller: KRL\nposition_levels: {free_move: 2}",

@@ -325,7 +325,9 @@ def test_it_is_shown_in_words_and_compared_by_meaning(written, tmp_path):
     text = written.text[:start] + written.language.fast + written.text[end:]
     other.write_bytes(text.encode("ascii"))
     changed = opl("show", written.file, "--diff", other)
-    assert changed.status == 1 and [line[0] for line in changed.out.splitlines()] == ["-", "+"]
+    summary, *table = changed.out.splitlines()
+    assert changed.status == 1 and summary.endswith("moves: 1 differ")
+    assert [written.language.fast in line for line in table if " -> " in line] == [True]
 
 
 def test_a_file_of_another_language_is_refused(written, tmp_path):

@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import opl
@@ -74,6 +75,13 @@ def test_the_trace_is_the_proven_motion(good):
     assert trace["time_s"][-1] == pytest.approx(verified.timed.seconds, abs=1e-6)
     assert trace["kind"] == [kind.value for kind in verified.motion.kind]
     assert trace["t"][0] is None and trace["pass"][-1] is None
+
+
+def test_what_the_replay_found_least_or_largest_leads_to_its_configuration(good):
+    run, page = good[0], page_of(good)
+    found, marks = opl.make_report(run).verification, data_of(page)["marks"]
+    assert np.allclose(np.rad2deg(marks["nearest"]["q"]), found.min_clearance_at.joints_deg)
+    assert 'data-mark="nearest"' in page and found.min_clearance_at.place in page
 
 
 def test_every_move_has_its_line_in_the_listing(good):

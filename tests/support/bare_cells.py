@@ -81,11 +81,18 @@ def random_configurations(robot, n, seed=0):
 
 
 class Ghosts:
-    """A scene in which all near some configurations collide; stands in for a `CollisionScene`."""
+    """A scene in which all near some configurations collide; stands in for a `CollisionScene`.
 
-    def __init__(self, q, radius):
+    Distances, where they are wanted, are those of the scene that it haunts.
+    """
+
+    def __init__(self, q, radius, haunted=None):
         self._q = np.atleast_2d(q)
         self._radius = radius
+        self._haunted = haunted
+
+    def anew(self):
+        return self._haunted.anew()
 
     def collides(self, q):
         away = np.linalg.norm(np.asarray(q)[:, None] - self._q, axis=-1)

@@ -9,7 +9,7 @@ from opl.cell.robot import forward_kinematics
 from opl.errors import InputError, UnsafeError
 from opl.geometry.frames import from_roll_pitch_yaw, pose
 from opl.program.inform import parse, write_jobs
-from opl.program.inform.cartesian import configurations, rconf_of, rectan_pose
+from opl.program.inform.cartesian import configurations, nameable, rconf_of, rectan_pose
 from opl.program.inform.times import job_configurations
 from opl.program.moves import Move, Program, plan_moves
 from opl.program.profiles import DX200, NX100
@@ -26,8 +26,8 @@ def write(q, profile=DX200, **changes):
     )
     form = ProgramSettings(positions=PositionForm.BASE, T_flange_tool=T_FLANGE_TOOL, tool=5)
     program = Program("ANY", moves=moves)
-    (text,) = write_jobs(program, ROBOT, replace(form, **changes), profile, DATE).files.values()
-    return text
+    files = write_jobs(program, ROBOT, replace(form, **changes), profile, DATE).files
+    return files["ANY.JBI"]
 
 
 SHARES = st.lists(st.floats(0.02, 0.98), min_size=6, max_size=6)
@@ -95,17 +95,42 @@ def test_rconf_is_written_where_it_changes_only():
     assert [line[9:20] for line in lines] == ["1,0,0,0,0,0", "1,0,0,0,1,0", "1,0,0,0,0,0"]
 
 
+def test_configuration_that_the_controller_could_mistake_is_refused():
+    with pytest.raises(UnsafeError, match=r"joint T from -310\.0 deg"):
+        write(np.deg2rad((0, 0, 0, 0, -60, 410)))
+
+
 @pytest.mark.parametrize(
-    ("q_deg", "message"),
+    ("joint", "angle", "written"),
     [
-        ((0, 0, 0, 0, -60, 180), "joint T from its other half turn"),
-        ((0, 0, 0, 0, -60, 410), "joint T from -310.0 deg"),
-        ((180, 0, 0, 0, -60, 0), "joint S from its other half turn"),
+        (5, 180.0, 179.985),
+        (5, -180.0, -179.985),
+        (5, 180.004, 180.015),
+        (5, -179.996, -179.985),
+        (5, 180.02, 180.02),
+        (0, 180.0, 179.985),  # the limit of S
+        (3, -180.0, -179.985),
     ],
 )
-def test_configuration_that_the_controller_could_mistake_is_refused(q_deg, message):
-    with pytest.raises(UnsafeError, match=message):
-        write(np.deg2rad(q_deg))
+def test_joint_at_half_a_turn_is_written_beside_it(joint, angle, written):
+    q = np.deg2rad([0.0, 0.0, 0.0, 0.0, -60.0, 0.0])
+    q[joint] = np.deg2rad(angle)
+    job = parse(write(q))
+    seen = job_configurations(job, ROBOT, np.eye(4), T_FLANGE_TOOL)[0]
+    assert np.rad2deg(seen[joint]) == pytest.approx(written, abs=2e-4)
+    assert job.positions[0].rconf[{3: 3, 5: 4, 0: 5}[joint]] == (abs(written) > 180.0)
+    rest = np.arange(6) != joint
+    np.testing.assert_allclose(seen[rest], q[rest], atol=4e-6)
+
+
+def test_what_can_be_named_is_clear_of_half_a_turn_and_of_other_turns():
+    angles = [0, 179.0, 179.96, 180.04, 181.0, 200.0, 264.0, 266.0, 410.0, -181.0, -410.0]
+    q = np.zeros((len(angles), 6))
+    q[:, 5] = np.deg2rad(angles)
+    found = nameable(q, ROBOT, np.deg2rad(0.05))
+    # T turns to 455 either way: from 265 on, the same pose is beyond half a turn at -455, too
+    assert found.tolist() == [True, True, False, False, True, True, True, False, False, True, False]
+    assert not nameable(q[[1, 4]], ROBOT, np.deg2rad(3.0)).any()
 
 
 @pytest.mark.parametrize(("bend", "no_flip"), [(60, 0), (-60, 1)])

@@ -184,3 +184,9 @@ def test_contact_chart_stays_small():
     states = np.random.default_rng(0).integers(0, 5, (300, 140)).astype(np.uint8)
     assert len(contact_svg()) < 60_000
     assert len(contact_chart(**{**arguments, "states": states})) < 150_000
+
+
+def test_what_holds_the_joint_range_sum_up_is_marked_on_the_path():
+    held = contact_chart(**contact_arguments(), held_at=[12.0, 171.5])
+    assert "holds the joint range sum up" in texts(held)
+    assert "holds the joint range sum up" not in texts(contact_svg())

@@ -8,6 +8,7 @@ negative, as jobs saved by controllers show.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from opl.cell.full_turns import FULL_TURN, angular_distance
 from opl.cell.inverse_kinematics import inverse_kinematics
@@ -23,8 +24,55 @@ _HALF_TURN_JOINTS = (3, 5, 0)  # R, T, S
 # Farthest from the planned configuration [rad] that one read back may be. Rounding a pose moves the
 # configurations by far less, except next to a singularity, where the controller would be as lost.
 _SAME_CONFIGURATION = np.deg2rad(1.0)
-# At half a turn exactly, controllers differ on which side they see a joint.
+# At half a turn exactly, controllers differ on which side they see a joint. What is that near is
+# written a little beside it.
 _HALF_TURN_WIDTH = np.deg2rad(0.01)
+_BESIDE = 1.5 * _HALF_TURN_WIDTH
+
+
+def nameable(q: Array, robot: Robot, margin: float) -> NDArray[np.bool_]:
+    """Return which configurations a Cartesian position names without doubt, shape (...,).
+
+    RCONF tells whether a joint is beyond half a turn, not in which sense, and next to half a turn
+    it is anybody's guess.
+
+    Args:
+        q: Joint positions in [rad], shape (..., 6).
+        robot: Whose positions.
+        margin: How far in [rad] from half a turn a joint has to be.
+    """
+    named = np.ones(q.shape[:-1], dtype=bool)
+    for joint in _HALF_TURN_JOINTS:
+        angle = q[..., joint]
+        named &= np.abs(np.abs(angle) - np.pi) >= margin
+        other = np.remainder(angle + np.pi, FULL_TURN) - np.pi - np.sign(angle) * FULL_TURN
+        in_reach = (other >= robot.lower[joint]) & (other <= robot.upper[joint])
+        named &= ~((np.abs(angle) > np.pi) & in_reach)
+    return named
+
+
+def beside_half_turns(
+    q: Array, robot: Robot, width: float = _HALF_TURN_WIDTH, beside: float = _BESIDE
+) -> Array:
+    """Return configurations with no joint so near to half a turn that its side is in doubt.
+
+    Args:
+        q: Joint positions in [rad], shape (n, 6).
+        robot: Whose positions.
+        width: How near in [rad] is too near.
+        beside: How far away in [rad] such a joint is put: to the side where it is, or below half a
+            turn where it stands there exactly or the limits leave no other room.
+    """
+    q = np.array(q)
+    for joint in _HALF_TURN_JOINTS:
+        angle = q[:, joint]
+        near = np.abs(np.abs(angle) - np.pi) < width
+        outside = np.copysign(np.pi + beside, angle)
+        fits = (outside >= robot.lower[joint]) & (outside <= robot.upper[joint])
+        inside = np.copysign(np.pi - beside, angle)
+        moved = np.where((np.abs(angle) > np.pi) & fits, outside, inside)
+        q[:, joint] = np.where(near, moved, angle)
+    return q
 
 
 def frame_pose(settings: ProgramSettings) -> Array:
@@ -101,9 +149,6 @@ def require_read_back(robot: Robot, q: Array, values: str, numbers: tuple[int, .
     Raises:
         UnsafeError: If the controller would take another configuration, or could.
     """
-    for joint in _HALF_TURN_JOINTS:
-        if abs(abs(q[joint]) - np.pi) < _HALF_TURN_WIDTH:
-            raise _ambiguous(robot, q, joint, "its other half turn")
     T_frame_tool = rectan_pose(tuple(float(value) for value in values.split(",")))
     T_base_flange = T_base_frame @ T_frame_tool @ inverse(T_flange_tool)
     found = configurations(robot, T_base_flange, numbers, q)

@@ -10,7 +10,13 @@ import numpy as np
 from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import Array, inverse, rotation_angle
 from opl.program.controller import ControllerProfile
-from opl.program.inform.cartesian import frame_pose, rconf_of, rectan, require_read_back
+from opl.program.inform.cartesian import (
+    beside_half_turns,
+    frame_pose,
+    rconf_of,
+    rectan,
+    require_read_back,
+)
 from opl.program.moves import Move, Program
 from opl.program.pulses import PulseScale
 from opl.program.settings import PositionForm, ProgramSettings
@@ -50,6 +56,7 @@ def write_positions(
     if settings.positions is PositionForm.PULSES:
         texts = tuple(",".join(map(str, row)) for row in pulses.tolist())
         return WrittenPositions(texts, (None,) * len(q), scale.to_angles(pulses))
+    q = beside_half_turns(q, robot)
     T_base_frame, T_flange_tool = frame_pose(settings), settings.T_flange_tool
     values = rectan(inverse(T_base_frame) @ forward_kinematics(robot, q) @ T_flange_tool, profile)
     numbers = [rconf_of(robot, configuration) for configuration in q]
@@ -67,7 +74,8 @@ def rounded_to_job(
 ) -> Array:
     """Return the configurations nearest to some that a job can express, shape (n, 6) in [rad].
 
-    Pulses are whole, poses have few digits. A joint at its limit is rounded inwards.
+    Pulses are whole, poses have few digits. A joint at its limit is rounded inwards. In Cartesian
+    positions, joints that stand at half a turn are moved beside it.
 
     Raises:
         UnsafeError: If one is beyond the limits, or no Cartesian position names it.

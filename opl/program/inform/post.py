@@ -11,8 +11,14 @@ from opl.cell.robot import Robot
 from opl.errors import InputError
 from opl.findings import Finding, Level
 from opl.program.controller import ControllerProfile
-from opl.program.inform.cartesian import frame_pose
+from opl.program.inform.cartesian import frame_pose, nameable
 from opl.program.inform.compare import differences_in_meaning
+from opl.program.inform.conditions import (
+    TOOLS,
+    USER_FRAMES,
+    condition_files,
+    condition_findings,
+)
 from opl.program.inform.faults import job_faults
 from opl.program.inform.job import InformJob
 from opl.program.inform.job_layout import VARIABLES
@@ -67,20 +73,24 @@ def write_jobs(
             speeds[move.motion_index] = written_speed(line).text
             if np.isfinite(time):
                 times[move.motion_index] = float(time)
+    files |= condition_files(settings, profile)
     return Written(files, speeds, times, pass_times(program, times, profile.name))
 
 
 def _read(
     files: Mapping[str, bytes], robot: Robot, settings: ProgramSettings, profile: ControllerProfile
 ) -> Reading:
-    """Read the job files of a program: the master and all parts it calls.
+    """Read the files of a program: the master, all parts it calls, and condition files.
 
     Raises:
         InputError: If the files are no jobs, not those of one program, or of another robot.
     """
     jobs: dict[str, InformJob] = {}
-    refused: list[Finding] = []
+    conditions = {name: data for name, data in files.items() if name.upper().endswith(".CND")}
+    refused = [*condition_findings(conditions, settings, profile)]
     for source, data in files.items():
+        if source in conditions:
+            continue
         text, _ = decode(data)
         several = read_jobs(text, source)
         for job in several:
@@ -150,6 +160,12 @@ def post_of(profile: ControllerProfile) -> Post:
         corners,
         describe_file,
         file_differences,
+        lambda q, robot, settings, margin: (
+            np.ones(len(q), dtype=bool)
+            if settings.positions is PositionForm.PULSES
+            else nameable(q, robot, margin)
+        ),
+        (USER_FRAMES, TOOLS),
         lambda kind, settings: ramps(kind, settings).strip(),
     )
     return Post(

@@ -3,9 +3,8 @@
 for (const table of document.querySelectorAll("table.sortable")) {
   const body = table.querySelector("tbody");
   table.querySelectorAll<HTMLElement>("thead th").forEach((head, column) => {
-    const button = document.createElement("button");
-    button.append(...head.childNodes);
-    head.append(button);
+    const button = head.appendChild(document.createElement("button"));
+    button.append(...[...head.childNodes].slice(0, -1));
     button.addEventListener("click", () => {
       const down = head.getAttribute("aria-sort") === "ascending";
       for (const other of table.querySelectorAll("[aria-sort]")) other.removeAttribute("aria-sort");

@@ -1,8 +1,8 @@
 // The cell in three dimensions: posed, looked at from somewhere, cut open, coloured.
 
 import {
-  AmbientLight, BoxGeometry, BufferAttribute, BufferGeometry, Color, CylinderGeometry, DirectionalLight, DoubleSide, EdgesGeometry, Group, Line,
-  LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial, PerspectiveCamera, Plane, Points, PointsMaterial, Scene,
+  AmbientLight, BoxGeometry, BufferAttribute, BufferGeometry, Color, CylinderGeometry, DirectionalLight, DoubleSide, EdgesGeometry, Group, Light, Line,
+  LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial, Object3D, PerspectiveCamera, Plane, Points, PointsMaterial, Scene,
   SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
@@ -40,10 +40,15 @@ export class CellView {
   private frames: LineSegments | null = null;
   private red: string[] = [];
   private waiting = false;
+  private settling = 0;
+  private readonly moving: number;
   drawn = 0; // pictures made up to now
 
   constructor(private readonly canvas: HTMLCanvasElement, private readonly page: Page, private readonly block: Block) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true }); // kept for printing
+    this.renderer = new WebGLRenderer({ canvas, preserveDrawingBuffer: true }); // kept for printing
+    const gl = this.renderer.getContext();
+    const named = gl.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER;
+    this.moving = /swiftshader|llvmpipe|software/i.test(String(gl.getParameter(named))) ? 0.5 : devicePixelRatio;
     this.camera.up.set(0, 0, 1);
     this.scene.add(new AmbientLight(0xffffff, 1.6));
     for (const [x, y, z, much] of [[2, -3, 4, 2.2], [-3, 2, 1, 0.8]]) {
@@ -141,9 +146,8 @@ export class CellView {
 
   look(from: string): void {
     const [eye, target] = this.page.views[from].map((place) => new Vector3(...place));
-    const back = Math.max(1, 1.3 / this.camera.aspect); // a narrow screen needs more distance
-    this.controls.target.copy(target);
-    this.camera.position.copy(target).addScaledVector(eye.sub(target), back);
+    this.controls.target.copy(target); // a narrow screen needs more distance
+    this.camera.position.copy(target).addScaledVector(eye.sub(target), Math.max(1, 1.3 / this.camera.aspect));
     this.controls.update();
     this.draw();
   }
@@ -151,10 +155,12 @@ export class CellView {
   // The cell as it is posed, as binary glTF.
   async save(): Promise<Blob> {
     const copy = this.scene.clone();
-    copy.remove(...copy.children.filter((child) => child instanceof AmbientLight)); // glTF has none
+    const left: Object3D[] = []; // what glTF has no words for
     copy.traverse((one) => {
       if (one instanceof Mesh) one.material = new MeshStandardMaterial({ color: one.material.color, opacity: one.material.opacity, transparent: one.material.transparent });
+      else if (one instanceof Light || one instanceof Line || one instanceof Points) left.push(one);
     });
+    for (const one of left) one.removeFromParent();
     return new Blob([(await new GLTFExporter().parseAsync(copy, { binary: true })) as ArrayBuffer], { type: "model/gltf-binary" });
   }
 
@@ -163,11 +169,15 @@ export class CellView {
     this.draw();
   }
 
-  private draw(): void {
+  // In motion fast, where a processor paints even coarse; at rest twice as sharp as the screen.
+  private draw(ratio = this.moving): void {
+    clearTimeout(this.settling);
+    if (ratio === this.moving) this.settling = setTimeout(() => this.draw(2 * devicePixelRatio), 250);
     if (this.waiting) return;
     this.waiting = true;
     requestAnimationFrame(() => {
       this.waiting = false;
+      if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
       this.renderer.render(this.scene, this.camera);
       this.drawn++;
     });

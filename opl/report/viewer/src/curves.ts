@@ -7,7 +7,7 @@ type Line = { name: string; kind: string; xs: Unpacked; ys: Unpacked };
 const [WIDTH, HEIGHT] = [1000, 120];
 
 export class Curves {
-  private readonly cursors: SVGElement[] = [];
+  private readonly line = Object.assign(document.createElement("div"), { className: "cursor" }); // over all panels
 
   constructor(
     home: HTMLElement,
@@ -17,14 +17,12 @@ export class Curves {
     private readonly chosen: (time: number) => void,
     private readonly told: (text: string) => void,
   ) {
-    home.replaceChildren(...panels.map((panel) => this.figure(panel)));
+    home.replaceChildren(...panels.map((panel) => this.figure(panel)), this.line);
   }
 
   cursor(time: number | null): void {
-    for (const line of this.cursors) {
-      line.style.display = time === null ? "none" : "";
-      line.setAttribute("transform", `translate(${time === null ? 0 : this.across(time)} 0)`);
-    }
+    this.line.hidden = time === null;
+    this.line.style.left = `${(100 * (time ?? 0)) / (this.end || 1)}%`;
   }
 
   private across(time: number): number {
@@ -56,9 +54,6 @@ export class Curves {
       drawn.append(tip);
       svg.append(drawn);
     }
-    const cursor = shape("line", { x1: "0", x2: "0", y1: "0", y2: `${HEIGHT}`, class: "cursor", "vector-effect": "non-scaling-stroke" });
-    this.cursors.push(cursor);
-    svg.append(cursor);
     const caption = Object.assign(document.createElement("figcaption"), { textContent: title });
     const figure = document.createElement("figure");
     figure.append(caption, svg);

@@ -19,6 +19,7 @@ class Viewer {
   private readonly near: Unpacking<NonNullable<Page["clearance"]>> | null;
   private readonly lines = new Map<number, HTMLElement>(); // of the program, by the move they end
   private now: HTMLElement | undefined;
+  private readonly end: number;
   private time = 0;
   private playing = 0; // when the last picture was made; 0 at rest
 
@@ -26,6 +27,7 @@ class Viewer {
     const { motion, clearance: near } = page;
     this.motion = motion && block.all(motion);
     this.near = near && block.all(near);
+    this.end = this.motion?.time.at(-1) ?? 0;
     this.view = this.open();
     this.chart = page.field === null ? null : new ContactChart(page, block, (cell) => this.showCell(cell), tell);
     if (this.motion !== null) this.connectPlayer();
@@ -37,10 +39,6 @@ class Viewer {
     if (page.marks.start !== undefined) this.showMark(page.marks.start);
     else if (this.motion !== null) this.showTime(0);
     else if (page.home !== null) this.show({ q: page.home, time: null, point: null, t: null, hit: [], text: "home" });
-  }
-
-  get end(): number {
-    return this.motion === null ? 0 : this.motion.time[this.motion.time.length - 1];
   }
 
   show(shown: Shown): void {
@@ -213,7 +211,6 @@ class Viewer {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.view?.recolour());
   }
 
-  // Colours along the passes in the view, with a scale beside it.
   private paintPasses(what: string): void {
     const paint = this.page.paints[what];
     element("scale").hidden = paint === undefined;

@@ -1,0 +1,52 @@
+"""Compiled kernels are kept where somebody can write."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from opl.files import kernel_cache
+from opl.files.kernel_cache import settle_kernel_cache
+
+
+@pytest.fixture(autouse=True)
+def apart(monkeypatch, tmp_path):
+    """An environment of its own, and what is registered for the end done at once."""
+    done = []
+    monkeypatch.setattr(kernel_cache.atexit, "register", lambda *one, **named: done.append(one))
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "MPLCONFIGDIR"):
+        monkeypatch.setenv(name, "")
+        monkeypatch.delenv(name)
+    yield
+    for remove, *arguments in done:
+        remove(*arguments)
+
+
+def blocked(path):
+    """Return a place where no folder can be made, for root neither: below a file."""
+    path.write_text("")
+    return path / "below"
+
+
+def test_beside_the_code_or_in_the_home_is_no_matter(tmp_path, caplog):
+    settle_kernel_cache(tmp_path)
+    assert "NUMBA_CACHE_DIR" not in os.environ
+    settle_kernel_cache(blocked(tmp_path / "installed"))
+    assert os.environ["NUMBA_CACHE_DIR"] == str(tmp_path / "home" / ".cache" / "opl")
+    assert caplog.text == ""
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_nowhere_to_write_is_said_once_with_the_variable(tmp_path, monkeypatch, caplog, given):
+    monkeypatch.setenv("HOME", str(blocked(tmp_path / "file")))
+    if given:
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "x"))
+    place = blocked(tmp_path / "installed") if not given else tmp_path
+    settle_kernel_cache(place)
+    settle_kernel_cache(place)
+    (record,) = caplog.records
+    assert "are compiled anew at every start" in record.getMessage()
+    assert "set NUMBA_CACHE_DIR to a folder that can" in record.getMessage()
+    assert Path(os.environ["NUMBA_CACHE_DIR"]).is_dir()
+    assert os.environ["MPLCONFIGDIR"] == os.environ["NUMBA_CACHE_DIR"]
