@@ -8,8 +8,8 @@ import opl
 
 # what every bound covers, and what it is not about
 COVERED = (
-    "at any contact positions, each pass on one IK branch and count of full turns (approach, links "
-    "and retract not counted)"
+    "at any contact positions, each pass on an IK branch and count of full turns of its own "
+    "(approach, links and retract not counted)"
 )
 MOST_HOLDERS = 4  # that are named
 OBJECTIVES = {
@@ -40,9 +40,10 @@ def _certified(report: opl.Report) -> Iterator[str]:
     bound, gap = path.lower_bound_rad, path.gap
     if bound is None or gap is None:
         return
+    why = "" if path.open_because is None else f"; more than wanted: {path.open_because}"
     yield (
-        f"no motion along these passes has a joint range sum below {bound:.4f} rad, "
-        f"{COVERED}: the one found is within {100.0 * gap:.3f} % of the least there is"
+        f"no motion along these passes has a joint range sum below {bound:.4f} rad, {COVERED}, "
+        f"with the plan's clearances: the one found is within {100.0 * gap:.3f} % of the least{why}"
     )
 
 

@@ -170,6 +170,8 @@ def _read(path: Path) -> trimesh.Trimesh:
         mesh = trimesh.load_mesh(BytesIO(content), file_type=path.suffix.lower()[1:])
         if len(mesh.faces) > MOST_TRIANGLES:
             raise ValueError(f"has {len(mesh.faces)} triangles, at most {MOST_TRIANGLES} are taken")
+        if mesh.faces.shape[1:] != (3,) or mesh.vertices.shape[1:] != (3,):
+            raise ValueError("its triangles are none")
         if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
             raise ValueError(f"its triangles name corners beyond its {len(mesh.vertices)}")
         mesh.merge_vertices(merge_tex=True, merge_norm=True)

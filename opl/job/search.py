@@ -152,9 +152,9 @@ class SearchSection(Document):
         "smoother path.",
     )
     max_subproblems: Annotated[int, between(1, 10_000_000)] = Field(
-        default=4000,
-        description="Subproblems of the proof of the least joint range sum that are looked at, at "
-        "the most.",
+        default=12000,
+        description="Work that the proof of the least joint range sum may take at the most: each "
+        "subproblem counts as one, and so do four places that a box is held against.",
     )
     weights: WeightsSection = Field(
         default=WeightsSection(),

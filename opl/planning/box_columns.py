@@ -103,14 +103,11 @@ class ColumnSampler:
             np.interp(places, np.arange(len(points)), points.arc_length),
         )
         positions = problem.field.contact_positions
-        whole = places % 1.0 == 0.0
-        q = np.empty((len(places), len(positions), *problem.field.q.shape[2:]))
-        q[whole] = problem.field.q[before[whole]]
-        q[~whole] = inverse_solutions(
-            problem.cell, there.Ts_workpiece_cutter[~whole][:, None], positions
-        )
-        grid = np.broadcast_to(positions, q.shape[:2])
-        coarse = self._placed(there.pass_index, q, placements)
+        grid = np.broadcast_to(positions, (len(places), len(positions)))
+        field = self._placed(points.pass_index, problem.field.q, placements)
+        after = np.ceil(places).astype(int)
+        # between cutter points near enough to see where the box may be met
+        coarse = field[before] + (places - before)[:, None, None] * (field[after] - field[before])
         free = ~self._cuts(places, there, grid) & ~np.isnan(coarse[..., 0])
         t, _ = sampled(grid, coarse, free, box, FINE, whole=True)
         # where the part begins to cut is known to a hair only

@@ -7,9 +7,8 @@ the box between two places, more places are taken in.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,7 +22,7 @@ from opl.planning.nodes import NodeField, NodeMatrix
 from opl.planning.open_matrix import Track, open_matrices
 from opl.planning.plan import Found, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem
-from opl.planning.rows import Row, levels, shut_edges
+from opl.planning.rows import Bulges, Row, levels, shut_edges
 from opl.planning.symmetry import twins
 from opl.search.box import JointBox
 from opl.search.in_box import missing as missing_of
@@ -39,7 +38,7 @@ LEVELS = 4  # contact positions of a sweep that are looked at
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
 MOST_CHECKS = 12  # of motions in one box
-LAZY_ROUNDS = 3  # in which only the nodes of a track are asked for their clearance
+MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
 
 
 class BoxTracks:
@@ -124,20 +123,6 @@ class BoxTracks:
         return plan
 
 
-@dataclass(frozen=True)
-class Bulges:
-    """Where a track leaves its box between two places.
-
-    Attributes:
-        places: More places there, shape (n,).
-        sweeps: Place and contact position, and whether that rises, where it is outside of the box
-            while the contact moves over the wheel.
-    """
-
-    places: Array
-    sweeps: tuple[tuple[float, float, bool], ...]
-
-
 class _Sampled:
     """The nodes of some places at contact positions of their own."""
 
@@ -179,29 +164,33 @@ class _Sampled:
 
     def smoothest(self) -> Track | None:
         """Return the smoothest track in the matrix that is farthest from the limits."""
-        search = self._search
+        search, without = self._search, set()
         for index, matrix in enumerate(self.matrices):
+            # images differ in their limits only: one with the same nodes has no track either
+            left = matrix.free.tobytes(), matrix.blocked_edges.tobytes()
+            if left in without:
+                continue
+            without.add(left)
             cost = track_cost(
                 self.problem, matrix.nodes, replace(search._costs, push_weight=0.0), matrix.free
             )
             ladder = matrix.ladder_within(search._max_contact_change)
             asked = np.zeros_like(matrix.free)
             columns = np.arange(len(matrix.free))
-            for lazy in itertools.count():
+            for asking in range(MOST_ROUNDS + 1):
                 edges = matrix.blocked_edges
                 found = smoothest_within(ladder, edges, matrix.free, cost, search._most)
                 if found is None:
                     break
-                # along most tracks nothing is nearer than wanted: at first only its nodes are asked
-                now = matrix.free & ~asked
-                if lazy < LAZY_ROUNDS:
-                    on_track = np.zeros_like(now)
-                    on_track[columns, found.rows] = True
-                    now &= on_track
-                charge = search.push_charge(matrix.nodes.q[now])
-                if not charge.any():
+                # only along the track, and all over columns where something is nearer than wanted
+                new = ~asked[columns, found.rows]
+                charge = search.push_charge(matrix.nodes.q[columns[new], found.rows[new]])
+                now = np.zeros_like(asked)
+                now[columns[new][charge > 0.0]] = True
+                now &= matrix.free & ~asked
+                if asking == MOST_ROUNDS or not now.any():
                     return Track(index, found.rows)
-                cost.node_cost[now] += charge
+                cost.node_cost[now] += search.push_charge(matrix.nodes.q[now])
                 asked |= now
         return None
 
@@ -266,7 +255,7 @@ class _Sampled:
             search.checks += len(proposals)
             following = self.smoothest()
             if following is None:
-                return None
+                break
             track = following
         return None
 

@@ -6,7 +6,7 @@ flipped. Which image a pass uses is its placement.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from opl.search.box import JointBox
 from opl.search.in_box import JUMP
 from opl.search.outside import outside
 
+MOST_COLUMNS = 1000  # at which a box is held against the families
 FEW_COLUMNS = 40  # over which a box is grown at first
 STARTS = 8  # nodes from which one is grown
 MOST_PASSES = 8  # in which families are ruled out before the proof begins
@@ -94,8 +95,16 @@ def grown(q: Array, free: np.ndarray, box: JointBox) -> JointBox | None:
     return JointBox(low, high)
 
 
+def few_columns(pass_index: np.ndarray) -> np.ndarray:
+    """Return columns spread over all of them, both ends of each pass among them."""
+    step = -(-len(pass_index) // MOST_COLUMNS)
+    ends = np.flatnonzero(np.diff(pass_index))
+    last = len(pass_index) - 1
+    return np.unique(np.concatenate([np.arange(0, last, step), ends, ends + 1, [last]]))
+
+
 class Families:
-    """The unrolled angles of every family at some places.
+    """The unrolled angles of every family at cutter points spread over the passes.
 
     Args:
         images: The images of each posture.
@@ -106,6 +115,8 @@ class Families:
 
     def __init__(self, images: Images, q: Array, cuts: np.ndarray, pass_index: np.ndarray) -> None:
         self._images = images
+        self._places = few = few_columns(pass_index)
+        q, cuts, pass_index = q[few], cuts[few], pass_index[few]
         self._pass_index = pass_index
         self._unrolled = {}
         for family in images.families:
@@ -145,7 +156,7 @@ class Families:
             left = [lacks for lacks in left if lacks.any()]
             while left:
                 worst = int(np.argmax(np.sum(left, axis=0)))
-                places.append(float(columns[worst]))
+                places.append(float(self._places[columns[worst]]))
                 left = [lacks for lacks in left if not lacks[worst]]
         return places
 
@@ -160,7 +171,7 @@ class Families:
             box = larger
         return box
 
-    def fits(self, index: int, low: Array, high: Array, reference: bool) -> list[Fit]:
+    def _fits(self, index: int, low: Array, high: Array, reference: bool) -> list[Fit]:
         """Return how every image of every family of a pass fits into a box.
 
         Args:
@@ -187,3 +198,38 @@ class Families:
                 outside(q, np.ascontiguousarray(open_now), low, high, JUMP, missing, row)
                 found.append(Fit(placement, missing, row))
         return found
+
+    def hold(
+        self, box: JointBox, reference: int, known: Collection[float], allowed: float
+    ) -> tuple[list[Placement], list[float]]:
+        """Return the image of each pass that fits a box best, and where passes miss it most.
+
+        Args:
+            box: The box.
+            reference: The pass of which only the families themselves count, not their images.
+            known: Cutter points that are held against the box already.
+            allowed: What it may miss in [rad].
+
+        Returns:
+            The images, and the worst cutter point of each pass, the worst of all first.
+        """
+        placements, missed = [], []
+        for index in range(int(self._pass_index[-1]) + 1):
+            fits = self._fits(index, box.lower, box.upper, index == reference)
+            columns = self._places[self._pass_index == index]
+            there = np.array([float(column) in known for column in columns])
+            # the image that the proof has in mind: the walls of the pass fit into the box
+            best = min(fits, key=lambda fit: _misfit(fit, there))
+            placements.append(best.placement)
+            missing = np.where(there, -1.0, best.missing)
+            worst = int(np.argmax(missing))
+            if missing[worst] > allowed:
+                missed.append((float(missing[worst]), float(columns[worst])))
+        missed.sort(reverse=True)
+        return placements, list(dict.fromkeys(place for _, place in missed))
+
+
+def _misfit(fit: Fit, known: np.ndarray) -> tuple[float, float]:
+    """Return what a box misses of the walls of a pass, and of all its columns."""
+    at_walls = float(fit.missing[known].max(initial=0.0))
+    return round(at_walls, 2), float(fit.missing.max())

@@ -1,31 +1,31 @@
 """The least joint range sum, proven for every contact position, and the motion that attains it.
 
 The proof works on boxes of joint space and few walls; a box that it proposes is held against all
-cutter points, and one that no posture of some cutter point lies in makes that cutter point a wall.
-In a box that misses none the smoothest motion is sought. The proof ends when nothing is left that
-could be smaller than the best motion by more than the gap.
+cutter points, and a cutter point that it misses becomes a wall. In a box that misses none the
+smoothest motion is sought, until nothing can be smaller than the best by more than the gap.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from opl.geometry.frames import Array
 from opl.planning.box_columns import Columns, ColumnSampler
-from opl.planning.box_track import BoxTracks, Bulges
+from opl.planning.box_track import BoxTracks
 from opl.planning.columns import ColumnWalls, Sweep
 from opl.planning.costs import CostWeights
-from opl.planning.families import Families, Fit, Placement, grown
+from opl.planning.families import Families, few_columns, grown
 from opl.planning.holders import Holder, holders
 from opl.planning.images import Images, seams_of
 from opl.planning.obstructed import Obstructions
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
-from opl.planning.rows import Row
+from opl.planning.rows import Bulges, Row
 from opl.search.box import JointBox
-from opl.search.least_box import BoxProof, Candidate
+from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
 
 PROOF_SHARE = 0.9  # of the widening: how far the bound may stay below the path
@@ -35,6 +35,7 @@ RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
 SWEEP_MISSED = 0.2  # of the widening: what it may miss a contact position by between them
 PLACE_DIGITS = 5  # of places, in cutter points
+PLACES_OF_WORK = 4  # that cost as much to look at as a subproblem
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
 
@@ -48,7 +49,7 @@ class OptimalSettings:
             smoother track.
         max_contact_change: Largest change of t between neighbouring columns in belt units.
         costs: What a track is charged for inside the box.
-        max_subproblems: How many subproblems of the proof are looked at, at the most.
+        max_subproblems: How much is tried: subproblems, and places held against a box.
     """
 
     widen: float
@@ -66,46 +67,63 @@ class OptimalSearch:
         fallback: A motion that is known.
     """
 
-    def __init__(self, problem: GrindingProblem, settings: OptimalSettings, fallback: Plan) -> None:
+    def __init__(
+        self, problem: GrindingProblem, settings: OptimalSettings, fallback: Plan | None
+    ) -> None:
         self._problem = problem
         self._points = problem.points
         self._settings = settings
-        seams = seams_of(problem.field.q)
-        found = fallback.path.joint_range_sum
-        images = Images(problem.cell.robot, seams, found)
+        seams = seams_of(problem.field.q[few_columns(problem.points.pass_index)])
+        robot = problem.cell.robot
+        largest, most = float((robot.upper - robot.lower).sum()), Travel(np.inf, np.inf)
+        if fallback is not None:
+            largest = fallback.path.joint_range_sum
+            most = Travel(fallback.path.joint_travel, fallback.path.contact_travel)
+        images = Images(robot, seams, largest)
         part, points = problem.scene.part, problem.points
         self._walls = ColumnWalls(problem.cell, part, points, images)
         self._families = Families(images, problem.field.q, problem.cuts, points.pass_index)
         self._sampler = ColumnSampler(problem, seams)
-        most = Travel(fallback.path.joint_travel, fallback.path.contact_travel)
         self._tracks = BoxTracks(
             problem, self._sampler, settings.costs, settings.max_contact_change, most
         )
         self.plan = fallback
+        self._largest = largest
         self._proven = self._least_hope = 0.0
         self._spent = self._given_up = 0
         gap = PROOF_SHARE * settings.widen
-        self.proof = BoxProof(self._walls.images.of, self._walls.finer, found, gap)
+        self.proof = BoxProof(self._walls.images.of, self._walls.finer, largest, gap)
         self._places: set[float] = set()
         self._rows: list[tuple[Array, float, bool]] = []
         self._passed: set[tuple[float, float, float]] = set()
         self._columns = np.arange(len(problem.points), dtype=float)
         self._hope(self._families.smallest_grown())
-        n = len(problem.points)
-        first = [0.0, float(n // 2), float(n - 1)]
+        first = [0.0, float(len(points) // 2), float(len(points) - 1)]
         self._add(list(dict.fromkeys(first + self._families.unreached())))
 
     @property
     def finished(self) -> bool:
         """Whether there is nothing left to do."""
+        done = self.proof.closed and self.proof.threshold >= self._value
+        return done or self._given_up >= MOST_GIVEN_UP or self.work_share >= 1.0
+
+    @property
+    def work_share(self) -> float:
+        """How much of the work allowed is done."""
+        return (self._spent + self.proof.subproblems) / self._settings.max_subproblems
+
+    @property
+    def open_because(self) -> str | None:
+        """Why the bound is further off than wanted, None if it is not."""
+        if self.lower_bound >= self._value * (1.0 - self._settings.widen):
+            return None
         if self._given_up >= MOST_GIVEN_UP:
-            return True
-        spent = self._spent + self.proof.subproblems >= self._settings.max_subproblems
-        return spent or (self.proof.closed and self.proof.threshold >= self._value)
+            return "no motion was found nearer to the bound"
+        return "the work allowed for the proof was done before it was complete"
 
     @property
     def _value(self) -> float:
-        return self.plan.path.joint_range_sum
+        return self._largest if self.plan is None else self.plan.path.joint_range_sum
 
     @property
     def lower_bound(self) -> float:
@@ -125,7 +143,10 @@ class OptimalSearch:
         if candidate is None:
             return
         box = JointBox(candidate.low, candidate.high)
-        placements, missed = self._hold(candidate)
+        share = MISSED * self._settings.widen if candidate.settled else CLEARLY_MISSED
+        reference, allowed = self.proof.walls[0].pass_index, share * self.proof.threshold
+        placements, missed = self._families.hold(box, reference, self._places, allowed)
+        missed = missed[:MOST_ADDED]
         if not candidate.settled:
             if not self._sampler.collisions:
                 self._hope(self._families.grown(box, placements))
@@ -137,6 +158,7 @@ class OptimalSearch:
             return
         columns = None
         if len({(one.family, float(one.flip[0][4])) for one in placements}) == 1:
+            self._spent += len(self._columns) // PLACES_OF_WORK
             columns = self._sampler.columns(box, placements, self._columns)
             rows = self._sampler.rows(self._rows, columns)
             inner = grown(columns.q, columns.free, box)
@@ -153,7 +175,6 @@ class OptimalSearch:
         elif candidate.bound < self.proof.closing and not self._sampler.collisions:
             self._mind_collisions()
         elif candidate.bound < self.proof.closing:
-            # the bound cannot rise further; the path may still come nearer to it
             self._given_up += 1
             self.proof.give_up()
 
@@ -226,42 +247,14 @@ class OptimalSearch:
                 walls.append(Sweep(key[0], key[1], t, upwards))
                 continue
             self._rows.append((row.places, t, must))
-            stretches = row.inside(box.widened(room / 2.0))
-            more.append(np.append(stretches.ravel(), stretches.mean(axis=1)))
+            for begin, stop in row.inside(box.widened(room / 2.0)):
+                if not ((self._columns >= begin) & (self._columns <= stop)).any():
+                    more.append(np.array([(begin + stop) / 2.0]))
         for wall in self._walls.sweeps(walls) if walls else ():
             self.proof.add(wall)
-        grown = np.union1d(self._columns, np.round(np.concatenate(more), PLACE_DIGITS))
-        new = len(grown) > len(self._columns) or len(self._rows) > known or bool(walls)
-        self._columns = grown
-        return new
-
-    def _hold(self, candidate: Candidate) -> tuple[list[Placement], list[float]]:
-        """Return the image of each pass that fits into the box, and the cutter points it misses."""
-        share = MISSED * self._settings.widen if candidate.settled else CLEARLY_MISSED
-        allowed = share * self.proof.threshold
-        reference = self.proof.walls[0].pass_index
-        placements, missed = [], []
-        for index in range(self._points.n_passes):
-            fits = self._families.fits(index, candidate.low, candidate.high, index == reference)
-            first = int(np.argmax(self._points.pass_index == index))
-            columns = range(first, first + len(fits[0].missing))
-            known = np.array([float(column) in self._places for column in columns])
-            # the image that the candidate has in mind: the walls of the pass fit into the box
-            best = min(fits, key=lambda fit: self._misfit(fit, known))
-            placements.append(best.placement)
-            missing = np.where(known, -1.0, best.missing)
-            worst = int(np.argmax(missing))
-            if missing[worst] > allowed:
-                missed.append((float(missing[worst]), float(first + worst)))
-        missed.sort(reverse=True)
-        places = list(dict.fromkeys(place for _, place in missed))
-        return placements, places[:MOST_ADDED]
-
-    @staticmethod
-    def _misfit(fit: Fit, known: np.ndarray) -> tuple[float, float]:
-        """Return what a box misses of the walls of a pass, and of all its columns."""
-        at_walls = float(fit.missing[known].max(initial=0.0))
-        return round(at_walls, 2), float(fit.missing.max())
+        before = len(self._columns)
+        self._columns = np.union1d(self._columns, np.round(np.concatenate(more), PLACE_DIGITS))
+        return len(self._columns) > before or len(self._rows) > known or bool(walls)
 
     def _try(self, columns: Columns, rows: list[Row], box: JointBox) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
@@ -280,19 +273,28 @@ class OptimalSearch:
         return learnt
 
 
-def plan_optimal(problem: GrindingProblem, settings: OptimalSettings, fallback: Plan) -> Plan:
+def plan_optimal(
+    problem: GrindingProblem,
+    settings: OptimalSettings,
+    fallback: Plan | None,
+    report: Callable[[float], None] = lambda _: None,
+) -> Plan | None:
     """Find the collision-free motion with the least joint range sum, the smoothest of these.
 
     Args:
         problem: What is to be planned.
         settings: What is wanted.
-        fallback: The motion to return if no better one is found. Joints and contact should not
-            travel further than along it.
+        fallback: A motion that is known, if one is: joints and contact should travel no further.
+        report: Given how much of the work allowed is done, after every step; may raise.
 
     Returns:
-        The plan with its lower bound.
+        The plan with its lower bound; None only if no motion was known and none was found.
     """
     search = OptimalSearch(problem, settings, fallback)
     while not search.finished:
         search.step()
-    return replace(search.plan, lower_bound=search.lower_bound, holders=search.holders())
+        report(min(search.work_share, 1.0))
+    if search.plan is None:
+        return None
+    bound, why, held = search.lower_bound, search.open_because, search.holders()
+    return replace(search.plan, lower_bound=bound, open_because=why, holders=held)

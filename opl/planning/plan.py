@@ -48,6 +48,7 @@ class Plan:
         checks: How many motions were checked, this one included.
         lower_bound: No motion through the cutter points has a smaller joint range sum, whatever the
             contact positions, in [rad]; None if no bound was wanted.
+        open_because: Why the bound is further off than wanted, in words; None if it is not.
         objective: What was kept small, where that is not the joint range sum alone.
         holders: What keeps the joint range sum from being smaller, what could gain most first.
     """
@@ -56,6 +57,7 @@ class Plan:
     motion: Motion
     checks: int
     lower_bound: float | None = None
+    open_because: str | None = None
     objective: ObjectiveValue | None = None
     holders: tuple[Holder, ...] = ()
 

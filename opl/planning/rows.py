@@ -50,6 +50,20 @@ class Row:
         return np.stack([first[starts], np.append(last[:-1][starts[1:]], last[-1:])], axis=1)
 
 
+@dataclass(frozen=True)
+class Bulges:
+    """Where a track leaves its box between two places.
+
+    Attributes:
+        places: More places there, shape (n,).
+        sweeps: Place and contact position, and whether that rises, where it is outside of the box
+            while the contact moves over the wheel.
+    """
+
+    places: Array
+    sweeps: tuple[tuple[float, float, bool], ...]
+
+
 def levels(places: Array, rows: Sequence[Row], box: JointBox, otherwise: Array) -> Array:
     """Return the contact positions of the rows that a box holds at each place, shape (n, k).
 

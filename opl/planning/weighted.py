@@ -10,7 +10,7 @@ that of travel and time, added up.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,7 +35,11 @@ Entry = tuple[float, int, int, tuple[int, ...]]  # weighted sum, matrix, widenin
 
 
 def plan_weighted(
-    problem: GrindingProblem, weights: ObjectiveWeights, settings: OptimalSettings, fallback: Plan
+    problem: GrindingProblem,
+    weights: ObjectiveWeights,
+    settings: OptimalSettings,
+    fallback: Plan,
+    report: Callable[[float], None] = lambda _: None,
 ) -> Plan:
     """Find a collision-free motion with a small weighted sum, and a bound on the least one.
 
@@ -44,13 +48,16 @@ def plan_weighted(
         weights: What is charged for.
         settings: What is wanted of the least joint range sum.
         fallback: A motion that is known; returned if none better is found.
+        report: As of `plan_optimal`.
 
     Returns:
         The plan with its weighted sum and what that can be at the least.
     """
     prices = CostWeights(np.full(6, weights.travel), 0.0, weights.time, 0.0, 0.0, 0.0, 0.0)
     matrices = open_matrices(problem)
-    smallest = plan_optimal(problem, settings, fallback) if weights.joint_range > 0.0 else fallback
+    smallest = fallback
+    if weights.joint_range > 0.0:
+        smallest = plan_optimal(problem, settings, fallback, report) or fallback
     least_range = smallest.lower_bound or 0.0
     box = JointBox(smallest.path.q.min(axis=0), smallest.path.q.max(axis=0))
     lower_bound = weights.joint_range * least_range

@@ -111,6 +111,7 @@ def _path(planned: Planned) -> result.PathReport:
         lower_bound_rad=_rounded(plan.lower_bound),
         held_by=[_holder(one, path.joint_range_sum, robot) for one in plan.holders],
         gap=_rounded(plan.gap),
+        open_because=plan.open_because,
         weighted=objective if search.objective is Objective.WEIGHTED else None,
         objective_value=objective,
     )

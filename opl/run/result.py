@@ -77,9 +77,10 @@ class PathReport:
     contact_travel: float
     nodes: int
     intermediate_nodes: int
-    lower_bound_rad: float | None  # no path has a smaller sum, whatever its contact positions
+    lower_bound_rad: float | None  # no motion kept as clear has a smaller sum
     held_by: Sequence[HolderReport]
     gap: float | None  # fraction by which the sum may be above the least there is
+    open_because: str | None  # why the gap is wider than wanted
     weighted: ObjectiveReport | None
     objective_value: ObjectiveReport | None  # of travel, time or weighted sum
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from opl.job.search import Method, Objective, Search
@@ -15,13 +15,14 @@ from opl.planning.equals import quickest_of_equals
 from opl.planning.least_cost import least_cost
 from opl.planning.multi_start import Start, plan_recursive, try_recursive
 from opl.planning.optimal import plan_optimal
-from opl.planning.plan import Found, ObjectiveValue, Plan
+from opl.planning.plan import Found, ObjectiveValue, OutOfBudget, Plan, SearchOutcome
 from opl.planning.problem import GrindingProblem
 from opl.planning.weighted import plan_weighted
 from opl.run.values import Prepared
 
 # of motions from the paper's start node, which are searched for comparison only
 MOST_CHECKS = 20
+MOST_FIRST_CHECKS = 40  # of motions of the recursive search, before the proof begins without it
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,10 @@ class FoundPaths:
 
 
 def search_path(
-    search: Search, problem: GrindingProblem, nameable: Nameable | None = None
+    search: Search,
+    problem: GrindingProblem,
+    nameable: Nameable | None = None,
+    report: Callable[[float], None] = lambda _: None,
 ) -> FoundPaths:
     """Search the path by the method and for the objective of a job.
 
@@ -47,29 +51,47 @@ def search_path(
         search: What the job wants.
         problem: What is to be planned.
         nameable: Which configurations the program names without doubt; None for all.
+        report: Given how much of the work allowed is done, often; may raise.
 
     Raises:
         NoPathError: If there is none.
     """
-    recursive = plan_recursive(problem, search.start)
+    first: SearchOutcome | None = None
+    if search.method is Method.OPTIMAL and search.objective is Objective.RANGE:
+        first = try_recursive(problem, search.start, MOST_FIRST_CHECKS)
+        if isinstance(first, OutOfBudget):
+            # what it proposes collides again and again: the proof knows better where not to look
+            best = plan_optimal(problem, search.optimal, None, report)
+            if best is not None:
+                return FoundPaths(_finished(search, problem, best, nameable), best)
+    recursive = first.plan if isinstance(first, Found) else plan_recursive(problem, search.start)
     plan = recursive
     if search.method is Method.OPTIMAL:
-        plan = _search_best(search, problem, recursive)
+        plan = _search_best(search, problem, recursive, report)
+    return FoundPaths(_finished(search, problem, plan, nameable), recursive)
+
+
+def _finished(
+    search: Search, problem: GrindingProblem, plan: Plan, nameable: Nameable | None
+) -> Plan:
+    """Return the quickest of the equals of a plan, its leads no longer than they need be."""
     quickest = quickest_of_equals(problem, plan, search.counts_ranges, nameable)
     if nameable is not None:
         quickest = clear_of_borders(problem, quickest, nameable)
     motion = shortened(quickest.motion, problem.scene.free_moves.joined)
-    return FoundPaths(replace(quickest, motion=motion), recursive)
+    return replace(quickest, motion=motion)
 
 
-def _search_best(search: Search, problem: GrindingProblem, recursive: Plan) -> Plan:
+def _search_best(
+    search: Search, problem: GrindingProblem, recursive: Plan, report: Callable[[float], None]
+) -> Plan:
     settings = search.optimal
     change = settings.max_contact_change
     if search.objective is Objective.RANGE:
-        return plan_optimal(problem, settings, recursive)
+        return plan_optimal(problem, settings, recursive, report) or recursive
     if search.objective is Objective.WEIGHTED:
         weights = search.objective_weights
-        return plan_weighted(problem, weights, settings, recursive)
+        return plan_weighted(problem, weights, settings, recursive, report)
     travel, time = (0.0, 1.0) if search.objective is Objective.TIME else (1.0, 0.0)
     joint_weights = travel * settings.costs.joint_weights
     costs = replace(settings.costs, joint_weights=joint_weights, time_weight=time)

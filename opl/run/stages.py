@@ -63,8 +63,8 @@ def plan_path(surfaced: Surfaced, watch: Watch | None = None) -> Planned | Refus
 def _plan(surfaced: Surfaced, watch: Watch) -> Planned | Refused:
     prepared, job = prepare(surfaced, watch), surfaced.job
     try:
-        with watch.stage(Stage.SEARCH):
-            found = search_path(job.search, prepared.problem, _nameable(job))
+        with watch.stage(Stage.SEARCH) as report:
+            found = search_path(job.search, prepared.problem, _nameable(job), report)
     except NoPathError as error:
         return _without_path(prepared, error, watch)
     with watch.stage(Stage.COMPARISON):

@@ -9,12 +9,17 @@ import pytest
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
+from opl.cell.collision import CollisionScene
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.motion.collision_check import RESOLUTION, densify
 from opl.motion.figures import figures_of_path
 from opl.planning.cheapest import plan_cheapest
+from opl.planning.columns import ColumnWalls
 from opl.planning.costs import ObjectiveWeights
+from opl.planning.images import Images, seams_of
 from opl.planning.least_cost import least_cost
 from opl.planning.multi_start import plan_recursive
+from opl.planning.obstructed import Obstructions
 from opl.planning.optimal import plan_optimal
 from opl.planning.weighted import plan_weighted
 from opl.verification.replay import replay
@@ -174,6 +179,48 @@ def test_an_interrupted_search_returns_what_there_was_and_a_bound_that_holds():
     plan = plan_optimal(problem, replace(SETTINGS, max_subproblems=1), recursive(one_row))
     assert plan.motion is recursive(one_row).motion
     assert 0.0 <= plan.lower_bound <= optimal(one_row).lower_bound + 1e-12
+
+
+def test_a_search_can_be_stopped_after_every_step():
+    def report(share):
+        assert 0.0 <= share <= 1.0
+        seen.append(share)
+        if len(seen) == 3:
+            raise InterruptedError
+
+    seen = []
+    with pytest.raises(InterruptedError):
+        plan_optimal(one_row(), SETTINGS, recursive(one_row), report)
+    assert seen == sorted(seen)
+
+
+def test_without_a_motion_that_is_known_the_proof_finds_one():
+    plan = plan_optimal(one_row(), SETTINGS, None)
+    assert plan.gap <= SETTINGS.widen
+    assert plan.lower_bound <= optimal(one_row).path.joint_range_sum
+
+
+def test_what_is_left_out_of_a_wall_collides_all_over():
+    problem = one_row()
+    cell = problem.cell
+    images = Images(cell.robot, seams_of(problem.field.q), 10.0)
+    wall = ColumnWalls(cell, problem.scene.part, problem.points, images).walls([7.0])[0]
+    scene = CollisionScene(cell.widened(0.036))
+    obstructions = Obstructions(scene, images)
+    T_workpiece_cutter = problem.points.Ts_workpiece_cutter[7]
+    left_out, kept = [], 0
+    for piece in wall.pieces:
+        t = np.linspace(piece.at[0], piece.at[-1], 400)
+        q = inverse_kinematics(cell.robot.arm, cell.Ts_base_flange(t, T_workpiece_cutter))
+        inside = np.zeros(len(t), dtype=bool)
+        for left in obstructions.clear(piece):
+            inside |= (t >= left.at[0]) & (t <= left.at[-1])
+        for branch in (piece.family, piece.family + 4):
+            left_out.append(q[~inside, branch])
+        kept += int(inside.sum())
+    left_out = np.concatenate(left_out)
+    assert kept > 50 and len(left_out) > 100
+    assert scene.collides(left_out).all()
 
 
 def test_an_interrupted_proof_still_leaves_a_verified_program(tmp_path):

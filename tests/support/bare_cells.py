@@ -104,5 +104,8 @@ class Ghosts:
     def against_surroundings(self, reserve):
         return Ghosts(self._q, self._radius + reserve)
 
+    def less(self, amount):
+        return Ghosts(self._q, self._radius - amount)
+
     def levers(self):
         return np.ones(6)  # distances are those of joint space
