@@ -19,7 +19,6 @@ from opl.proof.events import name_findings
 from opl.proof.written import written_findings
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import Verification, replay
-from opl.verification.shift import common_shift
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,10 +95,6 @@ def prove(
         *written_findings(job, points, found.timed.take(rows), playback, reader),
         *name_findings(job, reading.name),
     )
-    if any(one.kind in ("order", "contact") for one in findings):
-        q = playback.q[playback.stations]
-        shift = common_shift(job.cell, points, q, rule.max_contact_step, rule.max_contact_error)
-        findings = findings if shift is None else (*findings, shift)
     moves = len(playback.moves)
     return Proof(tuple(files), reading.foreign, moves, found.timed, replayed, findings)
 
