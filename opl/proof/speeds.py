@@ -50,7 +50,8 @@ def speed_findings(
             for k in moves.tolist():
                 wanted, takes = float(durations[k]), float(written.duration[k])
                 digit = _last_digit(playback.moves[k], takes)
-                if not wanted / FASTER - digit <= takes <= wanted * SLOWER + digit:
+                slowest = wanted * SLOWER + _last_digit(playback.moves[k], takes, wanted)
+                if not wanted / FASTER - digit <= takes <= slowest:
                     yield _finding(written, playback, k, wanted, "the speed")
 
 
@@ -81,19 +82,21 @@ def _ahead(
             yield Finding(Level.ERROR, "speed", where, message)
 
 
-def _last_digit(move: ReadMove, takes: float) -> float:
+def _last_digit(move: ReadMove, takes: float, wanted: float | None = None) -> float:
     """Return by how much in [s] the time of a move changes with the last digit of its speed.
 
     Args:
         move: The move.
         takes: Its time as written in [s].
+        wanted: Another time in [s], at which the digit is taken instead.
     """
     speed = move.speed
     if speed.unit is SpeedUnit.SECONDS:
         return speed.digit
-    slower = speed.value - speed.digit
+    time = takes if wanted is None or not wanted > 0.0 else wanted
+    slower = speed.value * takes / time - speed.digit if time > 0.0 else 0.0
     # the slowest speed there is may stand for any slower one
-    return takes * speed.digit / slower if slower > 0.0 else np.inf
+    return time * speed.digit / slower if slower > 0.0 else np.inf
 
 
 def _pass_time(written: TimedMotion, requested: TimedMotion, moves: list[int]) -> Iterator[Finding]:

@@ -132,6 +132,8 @@ def _shipped(controller, part, home):
         "search.max_contact_error_mm": 0.1,
         "wheel.max_belt_penetration_mm": 0.5,
         "process.home_deg": list(home_deg),
+        # rows this short end where the arms pivot; what is attacked is the file
+        "process.max_dwell_s": 10,
         "program.controller": controller,
         **ACTIONS,
     }

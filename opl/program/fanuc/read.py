@@ -40,6 +40,12 @@ _POSITION = re.compile(
     + r"\};"
 )
 _GROUP = re.compile(r"DEFAULT_GROUP ?= ?(.*);")
+# What may stand in the head; all but the group say nothing of the motion.
+_ATTRIBUTE = re.compile(
+    "(?:TCD: ?)?(?:OWNER|COMMENT|PROG_SIZE|CREATE|MODIFIED|FILE_NAME|VERSION|LINE_COUNT|MEMORY_SIZE"
+    "|PROTECT|STACK_SIZE|TASK_PRIORITY|TIME_SLICE|BUSY_LAMP_OFF|ABORT_REQUEST|PAUSE_REQUEST"
+    "|DEFAULT_GROUP|CONTROL_CODE) ?="
+)
 _HALF_DIGIT = 0.5 * np.deg2rad(10.0**-DECIMALS) * np.array([1.0, 1.0, 2.0, 1.0, 1.0, 1.0])
 START = WrittenSpeed(SpeedUnit.TOP_SPEED, START_SPEED, f"{100.0 * START_SPEED:.0f}%")
 _CNT = Corner(100.0, "CNT100")
@@ -64,9 +70,13 @@ def parse(text: str, source: str) -> Listing:
     notes = Notes(source, _WORDS)
     sections = _sections(notes, text)
     for line, code in sections["/ATTR"]:
+        if not _ATTRIBUTE.match(code):
+            notes.doubt(line, f"nobody can tell from the file what {code} leads to")
         group = _GROUP.fullmatch(code)
         if group and group[1].replace(" ", "") != "1,*,*,*,*":
             notes.doubt(line, f"moves the groups {group[1]}; opl knows programs of group 1 alone")
+    if not any(_GROUP.fullmatch(code) for _, code in sections["/ATTR"]):
+        notes.doubt(1, "has no DEFAULT_GROUP, so it moves no robot")
     body = _Body(notes, _positions(notes, sections["/POS"]))
     for index, (line, code) in enumerate(sections["/MN"]):
         numbered = _NUMBERED.fullmatch(code)

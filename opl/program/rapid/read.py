@@ -52,6 +52,7 @@ _FRAME = (
 )
 _INSIDE = 2
 _VARIABLE = re.compile(r"VAR bool late ?:= ?FALSE ?;", re.I)
+_LATE = re.compile(r"\blate\b", re.I)
 _CONF = re.compile(r"ConfL ?\\(On|Off) ?;", re.I)
 
 
@@ -60,6 +61,7 @@ def parse(text: str, source: str) -> Listing:
     notes = Notes(source, _WORDS)
     passed = 0  # of the lines that enclose the procedure
     free = False  # whether ConfL is off
+    declared = False  # whether there is the variable of waits that take too long
     line = 0
     for line, code in code_lines(text, "!"):
         if passed < len(_FRAME) and (found := _FRAME[passed].fullmatch(code)):
@@ -67,13 +69,15 @@ def parse(text: str, source: str) -> Listing:
             if passed == _INSIDE:
                 notes.name = found["name"]
         elif passed == _INSIDE - 1 and _VARIABLE.fullmatch(code):
-            continue
+            declared = True
         elif passed != _INSIDE:
             notes.doubt(line, f"{code} stands outside of the procedure")
         elif switch := _CONF.fullmatch(code):
             free = switch[1].lower() == "off"
-            notes.setting(line, code)
+            notes.event(line, code)
         else:
+            if _LATE.search(code) and not declared:
+                notes.doubt(line, "uses late, which the module does not declare")
             _statement(notes, line, code, free)
     if passed < len(_FRAME):
         notes.doubt(line, "the module does not end")
