@@ -41,7 +41,12 @@ JOB = {
         "max_step_mm": 20,
     },
     "search": {"contact_positions": 40, "max_contact_step": 5, "max_contact_error_mm": 0.5},
-    "process": {"feed_mm_s": 20, "approach_mm": 20, "home_deg": [15, -45, -50, 0, 50, -180]},
+    "process": {
+        "feed_mm_s": 20,
+        "approach_mm": 20,
+        "max_dwell_s": 5,
+        "home_deg": [15, -45, -50, 0, 50, -180],
+    },
 }
 
 

@@ -14,8 +14,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from opl.findings import Finding, Level
-from opl.motion.motion import MoveKind, Phase, TimedMotion
+from opl.motion.motion import Motion, MoveKind, Phase, TimedMotion
 from opl.motion.timing import Timing
+from opl.program.moves import SAME_CONFIGURATION
 from opl.program.played import Playback, ReadMove, SpeedUnit
 from opl.program.posts import PASS_TIME_TOLERANCE
 from opl.program.speeds import MOST_CORRECTION
@@ -51,8 +52,15 @@ def speed_findings(
                 wanted, takes = float(durations[k]), float(written.duration[k])
                 digit = _last_digit(playback.moves[k], takes)
                 slowest = wanted * SLOWER + _last_digit(playback.moves[k], takes, wanted)
+                if _stays(motion, k):  # parts of a split program begin where the one before ended
+                    continue
                 if not wanted / FASTER - digit <= takes <= slowest:
                     yield _finding(written, playback, k, wanted, "the speed")
+
+
+def _stays(motion: Motion, k: int) -> bool:
+    """Return whether a move ends where it begins."""
+    return k > 0 and bool(np.abs(motion.q[k] - motion.q[k - 1]).max() <= SAME_CONFIGURATION)
 
 
 def _ahead(

@@ -158,6 +158,7 @@ def test_the_table_has_the_flange_where_the_pendant_of_a_ur_shows_it(tmp_path, m
     changes = {
         "robot": "ur10e",
         "search.method": "recursive",
+        "process.max_dwell_s": 5.0,
         "passes.end_margin_mm": 75,
         "process.home_deg": [-136, -95, -102, -163, -58, -68],
         "program": {"controller": "URSCRIPT"},

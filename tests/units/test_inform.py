@@ -31,8 +31,8 @@ def render_jobs(program, robot, date, *, profile=DX200, **settings):
 
 
 def render(program, robot, date, **options):
-    (text,) = render_jobs(program, robot, date, **options).values()
-    return text
+    job, *_ = render_jobs(program, robot, date, **options).values()
+    return job
 
 
 def sample(**options):
