@@ -192,6 +192,9 @@ def _clashes(jobs: Sequence[Path]) -> dict[Path, BatchRow]:
 def _start_worker() -> None:
     signal.signal(signal.SIGTERM, _stop)
     end_with_parent()
+    parent = multiprocessing.parent_process()
+    if parent is not None and not parent.is_alive():  # it ended while this process started
+        os._exit(BUG)
     use_threads(1)  # the processes share the cores
 
 
