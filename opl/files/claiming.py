@@ -12,7 +12,7 @@ from pathlib import Path
 
 from opl.errors import InputError
 from opl.files.switching import recover, switch
-from opl.files.writing import HIDDEN, check_folder, told
+from opl.files.writing import HIDDEN, check_folder, unwritable
 
 LOCK = HIDDEN + "lock"
 
@@ -50,7 +50,7 @@ class Claim:
             self.place.mkdir(parents=True, exist_ok=True)  # somebody may have removed it
             switch(self.place, files, leaving)
         except OSError as error:
-            raise told(self.folder, error) from error
+            raise unwritable(self.folder, error) from error
         return [self.folder / name for name in texts]
 
 
@@ -74,7 +74,7 @@ def claimed(folder: Path) -> Iterator[Claim]:
             lock = _lock(place, folder)
             recover(place)
         except OSError as error:
-            raise told(folder, error) from error
+            raise unwritable(folder, error) from error
         _HELD[lock] = (place, missing)
         yield Claim(folder, place)
     finally:

@@ -26,8 +26,8 @@ def read_bytes(path: Path, most: int) -> bytes:
         with open(opened, "rb") as file:
             status = os.fstat(opened)
             if not stat.S_ISREG(status.st_mode):
-                told = "Is a directory" if stat.S_ISDIR(status.st_mode) else "Is not a file"
-                raise InputError(str(path), f"cannot be read: {told}")
+                reason = "Is a directory" if stat.S_ISDIR(status.st_mode) else "Is not a file"
+                raise InputError(str(path), f"cannot be read: {reason}")
             content = file.read(most + 1)
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror}") from error

@@ -96,6 +96,6 @@ def sync_folder(folder: Path) -> None:
         os.close(opened)
 
 
-def told(folder: Path, error: OSError) -> InputError:
+def unwritable(folder: Path, error: OSError) -> InputError:
     """Return what a folder that cannot be written to is refused with."""
     return InputError(str(folder), f"cannot be written to: {error.strerror}")

@@ -145,7 +145,7 @@ def _summary(
         if not any(said is not None and said.moves for said in (a, b))
     )
     if others:
-        yield f"{others} other lines differ"
+        yield f"{others} other {'line differs' if others == 1 else 'lines differ'}"
 
 
 def _everywhere(pairs: Sequence[_Pair]) -> tuple[list[str], set[str]]:

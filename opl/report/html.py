@@ -30,13 +30,13 @@ def page(title: str, body: str, data: Mapping[str, Any], block: str) -> str:
 
 
 def batch_page(
-    title: str, told: str, heads: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]
+    title: str, subtitle: str, heads: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]
 ) -> str:
     """Return a page with one table that is sorted by a click on a heading.
 
     Args:
         title: What the page is called.
-        told: A line below it.
+        subtitle: A line below it.
         heads: Of the columns.
         rows: First cell and others of each row, as HTML.
     """
@@ -46,7 +46,7 @@ def batch_page(
         for first, cells in rows
     )
     body = (
-        f"<header><h1>{text(title)}</h1><p>{text(told)}</p></header>\n"
+        f"<header><h1>{text(title)}</h1><p>{text(subtitle)}</p></header>\n"
         f'<div class="scroll"><table class="words sortable"><thead><tr>{head}</tr></thead>\n'
         f"<tbody>\n{lines}\n</tbody></table></div>"
     )
@@ -151,10 +151,10 @@ def bars(
         f"{text(unit)}</title></rect>"
         for k, (start, value) in enumerate(zip(starts, values, strict=True))
     )
-    told = f"{caption}; most is {most:.2f} {unit}"
+    label = f"{caption}; most is {most:.2f} {unit}"
     ends = f"<span>{starts[0]:g}</span><span>t</span><span>{starts[-1] + step:g}</span>"
     return (
-        f'<figure class="bars"><figcaption>{text(told)}</figcaption><svg viewBox="0 0 100 40" '
-        f'preserveAspectRatio="none" role="img" aria-label="{text(told)}">{shapes}</svg>'
+        f'<figure class="bars"><figcaption>{text(label)}</figcaption><svg viewBox="0 0 100 40" '
+        f'preserveAspectRatio="none" role="img" aria-label="{text(label)}">{shapes}</svg>'
         f'<div class="ends">{ends}</div></figure>'
     )

@@ -24,12 +24,12 @@ from opl.run.page_data import EMPTY, joints_data, passes_data
 from opl.run.values import Surfaced
 
 
-def points_page(surfaced: Surfaced, told: str) -> str:
+def points_page(surfaced: Surfaced, figures: str) -> str:
     """Return the page of cutter points: the part, its passes and frames.
 
     Args:
         surfaced: The cutter points.
-        told: Their figures, in a line.
+        figures: Their figures, in a line.
     """
     job, packer = surfaced.job, Packer()
     points, paints = passes_data(surfaced, packer)
@@ -45,7 +45,8 @@ def points_page(surfaced: Surfaced, told: str) -> str:
     }
     body = "\n".join(
         [
-            f"<header><h1>{text(job.name)}: what will be ground</h1><p>{text(told)}</p></header>",
+            f"<header><h1>{text(job.name)}: what will be ground</h1>"
+            f"<p>{text(figures)}</p></header>",
             view_frame("The part", data["views"], paints, ["frames"], False),
             hover(),
             section("warnings", "Warnings", bullets(map(str, surfaced.warnings))),
@@ -131,8 +132,8 @@ def batch_page(rows: Sequence[BatchRow], folder: Path) -> str:
         "clearance mm",
         "why not",
     )
-    told = f"{good} of {len(rows)} jobs have a program"
-    return sortable_page("Batch", told, heads, lines)
+    summary = f"{good} of {len(rows)} jobs have a program"
+    return sortable_page("Batch", summary, heads, lines)
 
 
 def _small_bars(values: Sequence[float]) -> str:
@@ -143,5 +144,5 @@ def _small_bars(values: Sequence[float]) -> str:
         f'height="{20 * value / most:.1f}"/>'
         for k, value in enumerate(values)
     )
-    told = ", ".join(f"{value:.3f}" for value in values)
-    return f'<svg class="small" viewBox="0 0 90 20" role="img" aria-label="{told}">{bars}</svg>'
+    label = ", ".join(f"{value:.3f}" for value in values)
+    return f'<svg class="small" viewBox="0 0 90 20" role="img" aria-label="{label}">{bars}</svg>'

@@ -136,8 +136,8 @@ def _program_section(run: Written | Refused) -> str:
     )
     if not listings:
         return ""
-    told = "A click on the line of a move poses the robot at its end; what is played is marked."
-    return section("program", "Program", f"<p>{told}</p>", listings)
+    hint = "A click on the line of a move poses the robot at its end; what is played is marked."
+    return section("program", "Program", f"<p>{hint}</p>", listings)
 
 
 def _listed(run: Written | Refused) -> list[str]:

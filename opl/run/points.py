@@ -72,10 +72,10 @@ def report_points(surfaced: Surfaced) -> PointsReport:
 
 def points_files(surfaced: Surfaced) -> dict[str, str]:
     """Return a table of cutter points, a picture and a page of part and passes, by file name."""
-    job, told = surfaced.job, str(report_points(surfaced))
+    job, figures = surfaced.job, str(report_points(surfaced))
     picture = part_view(
         title=f"{job.name}: what will be ground",
-        subtitle=told,
+        subtitle=figures,
         part=job.cell.part,
         points=surfaced.points,
         inspection=surfaced.inspection,
@@ -83,7 +83,7 @@ def points_files(surfaced: Surfaced) -> dict[str, str]:
     return {
         f"{job.name}_points.csv": points_table(surfaced.laid),
         f"{job.name}_points.svg": picture,
-        f"{job.name}_points.html": points_page(surfaced, told),
+        f"{job.name}_points.html": points_page(surfaced, figures),
     }
 
 
