@@ -1,7 +1,7 @@
 """Straight ways between two poses."""
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opl.geometry.frames import from_roll_pitch_yaw, rotation_angle
@@ -10,6 +10,7 @@ from opl.geometry.rotations import straight_between
 NUMBERS = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6).map(np.array)
 
 
+@settings(deadline=None)
 @given(NUMBERS, NUMBERS, st.floats(0.0, 1.0))
 def test_a_straight_way_shares_line_and_angle_out_in_proportion(one, other, s):
     start, end = (from_roll_pitch_yaw(values[:3], values[3:]) for values in (one, other))
