@@ -107,7 +107,7 @@ def small_program(controller, part="v_shape"):
 @cache
 def _made(controller, part):
     drawn = stages.draw_charts
-    stages.draw_charts = lambda planned: {}  # pictures take longer than all the rest
+    stages.draw_charts = lambda *_: {}  # pictures take longer than all the rest
     try:
         with tempfile.TemporaryDirectory() as folder:
             job = _arch() if part == "arch" else _shipped(controller, part, Path(folder))
