@@ -224,7 +224,10 @@ def _program(written: Written) -> result.ProgramReport:
         duration_s=round(written.proven.motion.timed.seconds, 3),
         passes=[
             result.PassTimeReport(
-                round(time.wanted, 3), round(time.written, 3), round(100.0 * time.error, 4)
+                round(time.wanted, 3),
+                round(time.written, 3),
+                round(100.0 * time.error, 4),
+                round(100.0 * time.single, 4),
             )
             for time in written.program.pass_times
         ],

@@ -187,11 +187,12 @@ class VerificationReport:
 
 @dataclass(frozen=True)
 class PassTimeReport:
-    """How long a pass should take, takes, and by how much that is off."""
+    """How long a pass should take, takes, and by how much that and a single move of it is off."""
 
     wanted_s: float
     written_s: float
     error_percent: float
+    largest_move_error_percent: float
 
 
 @dataclass(frozen=True)
