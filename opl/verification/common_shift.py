@@ -108,7 +108,7 @@ def _told(shift: Array) -> str:
     side = towards if abs(z) > 500.0 * length else "aside"
     than = "of where it was planned" if side == "aside" else "than planned"
     return (
-        f"seems {1e3 * length:.2f} mm {side} {than} (x {x:.2f}, y {y:.2f}, z {z:.2f} mm in contact "
+        f"the wheel seems {1e3 * length:.2f} mm {side} {than} (x {x:.2f}, y {y:.2f}, z {z:.2f} mm in contact "
         "frame 0)"
     )
 

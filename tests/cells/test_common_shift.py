@@ -40,7 +40,7 @@ def test_a_shifted_wheel_is_told_by_its_shift(shift, words):
     found = recognise(cell, points, q, np.ones(len(q)), np.arange(len(q)), RULE)
     assert missing_points(points, found.timed.motion)  # without the shift hardly any is ground
     message = str(told(cell, q))
-    assert message.startswith(f"contact at wheel: {words}")
+    assert message.startswith(f"contact at wheel: the wheel {words}")
     numbers = re.search(r"\(x (\S+), y (\S+), z (\S+) mm", message).groups()
     np.testing.assert_allclose([float(number) for number in numbers], shift, atol=0.011)
 
@@ -64,7 +64,7 @@ def test_what_no_contact_shows_stays_zero():
     points = replace(
         problem.points,
         Ts_workpiece_cutter=problem.points.Ts_workpiece_cutter[ground],
-        pass_index=problem.points.pass_index[ground],
+        pass_index=np.zeros(len(ground), dtype=int),
         arc_length=problem.points.arc_length[ground],
     )
     fitted = fit_shift(beside([0.3, 0.0, -0.2]), points, motion.q[rows])
