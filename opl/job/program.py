@@ -244,7 +244,9 @@ class ProgramSection(Document):
             actions=Actions(*(tuple(action.in_si() for action in some) for some in actions)),
             accepted_pulses=tuple(self.accept_unverified_pulses),
             title=self.comment,
-            template=None if self.template is None else source.file(self.template),
+            template=None
+            if self.template is None
+            else source.file(self.template, "program.template"),
         )
 
     def _require_possible(self, source: Source, post: Post, robot: Robot) -> None:
