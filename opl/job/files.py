@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from opl.errors import InputError
+from opl.files.confining import require_inside
 from opl.files.digests import digest
 from opl.files.documents import content_of
 from opl.files.reading import MB, read_bytes
@@ -64,6 +65,7 @@ def shape_files(urdf: Path) -> Iterator[tuple[str, Path]]:
     names = _SHAPE.findall(read_bytes(urdf, MOST_BYTES).decode("utf-8", "replace"))
     for name in sorted(set(names)):
         path = urdf.parent / name.split("://")[-1]
+        require_inside(path)
         if path.is_file():
             yield name, path
 
