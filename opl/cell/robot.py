@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from opl.cell.full_turns import angular_distance
 from opl.cell.inverse_kinematics import Arm, inverse_kinematics
@@ -27,7 +26,7 @@ from opl.cell.urdf_tree import UrdfTree
 from opl.errors import InputError
 from opl.files.confining import require_inside
 from opl.files.resources import folder
-from opl.geometry.frames import Array, pose, read_only
+from opl.geometry.frames import Array, from_roll_pitch_yaw, read_only
 
 # In which a joint is taken to reach its top speed where nobody knows its acceleration, in [s].
 # Integrators guess 0.1 s for arms of this kind; slower is the safe side.
@@ -101,8 +100,8 @@ class Robot:
     @property
     def T_controller_base(self) -> Array:
         """The base frame, as the maker's controller counts, shape (4, 4)."""
-        return pose(
-            Rotation.from_rotvec([0.0, 0.0, -self.controller_base_turn]).as_matrix(),
+        return from_roll_pitch_yaw(
+            np.array([0.0, 0.0, -self.controller_base_turn]),
             np.array([0.0, 0.0, self.base_height - self.controller_base_height]),
         )
 

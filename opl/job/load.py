@@ -24,6 +24,7 @@ from opl.job.inputs import input_digests
 from opl.job.search import Method, Search
 from opl.job.source import Source
 from opl.job.sweeps import with_value
+from opl.job.user_frame import home_in_user_frame
 from opl.job.workpiece import GIVEN
 from opl.motion.process_settings import ProcessSettings
 from opl.program.settings import ProgramSettings
@@ -135,7 +136,10 @@ def _in_si(file: JobFile, source: Source, method: str | None,
     search = file.search.in_si(file.passes.max_chord_error_mm)
     if method is not None:
         search = replace(search, method=Method(method))
-    home = file.program.home_as_written(robot, around.home)
+    home = around.home
+    if file.program.positions == "user":
+        home = home_in_user_frame(robot, home)
+    load = file.workpiece.load_in_hand(part, cell.T_flange_workpiece)
     return Job(
         source=source,
         name=file.name,
@@ -144,6 +148,8 @@ def _in_si(file: JobFile, source: Source, method: str | None,
         surface=surface,
         passes=file.passes.in_si(source, surface, cell.wheel.radius),
         search=search,
-        process=file.process.in_si(home),
-        program=file.program.in_si(source, file.name, robot, home, cell.wheel.T_base_contact0),
+        process=file.process.in_si(home, file.program.one_job_per_pass),
+        program=file.program.in_si(
+            source, file.name, robot, home, cell.wheel.T_base_contact0, load
+        ),
     )

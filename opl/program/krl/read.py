@@ -12,9 +12,8 @@ import re
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from opl.geometry.frames import pose
+from opl.geometry.frames import from_roll_pitch_yaw
 from opl.program.moves import START_SPEED
 from opl.program.played import Corner, Corners, ReadMove, SpeedUnit, WrittenSpeed
 from opl.program.statements import NUMBER, Listing, Notes, Words, read_enclosed
@@ -117,9 +116,8 @@ def _ptp(state: Mapping[str, str], values: list[float], rounds: bool, place: str
 
 
 def _lin(state: Mapping[str, str], values: list[float], rounds: bool, place: str) -> ReadMove:
-    turned = Rotation.from_euler("ZYX", values[3:], degrees=True).as_matrix()
     return ReadMove(
-        target=pose(turned, np.array(values[:3]) * 1e-3),
+        target=from_roll_pitch_yaw(np.deg2rad(values[:2:-1]), np.array(values[:3]) * 1e-3),
         straight=True,
         speed=WrittenSpeed.of_number(
             SpeedUnit.TOOL_POINT, 1.0, state[_METRES], 4, f"{_METRES} = {state[_METRES]}"
