@@ -156,10 +156,9 @@ def _work(pipe: Connection, memory: int | None, warm: bool) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _stop)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
-    end_with_parent()
     parent = multiprocessing.parent_process()
-    if parent is not None and not parent.is_alive():  # it ended while this process started
-        os._exit(BUG)
+    assert parent is not None and parent.pid is not None, "a worker is started by another process"
+    end_with_parent(parent.pid)
     from opl.work import doing
 
     doing.prepare(memory, warm)
