@@ -102,15 +102,13 @@ def common_shift(
 
 def _told(shift: Array) -> str:
     """Say where the wheel is instead of where it was planned; z points from the part into it."""
-    x, y, z = 1e3 * shift
-    length = np.linalg.norm(shift)
-    towards = "nearer" if z < 0.0 else "farther away"
-    side = towards if abs(z) > 500.0 * length else "aside"
-    than = "of where it was planned" if side == "aside" else "than planned"
-    return (
-        f"the wheel seems {1e3 * length:.2f} mm {side} {than} (x {x:.2f}, y {y:.2f}, z {z:.2f} mm in contact "
-        "frame 0)"
-    )
+    x, y, z = np.round(1e3 * shift, 2) + 0.0  # no -0.00
+    length = 1e3 * np.linalg.norm(shift)
+    where = "nearer than planned" if z < 0.0 else "farther away than planned"
+    if abs(z) <= 0.5 * length:
+        where = "aside of where it was planned"
+    place = f"x {x:.2f}, y {y:.2f}, z {z:.2f} mm in contact frame 0"
+    return f"the wheel seems {length:.2f} mm {where} ({place})"
 
 
 def fit_shift(cell: WorkCell, points: CutterPoints, q: Array) -> Shift | None:
