@@ -240,7 +240,9 @@ class ProgramSection(Document):
             load=load,
             belt_switched_by=self.belt_switched_by,
             title=self.comment,
-            template=None if self.template is None else source.file(self.template),
+            template=None
+            if self.template is None
+            else source.file(self.template, "program.template"),
         )
 
     def _require_possible(self, source: Source, post: Post, robot: Robot) -> None:
