@@ -80,6 +80,13 @@ class TriangleMesh:
         a, b, c = np.moveaxis(self.triangles, 1, 0)
         return float(np.sum(np.cross(a, b) * c) / 6.0)
 
+    @property
+    def centre_of_volume(self) -> Array:
+        """Return the centre of gravity of the enclosed volume in [m], shape (3,)."""
+        a, b, c = np.moveaxis(self.triangles, 1, 0)
+        parts = np.sum(np.cross(a, b) * c, axis=1)  # six times a tetrahedron from the origin
+        return np.asarray(parts @ (a + b + c) / 4.0 / parts.sum())
+
 
 def winding_number(mesh: TriangleMesh, point: Array) -> float:
     """Return how often a surface winds around a point: 1 in a solid, 0 outside, a part if open.

@@ -30,7 +30,7 @@ def settings(tmp_path, text, robot=ROBOT):
     source = Source.of_file(path)
     section = read(path, ProgramSection)
     counted = section.robot_as_counted(source, robot)
-    return section.in_si(source, "SAMPLE", counted, HOME, np.eye(4))
+    return section.in_si(source, "SAMPLE", counted, HOME, np.eye(4), None)
 
 
 def test_nothing_asked_for_is_a_pulse_job_of_joint_moves(tmp_path):

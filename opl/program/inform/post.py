@@ -56,7 +56,7 @@ def write_jobs(
     if settings.positions is PositionForm.PULSES:
         require_known(robot)
         require_accepted(robot.unverified_pulses, settings.accepted_pulses)
-    parts = split_for(program, profile)
+    parts = split_for(program, profile, settings.one_job_per_pass)
     clash = settings.actions.calls & {part.name for part in parts}
     if clash:
         raise InputError("program: call", f"{sorted(clash)[0]} is the name of the program itself")
