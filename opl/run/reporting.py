@@ -49,6 +49,7 @@ def make_report(run: Written | Refused) -> Report:
         warnings=[str(finding) for finding in surfaced.warnings],
         reasons=() if refused is None else refused.reasons,
         remedies=() if refused is None else refused.remedies,
+        tried_in_vain=() if refused is None else refused.in_vain,
         fixed=_fixed(reached if isinstance(reached, Prepared) else reached.prepared),
         path=None if planned is None else _path(planned),
         compared={} if planned is None else _compared(planned),
