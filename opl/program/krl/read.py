@@ -63,7 +63,8 @@ _BEGUN, _BASE, _TOOL = "BAS(#INITMOV, 0)", "$BASE", "$TOOL"
 _PERCENT, _METRES, _CPTP, _CVEL = "BAS(#VEL_PTP, n)", "$VEL.CP", "$APO.CPTP", "$APO.CVEL"
 _IPO, _ORI = "$IPO_MODE", "$ORI_TYPE"
 _ALWAYS = (_BEGUN, _BASE, _TOOL)
-_OF_PTP, _OF_LIN = (*_ALWAYS, _PERCENT, _CPTP), (*_ALWAYS, _METRES, _CVEL, _IPO, _ORI)
+_OF_PTP: tuple[str, ...] = (*_ALWAYS, _PERCENT, _CPTP)
+_OF_LIN: tuple[str, ...] = (*_ALWAYS, _METRES, _CVEL, _IPO, _ORI)
 _SETTINGS = {
     _BEGUN: re.compile(r"BAS ?\( ?#(INITMOV) ?, ?0 ?\)", re.I),
     _PERCENT: re.compile(r"BAS ?\( ?#VEL_PTP ?, ?([0-9]+) ?\)", re.I),
