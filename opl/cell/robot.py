@@ -24,6 +24,7 @@ from opl.cell.robot_file import N_JOINTS, RobotFile, read_robot_file
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.cell.urdf_tree import UrdfTree
 from opl.errors import InputError
+from opl.files.confining import require_inside
 from opl.files.resources import folder
 from opl.geometry.frames import Array, from_roll_pitch_yaw, read_only
 
@@ -138,6 +139,7 @@ def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
     """
     path = robot_path(name_or_folder, relative_to)
     robot = _robot(read_robot_file(path), path.parent)
+    require_inside(robot.urdf)
     if not robot.urdf.is_file():
         raise InputError(str(path), f"urdf: no such file, got {robot.urdf.name!r}")
     UrdfTree(robot.urdf).require_shapes_on_joints()

@@ -23,6 +23,7 @@ from opl.job.file import JobFile
 from opl.job.inputs import input_digests
 from opl.job.search import Method, Search
 from opl.job.source import Source
+from opl.job.sweeps import with_value
 from opl.job.user_frame import home_in_user_frame
 from opl.job.workpiece import GIVEN
 from opl.motion.process_settings import ProcessSettings
@@ -63,6 +64,7 @@ def load_job(
     *,
     folder: Path | None = None,
     method: str | None = None,
+    changes: Mapping[str, Any] | None = None,
     surface: NurbsSurface | MachinedSurface | None = None,
     part: TriangleMesh | None = None,
 ) -> Job:
@@ -73,6 +75,7 @@ def load_job(
         folder: Where the relative file names in it are looked up; else the folder of the file, or
             the current folder for a mapping.
         method: Search to use instead of the job's own.
+        changes: Values by key path, as ``wheel.radius_mm``, that stand instead of the job's own.
         surface: The surface to be ground, in the workpiece frame, instead of the one that
             ``workpiece`` names. The outside of a `NurbsSurface` is that of du x dv.
         part: The solid for collisions, in the workpiece frame, instead of the one that
@@ -88,6 +91,8 @@ def load_job(
     else:
         origin, content = Source.of_file(Path(source)), content_of(Path(source))
         origin = replace(origin, folder=folder or origin.folder)
+    for path, value in (changes or {}).items():
+        content = with_value(content, path, value)
     given = {key for key, value in (("surface", surface), ("part", part)) if value is not None}
     if len(given) == 2 and isinstance(content, dict):
         content = {"workpiece": {}, **content}  # nothing is left for it to say
