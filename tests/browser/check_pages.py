@@ -5,6 +5,7 @@ python -m pytest -n 0 tests/browser/check_pages.py
 
 import json
 import os
+import re
 import shutil
 
 import numpy as np
@@ -240,6 +241,18 @@ def test_a_line_of_the_program_leads_to_its_configuration_and_back(runs, opened)
         shown = one.page.evaluate("() => Array.from(window.opl.shown.q)")
         assert np.allclose(shown, run.program.moves[k].q, atol=1e-5)
         assert "now" in row.get_attribute("class").split()
+
+
+@pytest.mark.parametrize("name", ["good", "post", "trough"])
+def test_a_page_prints_on_two_sheets_whose_words_fit(name, runs, opened, tmp_path):
+    one = opened(runs[name][1] / "report.html")
+    printed = one.page.pdf(prefer_css_page_size=True)
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) == 2
+    one.page.emulate_media(media="print")
+    one.page.set_viewport_size({"width": 718, "height": 1000})  # 190 mm of paper
+    pieces = "() => [...document.querySelectorAll('table, p, ul')]"
+    wide = f"{pieces}.filter((one) => one.getBoundingClientRect().right > 719)"
+    assert one.page.evaluate(f"{wide}.map((one) => one.innerText)") == []
 
 
 def test_a_cell_is_saved_as_gltf(runs, opened, tmp_path):
