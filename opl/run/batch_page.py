@@ -38,7 +38,7 @@ def batch_page(rows: Sequence[BatchRow], folder: Path) -> str:
             "" if path is None else _small_bars(path.joint_ranges_rad),
             "" if cycle is None else f"{cycle.total_s:.1f}",
             "" if found is None else f"{found.min_clearance_mm:.1f}",
-            text(row.message),
+            _folded(row.message),
         ]
         lines.append((job, cells))
     heads = (
@@ -54,6 +54,15 @@ def batch_page(rows: Sequence[BatchRow], folder: Path) -> str:
     )
     summary = f"{good} of {len(rows)} jobs have a program"
     return sortable_page("Batch", summary, heads, lines)
+
+
+def _folded(message: str) -> str:
+    """Return the first line of a message, the others where they are asked for."""
+    first, *others = message.split("\n")
+    if not others:
+        return text(first)
+    inside = text("\n".join(others))
+    return f"<details><summary>{text(first)}</summary>{inside}</details>"
 
 
 def _small_bars(values: Sequence[float]) -> str:

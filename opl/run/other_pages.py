@@ -26,6 +26,7 @@ def points_page(surfaced: Surfaced, figures: str) -> str:
     """
     job, packer = surfaced.job, Packer()
     points, paints = passes_data(surfaced, packer)
+    missed = surfaced.inspection.uncovered.points
     part = DrawnSolid(Body(PART, job.cell.part, np.eye(4)), BASE, False)
     normal = surfaced.points.Ts_workpiece_cutter[:, :3, 2].mean(axis=0)
     data = {
@@ -42,6 +43,7 @@ def points_page(surfaced: Surfaced, figures: str) -> str:
             f"<p>{text(figures)}</p></header>",
             view_frame("The part", data["views"], paints, ["frames"], False),
             hover(),
+            bullets(["orange dots: no pass comes by here"] if len(missed) else []),
             section("warnings", "Warnings", bullets(map(str, surfaced.warnings))),
         ]
     )
@@ -69,7 +71,7 @@ def cell_page(cell: Cell) -> str:
         **EMPTY,
         "name": name,
         "joints": joints_data(cell.robot),
-        "cell": drawn_cell(chain, solids, packer),
+        "cell": drawn_cell(chain, solids, packer, [one.name for one in cell.wheels]),
         "views": views(wheel),
         "home": (np.zeros(6) if cell.home is None else cell.home).tolist(),
         "wheel": drawn_wheel(wheel),
