@@ -54,6 +54,11 @@ def main() -> None:
     type=click.Choice(METHODS),
     help="Search; default as in the job.",
 )
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    help="Processes that work at a time; default one per core. The files are the same.",
+)
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @click.option(
     "-v",
@@ -67,6 +72,7 @@ def run_job(
     job: Path,
     out: Path | None,
     method: str | None,
+    workers: int | None,
     quiet: bool,
     verbose: bool,
     as_json: bool,
@@ -80,7 +86,7 @@ def run_job(
     folder = out or Path("out") / loaded.name
     with opl.claim_folder(folder, loaded.name) as claim:
         with progress_bar(quiet or as_json) as watch:
-            run = opl.run_job(loaded, watch)
+            run = opl.run_job(loaded, watch, workers or os.cpu_count() or 1)
         written = opl.deliver(run, claim)
     report = opl.make_report(run)
     if as_json:
