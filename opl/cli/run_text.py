@@ -101,7 +101,11 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
                 "nothing is proven of the file itself"
             )
         worst = max((abs(one.error_percent) for one in program.passes), default=0.0)
-        yield f"program: {program.moves} moves, passes within {worst:.2f} % of their time"
+        single = max((one.largest_move_error_percent for one in program.passes), default=0.0)
+        yield (
+            f"program: {program.moves} moves, passes within {worst:.2f} % of their time, single "
+            f"moves on the wheel within {single:.1f} % of theirs"
+        )
         yield from feed_and_cycle(report, job.cell.robot.title)
         yield from _caution(
             report.robot.unverified_pulse_ratios,

@@ -61,5 +61,6 @@ OF_PROGRAM = {
 }
 PROGRAM_CONTROLLER = "program.controller"
 PROGRAM_MOTION = "program.motion"
+PROGRAM_TOOL_POSE = "program.T_flange_tool_mm"
 PROGRAM_PULSE_RATIOS = "program.pulse_ratios"
 PROGRAM_ACCEPT_UNVERIFIED_PULSES = "program.accept_unverified_pulses"

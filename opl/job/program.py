@@ -91,10 +91,11 @@ class ProgramSection(Document):
         description="Pose of that tool in the flange frame as it is set on the controller, 4x4 "
         "with its origin in mm; else the flange itself.",
     )
-    motion: Literal["joint", "straight"] = Field(
-        default="joint",
+    motion: Literal["joint", "straight"] | None = Field(
+        default=None,
         description="Moves on the wheel, approach and retract as joint moves, or straight where "
-        "that stays near the verified path.",
+        "that stays near the verified path; else joint moves, in KRL straight ones: its joint "
+        "speeds are whole percents, too coarse for the feed.",
     )
     positions: Literal["pulses", "base", "robot", "user"] = Field(
         default="pulses",
@@ -159,13 +160,11 @@ class ProgramSection(Document):
     def _fits(self) -> ProgramSection:
         if self.positions != "user" and self.user_frame is not None:
             raise ValueError("user_frame goes with positions: user only")
-        cartesian = self.positions != "pulses" or self.motion == "straight"
-        if cartesian and self.tool and self.T_flange_tool_mm is None:
-            raise ValueError(
-                "positions in a frame and straight moves need T_flange_tool_mm, the data of tool "
-                f"{self.tool} on the controller"
-            )
         return self
+
+    def _form(self, post: Post) -> MotionForm:
+        """Return how moves on the wheel are written."""
+        return post.motion if self.motion is None else MotionForm(self.motion)
 
     def robot_as_counted(self, source: Source, robot: Robot) -> Robot:
         """Return the robot with the pulse ratios and soft limits that the job names.
@@ -208,7 +207,7 @@ class ProgramSection(Document):
                 if joint not in robot.joint_names:
                     known = ", ".join(robot.joint_names)
                     raise SettingError("accepted_pulses", f"no such joint {joint!r}; have: {known}")
-            settings = self._settings(source, T_base_contact0, load)
+            settings = self._settings(source, find_post(self.controller), T_base_contact0, load)
             try:
                 try_out(name, home, robot, settings)
             except SettingError:
@@ -218,7 +217,7 @@ class ProgramSection(Document):
         return settings
 
     def _settings(
-        self, source: Source, T_base_contact0: Array, load: Load | None
+        self, source: Source, post: Post, T_base_contact0: Array, load: Load | None
     ) -> ProgramSettings:
         levels, tool = self.position_levels, self.T_flange_tool_mm
         frame = self.user_frame
@@ -229,7 +228,7 @@ class ProgramSection(Document):
             controller=self.controller,
             tool=self.tool,
             T_flange_tool=np.eye(4) if tool is None else pose_of(tool),
-            motion=MotionForm(self.motion),
+            motion=self._form(post),
             positions=PositionForm(self.positions),
             user_frame=None if frame is None else frame.in_si(T_base_contact0),
             levels=ByKind(levels.on_wheel, levels.lead, levels.free_move),
@@ -248,6 +247,13 @@ class ProgramSection(Document):
 
     def _require_possible(self, source: Source, post: Post, robot: Robot) -> None:
         """Refuse another maker's arm, and keys that the post would pass over in silence."""
+        straight = self._form(post) is MotionForm.STRAIGHT
+        if (straight or self.positions != "pulses") and self.tool and not self.T_flange_tool_mm:
+            raise InputError(
+                source.at(keys.PROGRAM_TOOL_POSE),
+                "positions in a frame and straight moves need the data of tool "
+                f"{self.tool} on the controller",
+            )
         if post.counts_pulses:
             if robot.missing_pulses and robot.maker not in _MAY_COUNT_PULSES:
                 others = [name for name in known_posts() if not find_post(name).counts_pulses]

@@ -112,10 +112,12 @@ class PassTime:
     Attributes:
         wanted: At constant feed in [s].
         written: As the controller will play the written speeds, ramps left out, in [s].
+        single: How far a single move is off its time at the most, as a fraction of it.
     """
 
     wanted: float
     written: float
+    single: float
 
     @property
     def error(self) -> float:
