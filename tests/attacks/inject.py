@@ -111,10 +111,10 @@ def outcome(kind, program, case):
         return Outcome("refused", first) if kinds else Outcome("proven")
     if kinds:
         return Outcome("caught", ", ".join(dict.fromkeys(kinds)))
-    return _missed(program, text)
+    return _missed(kind, program, text)
 
 
-def _missed(program, text):
+def _missed(kind, program, text):
     """Say by how much a program that is proven differs from what was written."""
     before, after = program.read(program.text).playback, program.read(text).playback
     if len(before.stations) != len(after.stations):
@@ -132,6 +132,8 @@ def _missed(program, text):
         run = before.duration[program.motion.grinding].sum() / program.points.n_passes
         why = f"{100.0 * late / run:.2f} % of a pass"
         return Outcome("below" if late <= SPEED * run else "missed", why)
+    if kind.group in ("target", "ratio"):
+        return Outcome("below", "the same configurations")
     return Outcome("missed", "nothing that moves")
 
 

@@ -61,6 +61,7 @@ S_PART = {
 # what attacks take: a controller, and a part
 PROGRAMS = {
     **{name: {"controller": name} for name in ARMS},
+    "KRL straight": {"controller": "KRL", "motion": "straight"},
     "S part": {"controller": "DX200", "part": "s_shape"},
     "arch": {"controller": "DX200", "part": "arch"},
 }
