@@ -34,6 +34,7 @@ CONTACT = 1e-4  # [m]
 PLACE = 2.5e-4  # [m] along the pass, between two cutter points, at a contact that is kept
 SPEED = 0.02  # of a pass
 WORDS = ("caught", "below", "missed", "proven", "refused", "-")
+ALL_KINDS = tuple(KINDS.values())
 NOTHING = Verification("", 0, 0, 0.0, 0.0, 0, (), None)
 
 
@@ -147,7 +148,7 @@ def _ground_points(program, playback):
     return transform((Ts @ cell.T_flange_workpiece)[:, None], nearest[:, None])[:, 0]
 
 
-def outcomes_in(name, kinds=tuple(KINDS.values())):
+def outcomes_in(name, kinds=ALL_KINDS):
     """Return what becomes of kinds of faults in a program, by the name of the kind."""
     program = small_program(**PROGRAMS[name])
     case = case_of(program)
