@@ -1,4 +1,4 @@
-"""Commands that keep running: the service."""
+"""The service, and the plug-in that talks to it."""
 
 from __future__ import annotations
 
@@ -60,6 +60,19 @@ def serve(
         most_bytes=max_upload * 1_000_000,
     )
     opl.serve(settings, lambda address: click.echo(f"opl serves {address}, {address}/docs"))
+
+
+@click.command()
+@click.argument("folder", type=FILE, metavar="MOD")
+def plugin(folder: Path) -> None:
+    """Copy the workbench for FreeCAD into the folder of its add-ons.
+
+    That is the folder Mod of FreeCAD's user data: on Linux ~/.local/share/FreeCAD/Mod; its
+    Python console tells it: App.getUserAppDataDir(). docs/plugin.md says how to work with it.
+
+    Example: opl plugin ~/.local/share/FreeCAD/Mod
+    """
+    click.echo(f"wrote {opl.install_plugin(folder)}; start FreeCAD anew, and opl serve")
 
 
 def log_to(path: Path | None) -> None:
