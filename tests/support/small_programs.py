@@ -113,7 +113,7 @@ def small_program(controller, part="v_shape", motion="joint"):
 @cache
 def _made(controller, part, motion):
     drawn = stages.draw_charts
-    stages.draw_charts = lambda planned: {}  # pictures take longer than all the rest
+    stages.draw_charts = lambda *_: {}  # pictures take longer than all the rest
     try:
         with tempfile.TemporaryDirectory() as folder:
             job = _arch() if part == "arch" else _shipped(controller, part, motion, Path(folder))
