@@ -85,6 +85,7 @@ For command lines and editors, which show what is in files
 Jobs over HTTP
     `serve`             answers requests until it is stopped, as its `ServiceSettings` say;
                         `opl.client` talks to it, and needs nothing of opl
+    `install_plugin`    copies the workbench for FreeCAD, which talks to it too
 """
 
 from __future__ import annotations
@@ -110,6 +111,7 @@ if TYPE_CHECKING:
     from opl.files.claiming import release_folders as release_folders
     from opl.files.claiming import write_files as write_files
     from opl.files.reading import read_text as read_text
+    from opl.files.resources import install_plugin as install_plugin
     from opl.files.resources import start_job as start_job
     from opl.files.writing import check_folder as check_folder
     from opl.files.writing import write_file as write_file
@@ -190,7 +192,7 @@ _HOMES = {
     "opl.errors": "Cancelled InputError NoFreeMoveError NoPathError OplError UnsafeError",
     "opl.files.claiming": "release_folders write_files",
     "opl.files.reading": "read_text",
-    "opl.files.resources": "start_job",
+    "opl.files.resources": "install_plugin start_job",
     "opl.files.writing": "check_folder write_file",
     "opl.findings": "Finding",
     "opl.geometry.faces": "FaceSummary list_faces preview_face",

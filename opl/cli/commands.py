@@ -17,7 +17,7 @@ from opl.cli.programs import show, templates, verify
 from opl.cli.progress import progress_bar
 from opl.cli.robots import robots
 from opl.cli.run_text import show_run
-from opl.cli.services import serve, watch
+from opl.cli.services import plugin, serve, watch
 from opl.cli.stopping import stopped_at_once
 
 METHODS = ("recursive", "optimal")
@@ -164,5 +164,6 @@ for _command in (
     jobs,
     watch,
     serve,
+    plugin,
 ):
     main.add_command(_command)
