@@ -14,6 +14,7 @@ import pytest
 import opl
 from opl.cell.robot import forward_kinematics
 from opl.files.resources import folder
+from opl.run.batch_page import batch_page
 from tests.support.jobs import POST, document, write_job, write_trough
 
 sync_api = pytest.importorskip("playwright.sync_api")
@@ -310,7 +311,7 @@ def test_a_batch_is_sorted_by_a_click(browser, runs, tmp_path):
         opl.BatchRow(out.parent / "job.yaml", run.status, 0, out, "", opl.make_report(run))
         for run, out in runs.values()
     ]
-    (tmp_path / "report.html").write_text(opl.batch_page(rows, tmp_path))
+    (tmp_path / "report.html").write_text(batch_page(rows, tmp_path))
     context = browser.new_context()
     page = context.new_page()
     page.goto((tmp_path / "report.html").as_uri())

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import opl
+from opl.run.batch_page import batch_page
 from opl.run.delivery import deliver
 from tests.support.jobs import POST, document, write_job, write_trough
 from tests.support.jobs import opl as run_opl
@@ -198,6 +199,6 @@ def test_the_page_of_a_batch_names_every_job_and_leads_to_their_pages(good, tmp_
         opl.BatchRow(home / "job.yaml", "ok", 0, home / "out/V_SHAPE", "", opl.make_report(run)),
         opl.BatchRow(Path("bad & <b>.yaml"), "bad input", 2, None, "why <not>", None),
     ]
-    page = opl.batch_page(rows, home / "out")
+    page = batch_page(rows, home / "out")
     assert 'href="V_SHAPE/report.html"' in page and "1 of 2 jobs have a program" in page
     assert "bad &amp; &lt;b&gt;.yaml" in page and "why &lt;not&gt;" in page
