@@ -122,10 +122,10 @@ class Separation:
 def _box(body: pin.GeometryObject) -> tuple[Array, Array]:
     """Return T_joint_body and size of a body as `Bodies` has them."""
     shape = body.geometry
+    shape.computeLocalAABB()  # levers rest on it, too
     if isinstance(shape, coal.Cylinder):
         middle, size = np.zeros(3), np.array([shape.radius, shape.halfLength, -1.0])
     else:
-        shape.computeLocalAABB()
         middle, size = shape.aabb_local.center(), np.array(
             [shape.aabb_local.width(), shape.aabb_local.height(), shape.aabb_local.depth()]
         ) / 2.0  # fmt: skip
