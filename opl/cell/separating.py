@@ -144,6 +144,10 @@ def separate(  # type: ignore[no-untyped-def]
     at: np.ndarray = np.full(n_bodies, -1)  # number of the configuration a body was placed at
     # how far each body can have moved by the joints up to one
     moved = np.zeros((n_bodies, n_joints + 1))
+    radii = np.empty(n_bodies)
+    for b in range(n_bodies):
+        last_edge = max(sizes[b, 2], 0.0)
+        radii[b] = np.sqrt(sizes[b, 0] ** 2 + sizes[b, 1] ** 2 + last_edge**2)
     for n in range(len(q)):
         for b in range(n_bodies):
             for k in range(joint[b]):
@@ -166,10 +170,17 @@ def separate(  # type: ignore[no-untyped-def]
                 if at[body] < n and (at[body] < 0 or joint[body] > 0):
                     _product(placed[joint[body]], joint_body[body], bodies[body])
                     at[body] = n
+            x = bodies[b, 0, 3] - bodies[a, 0, 3]
+            y = bodies[b, 1, 3] - bodies[a, 1, 3]
+            z = bodies[b, 2, 3] - bodies[a, 2, 3]
+            apart[p] = np.sqrt(x * x + y * y + z * z) - radii[a] - radii[b]
+            if apart[p] > enough[p]:
+                near[n, p] = False
+                continue
             T, size, other, other_size = bodies[a], sizes[a], bodies[b], sizes[b]
             # what was the best direction the last time mostly still is
             _direction(T, size, other, other_size, best[p], way)
-            apart[p] = _between(T, size, other, other_size, way)
+            apart[p] = max(apart[p], _between(T, size, other, other_size, way))
             if apart[p] <= enough[p]:
                 for number in range(DIRECTIONS):
                     _direction(T, size, other, other_size, number, way)
