@@ -125,14 +125,14 @@ def _missed(kind, program, text):
     moved = _ground_points(program, after) - _ground_points(program, before)
     far = float(np.linalg.norm(moved, axis=-1).max())
     takes, took = _times(after), _times(before)
-    late, slow = abs(takes.sum() - took.sum()), float(np.abs(takes - took).max())
     if far > 0.0:
         why = f"{1e3 * far:.3f} mm"
         return Outcome("below" if far < PLACE else "missed", why)
-    if slow > 0.0:
-        run = took[program.motion.grinding].sum() / program.points.n_passes
-        why = f"{100.0 * late / run:.2f} % of a pass"
-        return Outcome("below" if late <= SPEED * run else "missed", why)
+    if (takes != took).any():
+        late = max(_off_time(program, takes), key=abs)
+        return Outcome(
+            "below" if abs(late) <= SPEED else "missed", f"{100.0 * late:+.2f} % of a pass"
+        )
     if kind.group in ("target", "ratio"):
         return Outcome("below", "the same configurations")
     return Outcome("missed", "nothing that moves")
@@ -142,6 +142,13 @@ def _times(playback):
     """Return the time of each move in [s]; a straight one is played in several steps."""
     ends = np.cumsum(playback.duration)[playback.stations]
     return np.diff(ends, prepend=0.0)
+
+
+def _off_time(program, takes):
+    """Return by how much the time of each pass is off what is asked for, as parts of that."""
+    motion, asked = program.motion, program.asked_times
+    passes = [motion.grinding & (motion.pass_index == k) for k in range(program.points.n_passes)]
+    return [float(takes[own].sum() / asked[own].sum() - 1.0) for own in passes]
 
 
 def _ground_points(program, playback):
