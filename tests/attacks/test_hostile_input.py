@@ -194,7 +194,7 @@ def odd_number(rng, content):
     ]
     *parents, key = rng.choice(numbers)
     inner = get(content, parents)
-    inner[key] = inner[key] * rng.choice([-1, 0, 0.1, 0.5, 0.9, 1.1, 2, 3, 10])
+    inner[key] = inner[key] * rng.choice([-1, 0, 0.5, 0.9, 1.1, 2])
     if isinstance(inner[key], float) and rng.random() < 0.5:
         inner[key] = round(inner[key])
     return content
