@@ -136,6 +136,21 @@ def test_stationary_tool_point_is_the_cutter_point_where_the_contact_stays_in_th
     assert len(re.findall(r"MoveL .*\[[0-9.]+,500,5000,1000\], ", program.text)) > 80
 
 
+def test_speed_that_is_read_in_the_file_is_the_feed_over_the_surface():
+    """Of the bar with an arched top: the contact hardly moves over the wheel."""
+    program = small_program("RAPID", "arch", "straight")
+    timing = program.run.proven.planned.timing
+    moves = [move for move in program.run.program.moves if move.straight]
+    read = re.findall(r"MoveL .*\[([0-9.]+),500,5000,1000\], ", program.text)
+    speeds = [
+        float(number)
+        for move, number in zip(moves, read, strict=True)
+        if move.ground_pass is not None and timing.cause[move.motion_index] is Cause.NONE
+    ]
+    assert len(speeds) > 10
+    np.testing.assert_allclose(speeds, 1e3 * program.job.process.feed, rtol=AS_WANTED)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
