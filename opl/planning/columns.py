@@ -2,9 +2,10 @@
 
 At a place the part can touch the wheel at every contact position t. The postures over a cell of t
 lie within h^2 / 8 times their second derivative of the chord between those at its ends, and the
-closed form of the inverse kinematics encloses that derivative. Cells are left out only where it is
-certain that nothing in them is allowed: out of reach, beyond the limits, or the part deeper in the
-wheel than any point of it can move within the cell.
+closed form of the inverse kinematics encloses that derivative. Where it does not, at singularities
+and the end of the reach, the postures themselves are enclosed, over cells cut smaller. Cells are
+left out only where it is certain that nothing in them is allowed: out of reach, beyond the limits,
+or the part deeper in the wheel than any point of it can move within the cell.
 """
 
 from __future__ import annotations
@@ -27,10 +28,12 @@ from opl.planning.images import Images
 from opl.planning.obstructed import Obstructions
 from opl.search.walls import UNKNOWN, Image, Line, Piece, Wall
 
-MOST_PARTS = 32  # of a cell whose pads are large
+MOST_PARTS = 16  # of a cell whose pads are large, at once
+MOST_CUTS = 3  # of such cells, each finer than the one before
 ROW_PARTS = 16  # cells between two places of a wall along a contact position
 FINER = 8  # cells that one is cut into where a proof needs it
 COARSE = 5e-4  # [rad] sum of the pads that is small enough
+WIDEST = 0.5  # [rad] that an angle is enclosed to; wider is not known
 ROUND_OFF = 1e-9  # [rad] of inverse kinematics and enclosures
 
 
@@ -79,8 +82,10 @@ class ColumnWalls:
         Ts_workpiece_cutter = self._points.frames_at(np.asarray(places, dtype=float))
         grids, cuts = cells_of(self._cell, self._part, Ts_workpiece_cutter)
         cells = self._cells(Ts_workpiece_cutter, grids, cuts)
-        parts = [np.where(cut, 1, now) for cut, now in zip(cuts, cells.parts(), strict=True)]
-        if any((now > 1).any() for now in parts):
+        for _ in range(MOST_CUTS):
+            parts = [np.where(cut, 1, now) for cut, now in zip(cuts, cells.parts(), strict=True)]
+            if not any((now > 1).any() for now in parts):
+                break
             grids = [cut_finer(t, now) for t, now in zip(grids, parts, strict=True)]
             cuts = [np.repeat(cut, now) for cut, now in zip(cuts, parts, strict=True)]
             cells = self._cells(Ts_workpiece_cutter, grids, cuts)
@@ -161,16 +166,21 @@ class ColumnWalls:
                 corners = q[low : high + 1]
                 pad_low = cells.pad_low[family][:, now][:, low:high].T
                 pad_high = cells.pad_high[family][:, now][:, low:high].T
+                middle = cells.middle[family][:, now][:, low:high].T
+                sure = known[:, low:high].T & ~np.isnan(corners[:-1] + corners[1:])
                 if kind[low] == 2:
-                    sure = known[:, low:high].T & ~np.isnan(corners[:-1] + corners[1:])
-                    pad_low = np.where(sure, pad_low, -UNKNOWN)
-                    pad_high = np.where(sure, pad_high, UNKNOWN)
-                    corners = np.nan_to_num(corners)
+                    filled = np.nan_to_num(np.concatenate([middle[:1], middle]))
+                    corners = np.where(np.isnan(corners), filled, corners)
                 seams = self.images.seams.start[family]
                 start = seams + np.remainder(corners[0] - seams, 2.0 * np.pi)
                 steps = np.diff(corners, axis=0)
                 steps -= 2.0 * np.pi * np.round(steps / (2.0 * np.pi))
                 corners = np.concatenate([start[None], start + np.cumsum(steps, axis=0)])
+                if not sure.all():
+                    radius = cells.radius[family][:, now][:, low:high].T
+                    off_low, off_high = _enclosing(corners, middle, radius)
+                    pad_low = np.where(sure, pad_low, off_low)
+                    pad_high = np.where(sure, pad_high, off_high)
                 piece = Piece(family, line, t[low : high + 1], corners, pad_low, pad_high)
                 yield from self._within_limits(piece)
 
@@ -227,8 +237,8 @@ class ColumnWalls:
         known &= 2.0 * radius * found.first < np.pi / 2.0
         first = np.concatenate([[0], np.cumsum(counts)[:-1]])
         return _Cells(
-            Ts_workpiece_cutter, grids, cuts, first, corners, pad_low, pad_high, known, found.none,
-            np.array(self.images.families),
+            Ts_workpiece_cutter, grids, cuts, first, corners, pad_low, pad_high, known,
+            found.middle, found.radius, found.none, np.array(self.images.families),
         )  # fmt: skip
 
 
@@ -245,6 +255,8 @@ class _Cells:
         pad_low: As in `Piece`, shape (8, 6, n).
         pad_high: As in `Piece`.
         known: Which pads are, shape (8, 6, n).
+        middle: Middle of what holds the angle all over a cell in [rad], shape (8, 6, n).
+        radius: Half of what holds it, shape (8, 6, n).
         none: Where there is certainly no posture, shape (8, n).
         families: Those that matter.
     """
@@ -257,17 +269,37 @@ class _Cells:
     pad_low: Array
     pad_high: Array
     known: np.ndarray
+    middle: Array
+    radius: Array
     none: np.ndarray
     families: np.ndarray
 
     def parts(self) -> list[np.ndarray]:
         """Return into how many parts each cell of each place should be cut."""
-        pads = (self.pad_high - self.pad_low)[self.families].sum(axis=1)
+        pads = np.where(self.known, self.pad_high - self.pad_low, 0.0)[self.families].sum(axis=1)
         wanted = np.ceil(np.sqrt(pads / COARSE))  # pads fall with the square
-        wanted = np.where(self.known[self.families].all(axis=1), wanted, MOST_PARTS)
+        off = np.where(self.known, 0.0, 2.0 * self.radius)[self.families].sum(axis=1)
+        wanted = np.where(off <= COARSE, wanted, MOST_PARTS)
         wanted = np.where(self.none[self.families], 1, wanted)
         parts = np.minimum(wanted.max(axis=0), MOST_PARTS).astype(int)
         return np.split(parts, self.first[1:])
+
+
+def _enclosing(corners: Array, middle: Array, radius: Array) -> tuple[Array, Array]:
+    """Return the pads of chords that hold angles known only up to a radius and full turns.
+
+    Args:
+        corners: Ends of the chords in [rad], shape (n + 1, 6).
+        middle: Of the angles over each cell, shape (n, 6).
+        radius: Of what holds them, shape (n, 6).
+    """
+    low, high = np.minimum(corners[:-1], corners[1:]), np.maximum(corners[:-1], corners[1:])
+    turns = np.round(((low + high) / 2.0 - middle) / (2.0 * np.pi))
+    middle = middle + 2.0 * np.pi * turns
+    known = radius <= WIDEST
+    below = np.where(known, np.minimum(middle - radius - high, 0.0) - ROUND_OFF, -UNKNOWN)
+    above = np.where(known, np.maximum(middle + radius - low, 0.0) + ROUND_OFF, UNKNOWN)
+    return below, above
 
 
 def _runs(kind: np.ndarray) -> list[tuple[int, int]]:
