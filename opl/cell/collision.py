@@ -50,7 +50,13 @@ class CollisionScene:
         self._pairs: list[BodyPair] = []
         self._needed = np.array(self._choose_pairs(cell))
         self._margins = self._needed
+        self._asked = [0]  # of all scenes made of this one
         self._prepare(self._margins, range(0))
+
+    @property
+    def queries(self) -> int:
+        """How many configurations this scene and those made of it have been asked about."""
+        return self._asked[0]
 
     def _prepare(self, margins: Array, unchecked: Iterable[int]) -> None:
         """Make ready for checks with these margins in [m], without some of the pairs."""
@@ -191,6 +197,7 @@ class CollisionScene:
         return float(found.min_distance), transform(self._T_base_world, places)
 
     def _compute(self, q: Array, stop_at_first: bool) -> bool:
+        self._asked[0] += 1
         return bool(pin.computeCollisions(self._model, self._data, self._manager, q, stop_at_first))
 
     def _add_bodies(self, cell: WorkCell) -> None:

@@ -61,9 +61,8 @@ class Interval:
         return self * Interval(other.middle / apart, other.radius / apart)
 
     def root(self) -> Interval:
-        """Return the square roots of the numbers that have one."""
-        low = np.sqrt(np.maximum(self.low, 0.0))
-        high = np.sqrt(np.where(self.high >= 0.0, self.high, np.nan))
+        """Return the square roots, 0 of what is less than 0."""
+        low, high = np.sqrt(np.maximum(self.low, 0.0)), np.sqrt(np.maximum(self.high, 0.0))
         return Interval((low + high) / 2.0, (high - low) / 2.0)
 
 

@@ -37,7 +37,7 @@ FINE_SHARE = 3e-5  # of the box: what an edge may bulge
 LEVELS = 4  # contact positions of a sweep that are looked at
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
-MOST_CHECKS = 12  # of motions in one box
+MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
 MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
 
 
@@ -66,7 +66,12 @@ class BoxTracks:
         self._max_contact_change = max_contact_change
         self._most = most
         self._wider = CollisionScene(problem.cell.widened(costs.push_away))
-        self.checks = 0
+        self.checks = self.places_checked = 0
+
+    @property
+    def queries(self) -> int:
+        """How many configurations were asked about for more than the clearance needed."""
+        return self._wider.queries
 
     def push_charge(self, q: Array) -> Array:
         """Return what nodes are charged for little clearance, q in [rad], shape (n, 6)."""
@@ -241,18 +246,21 @@ class _Sampled:
     def check(self, track: Track) -> Plan | None:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free."""
         search, places = self._search, self._columns.places
-        for _ in range(MOST_CHECKS):
+        most = search.checks + MOST_CHECKS
+        while search.checks < most:
             proposals = twins(self.matrices, track, self.problem.cell.robot)
             outcome = propose_and_check(self.problem, self.matrices, proposals, search.checks)
+            before, search.checks = search.checks, search.checks + len(proposals)
             if isinstance(outcome, Found):
                 plan = outcome.plan
                 search.checks = plan.checks
+            search.places_checked += (search.checks - before) * len(places)
+            if isinstance(outcome, Found):
                 path, motion = plan.path, plan.motion
                 columns = np.arange(len(places))
                 original = np.interp(path.cutter_point, columns, places)
                 motion = motion.renumbered(np.interp(motion.cutter_point, columns, places))
                 return replace(plan, path=replace(path, cutter_point=original), motion=motion)
-            search.checks += len(proposals)
             following = self.smoothest()
             if following is None:
                 break

@@ -31,6 +31,7 @@ from opl.search.walls import UNKNOWN, Image, Line, Piece, Wall
 MOST_PARTS = 16  # of a cell whose pads are large, at once
 MOST_CUTS = 3  # of such cells, each finer than the one before
 ROW_PARTS = 16  # cells between two places of a wall along a contact position
+PART_OF_A_WALL = 0.3  # of the work for one: a cell cut finer
 FINER = 8  # cells that one is cut into where a proof needs it
 COARSE = 5e-4  # [rad] sum of the pads that is small enough
 WIDEST = 0.5  # [rad] that an angle is enclosed to; wider is not known
@@ -75,10 +76,12 @@ class ColumnWalls:
         self._part = part
         self._points = points
         self.images = images
+        self.made = 0.0  # walls made so far; one cell cut finer is part of one
         self.obstructions: Obstructions | None = None  # left out once they are known to matter
 
     def walls(self, places: Sequence[float]) -> list[Wall]:
         """Return the walls at fractional cutter points."""
+        self.made += len(places)
         Ts_workpiece_cutter = self._points.frames_at(np.asarray(places, dtype=float))
         grids, cuts = cells_of(self._cell, self._part, Ts_workpiece_cutter)
         cells = self._cells(Ts_workpiece_cutter, grids, cuts)
@@ -97,6 +100,7 @@ class ColumnWalls:
 
     def finer(self, piece: Piece, cell: int) -> tuple[Piece, ...]:
         """Return one cell of a wall as pieces with smaller cells."""
+        self.made += PART_OF_A_WALL
         grid = np.linspace(piece.at[cell], piece.at[cell + 1], FINER + 1)
         T_workpiece_cutter = piece.line.T_workpiece_cutter
         if T_workpiece_cutter is None:
@@ -176,11 +180,10 @@ class ColumnWalls:
                 steps = np.diff(corners, axis=0)
                 steps -= 2.0 * np.pi * np.round(steps / (2.0 * np.pi))
                 corners = np.concatenate([start[None], start + np.cumsum(steps, axis=0)])
-                if not sure.all():
-                    radius = cells.radius[family][:, now][:, low:high].T
-                    off_low, off_high = _enclosing(corners, middle, radius)
-                    pad_low = np.where(sure, pad_low, off_low)
-                    pad_high = np.where(sure, pad_high, off_high)
+                radius = cells.radius[family][:, now][:, low:high].T
+                off_low, off_high = _enclosing(corners, middle, radius)
+                pad_low = np.where(sure, np.maximum(pad_low, off_low), off_low)
+                pad_high = np.where(sure, np.minimum(pad_high, off_high), off_high)
                 piece = Piece(family, line, t[low : high + 1], corners, pad_low, pad_high)
                 yield from self._within_limits(piece)
 
@@ -276,10 +279,12 @@ class _Cells:
 
     def parts(self) -> list[np.ndarray]:
         """Return into how many parts each cell of each place should be cut."""
-        pads = np.where(self.known, self.pad_high - self.pad_low, 0.0)[self.families].sum(axis=1)
-        wanted = np.ceil(np.sqrt(pads / COARSE))  # pads fall with the square
-        off = np.where(self.known, 0.0, 2.0 * self.radius)[self.families].sum(axis=1)
-        wanted = np.where(off <= COARSE, wanted, MOST_PARTS)
+        bent = np.where(self.known, self.pad_high - self.pad_low, np.nan)[self.families]
+        about = 2.0 * self.radius[self.families]
+        pads = np.fmin(bent, about).sum(axis=1)
+        # what is known of the bend falls with the square
+        wanted = np.where((bent <= about).all(axis=1), np.ceil(np.sqrt(pads / COARSE)), MOST_PARTS)
+        wanted = np.where(pads <= COARSE, 1, wanted)
         wanted = np.where(self.none[self.families], 1, wanted)
         parts = np.minimum(wanted.max(axis=0), MOST_PARTS).astype(int)
         return np.split(parts, self.first[1:])

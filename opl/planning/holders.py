@@ -88,7 +88,7 @@ def _least(
         if candidate is None:
             continue
         if candidate.settled:
-            prices = np.abs(candidate.prices[:, :6] - candidate.prices[:, 6:])
+            prices = np.abs(proof.pressing())
             ranges = candidate.high - candidate.low
             prices[:, ranges < LEAST_SHARE * ranges.sum()] = 0.0  # held by all alike
             return min(max(bound, candidate.bound), value), prices

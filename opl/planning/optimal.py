@@ -7,7 +7,7 @@ smoothest motion is sought, until nothing can be smaller than the best by more t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.box_track import BoxTracks
 from opl.planning.columns import ColumnWalls, Sweep
 from opl.planning.costs import CostWeights
-from opl.planning.families import Families, few_columns, grown
+from opl.planning.families import Families, Placement, few_columns, grown
 from opl.planning.holders import Holder, holders
 from opl.planning.images import Images, seams_of
 from opl.planning.obstructed import Obstructions
@@ -35,7 +35,15 @@ RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
 SWEEP_MISSED = 0.2  # of the widening: what it may miss a contact position by between them
 PLACE_DIGITS = 5  # of places, in cutter points
-PLACES_OF_WORK = 4  # that cost as much to look at as a subproblem
+# a unit of work is what takes about a millisecond; that many make one
+QUERIES_OF_WORK = 50  # configurations asked about for collisions
+NUMBERS_OF_WORK = 1e6  # numbers worked on in linear programs
+SUBPROBLEMS_OF_WORK = 4
+WORK_OF_A_WALL = 50
+WORK_OF_A_CHECK = 1  # for each of the places of a motion
+CLEARLY_LESS = 0.005  # of the best: what a motion in such a box should be better by
+EARLY_SHARE = 0.3  # of the work: motions in boxes that are not proven to be the least
+FIRST_WORK = 300  # that may be spent on those at once
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
 
@@ -49,7 +57,7 @@ class OptimalSettings:
             smoother track.
         max_contact_change: Largest change of t between neighbouring columns in belt units.
         costs: What a track is charged for inside the box.
-        max_subproblems: How much is tried: subproblems, and places held against a box.
+        max_subproblems: How much is tried, in units of work.
     """
 
     widen: float
@@ -90,7 +98,9 @@ class OptimalSearch:
         self.plan = fallback
         self._largest = largest
         self._proven = self._least_hope = 0.0
-        self._spent = self._given_up = 0
+        self._given_up = 0
+        self._before = self._early = 0.0  # work on proofs that were begun again; on early motions
+        self._queries = self._asked
         gap = PROOF_SHARE * settings.widen
         self.proof = BoxProof(self._walls.images.of, self._walls.finer, largest, gap)
         self._places: set[float] = set()
@@ -110,7 +120,25 @@ class OptimalSearch:
     @property
     def work_share(self) -> float:
         """How much of the work allowed is done."""
-        return (self._spent + self.proof.subproblems) / self._settings.max_subproblems
+        return self._work / self._settings.max_subproblems
+
+    @property
+    def _work(self) -> float:
+        """What was done so far, in units of work: counted, not measured."""
+        made = self._walls.made * WORK_OF_A_WALL
+        asked = (self._asked - self._queries) / QUERIES_OF_WORK
+        seen = self._families.work + self._sampler.work
+        checked = self._tracks.places_checked * WORK_OF_A_CHECK
+        return self._before + self._work_of_proof + made + asked + seen + checked
+
+    @property
+    def _work_of_proof(self) -> float:
+        proof = self.proof
+        return proof.subproblems / SUBPROBLEMS_OF_WORK + proof.work / NUMBERS_OF_WORK
+
+    @property
+    def _asked(self) -> int:
+        return self._problem.scene.collision.queries + self._tracks.queries
 
     @property
     def open_because(self) -> str | None:
@@ -144,39 +172,63 @@ class OptimalSearch:
             return
         box = JointBox(candidate.low, candidate.high)
         share = MISSED * self._settings.widen if candidate.settled else CLEARLY_MISSED
-        reference, allowed = self.proof.walls[0].pass_index, share * self.proof.threshold
-        placements, missed = self._families.hold(box, reference, self._places, allowed)
+        allowed = share * self.proof.threshold
+        placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
         missed = missed[:MOST_ADDED]
         if not candidate.settled:
-            if not self._sampler.collisions:
-                self._hope(self._families.grown(box, placements))
+            if not self._sampler.collisions and placements:
+                self._look_for_more(box, placements)
             if missed:
+                self.proof.show_soon()
                 self._add(missed)
                 self.proof.put_back()
             else:
                 self.proof.split()
             return
-        columns = None
-        if len({(one.family, float(one.flip[0][4])) for one in placements}) == 1:
-            self._spent += len(self._columns) // PLACES_OF_WORK
-            columns = self._sampler.columns(box, placements, self._columns)
-            rows = self._sampler.rows(self._rows, columns)
-            inner = grown(columns.q, columns.free, box)
-            for row in rows:
-                inner = row.grown(inner) if inner is not None and row.must else inner
+        looked_at = None
+        if _alike(placements):
+            looked_at = self._look(box, placements)
+            columns, _, inner = looked_at
             self._hope(inner)
             missed = missed or self._missed(columns, box)
         if missed:
             self._add(missed)
             self.proof.put_back()
             return
-        if columns is not None and inner is not None and self._try(columns, rows, inner):
+        if looked_at is not None and self._try(*looked_at):
             self.proof.put_back()
         elif candidate.bound < self.proof.closing and not self._sampler.collisions:
             self._mind_collisions()
         elif candidate.bound < self.proof.closing:
             self._given_up += 1
             self.proof.give_up()
+
+    def _look(
+        self, box: JointBox, placements: Sequence[Placement]
+    ) -> tuple[Columns, list[Row], JointBox | None]:
+        """Return places and rows sampled near a box, and the box grown for them."""
+        columns = self._sampler.columns(box, placements, self._columns)
+        rows = self._sampler.rows(self._rows, columns)
+        inner = grown(columns.q, columns.free, box)
+        for row in rows:
+            inner = row.grown(inner) if inner is not None and row.must else inner
+        return columns, rows, inner
+
+    def _look_for_more(self, box: JointBox, placements: Sequence[Placement]) -> None:
+        """Grow a box that is not settled until it holds all; look for a motion in it, if small."""
+        larger, threshold = self._families.grown(box, placements), self.proof.threshold
+        self._hope(larger)
+        if self.proof.threshold < threshold:
+            self.proof.show_soon()
+        before = self._work
+        least = self._value * (1.0 - CLEARLY_LESS)
+        if larger is None or larger.size > least or not _alike(placements):
+            return
+        if self._early < FIRST_WORK + EARLY_SHARE * before:
+            columns, _, inner = self._look(larger, placements)
+            if inner is not None:
+                self._keep(self._tracks.plan(columns, (), inner, self._room(inner), _nothing))
+            self._early += self._work - before
 
     def _hope(self, box: JointBox | None) -> None:
         """Look only for what is as good as a motion in a box would be."""
@@ -200,7 +252,7 @@ class OptimalSearch:
     def _begin_again(self, threshold: float, least_hope: float) -> None:
         """Begin the proof again: boxes up to a larger size are of interest."""
         self._proven = self.lower_bound
-        self._spent += self.proof.subproblems
+        self._before += self._work_of_proof
         self._least_hope = least_hope
         walls = self.proof.walls
         gap = PROOF_SHARE * self._settings.widen
@@ -256,21 +308,38 @@ class OptimalSearch:
         self._columns = np.union1d(self._columns, np.round(np.concatenate(more), PLACE_DIGITS))
         return len(self._columns) > before or len(self._rows) > known or bool(walls)
 
-    def _try(self, columns: Columns, rows: list[Row], box: JointBox) -> bool:
+    def _try(self, columns: Columns, rows: list[Row], box: JointBox | None) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
-        learnt = False
-        room = ROOM_SHARE * self._settings.widen * box.size
+        if box is None:
+            return False
+        learnt, room = False, self._room(box)
 
         def learn(bulges: Bulges) -> bool:
             nonlocal learnt
             learnt = self._learn(columns, box, room, bulges)
             return learnt
 
-        found = self._tracks.plan(columns, rows, box, room, learn)
+        self._keep(self._tracks.plan(columns, rows, box, room, learn))
+        return learnt
+
+    def _room(self, box: JointBox) -> float:
+        return ROOM_SHARE * self._settings.widen * box.size
+
+    def _keep(self, found: Plan | None) -> None:
+        """Keep a motion that is better than the best."""
         if found is not None and found.path.joint_range_sum < self._value:
             self.plan = found
             self.proof.threshold = min(self.proof.threshold, self._value)
-        return learnt
+
+
+def _nothing(_: Bulges) -> bool:
+    """Learn nothing of where a track leaves its box."""
+    return False
+
+
+def _alike(placements: Sequence[Placement]) -> bool:
+    """Return whether all passes are ground in one family with the wrist to one side."""
+    return len({(one.family, one.number) for one in placements}) == 1
 
 
 def plan_optimal(

@@ -16,7 +16,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.bounding import distance, tighten, trim
-from opl.search.cells import END, FIRST, WALL, Cells
+from opl.search.cells import END, FIRST, WALL, Cells, Key
 from opl.search.relaxation import least_box
 from opl.search.walls import Image, Piece, Wall
 
@@ -24,7 +24,8 @@ SETTLED = 0.1  # of the gap wanted: what the bend of the spans may lose where no
 MOST_TRIMS = 3  # of spans, before one is split
 SMALLEST = 1e-6  # along a wall: a cell that is not cut further
 TRIMMED = 0.9  # of the cells: more left, and trimming goes on no longer
-PROBE_EVERY = 16  # subproblems: how often a box is shown that is not settled
+FEWEST_UNSEEN = 8  # subproblems split before a box is shown that is not settled
+MOST_UNSEEN = 256  # that many where those shown before told nothing new
 
 
 @dataclass(frozen=True)
@@ -36,15 +37,12 @@ class Relaxation:
         high: Upper faces.
         place: Where along each wall it meets the hull, shape (k,).
         lost: How much more a wall would press had its cells no pads, in [rad], shape (k,).
-        prices: How hard each wall presses on each upper face of the box, and on each lower one,
-            from 0 to 1, shape (k, 12).
     """
 
     low: Array
     high: Array
     place: Array
     lost: Array
-    prices: Array
 
 
 @dataclass(order=True)
@@ -77,15 +75,15 @@ class Candidate:
         bound: Of its subproblem in [rad].
         low: Lower faces in [rad], shape (6,).
         high: Upper faces.
-        prices: How hard each wall presses on the faces of the box, as in `Relaxation`.
         settled: Whether nothing is gained by splitting its subproblem further.
+        keys: The families and images that each pass with walls has left, by pass.
     """
 
     bound: float
     low: Array
     high: Array
-    prices: Array
     settled: bool
+    keys: dict[int, list[Key]]
 
 
 class BoxProof:
@@ -110,7 +108,9 @@ class BoxProof:
         self.threshold = threshold
         self.stuck = np.inf  # least bound of what could not be split
         self.subproblems = 0
-        self._count = 0
+        self.work = 0.0  # how many numbers were worked on, about
+        self._count = self._unseen = 0
+        self._show_after = FEWEST_UNSEEN
         self._open: list[Subproblem] = []
         nothing = np.empty((0, 5), dtype=np.int64)
         self._push(0.0, nothing, 0, np.full(6, np.inf), np.full(6, -np.inf))
@@ -158,12 +158,34 @@ class BoxProof:
                 return None
         self._kept, self._branch = node, self._where_to_split(node)
         settled = self._branch is None
-        if not settled and self.subproblems % PROBE_EVERY:
+        self._unseen += 1
+        if not settled and self._unseen < self._show_after:
             self.split()
             return None
+        self._unseen, self._show_after = 0, min(2 * self._show_after, MOST_UNSEEN)
         found = node.found
         assert found is not None
-        return Candidate(node.bound, found.low, found.high, found.prices, settled)
+        return Candidate(
+            node.bound, found.low, found.high, settled, self._cells.keys_of(node.spans)
+        )
+
+    def pressing(self) -> Array:
+        """Return how hard each wall presses on the faces of the last candidate's box.
+
+        On the upper face of each joint less on its lower one, from -1 to 1, shape (n_walls, 6).
+        """
+        node = self._kept
+        assert node.found is not None
+        # against a core turned inside out, so that no face is held by it
+        n, low, high = node.n_walls, node.found.high, node.found.low
+        box, place, lost, prices = np.empty((2, 6)), np.empty(n), np.empty(n), np.empty((n, 12))
+        size = float((low - high).sum())
+        least_box(self._cells.table, node.spans, n, low, high, size, box, place, lost, prices)
+        return np.asarray(prices[:, :6] - prices[:, 6:])
+
+    def show_soon(self) -> None:
+        """Show boxes that are not settled more often again: the last one told something new."""
+        self._show_after = FEWEST_UNSEEN
 
     def split(self) -> None:
         """Split the subproblem of the last candidate."""
@@ -198,7 +220,10 @@ class BoxProof:
             spans = spans[: tighten(table, spans, *passes, low, high, closing, sizes)]
             if not len(spans):
                 return False
-            bound = least_box(table, spans, n_walls, low, high, closing, box, place, lost, prices)
+            bound, numbers = least_box(
+                table, spans, n_walls, low, high, closing, box, place, lost, prices
+            )
+            self.work += numbers
             node.bound = max(node.bound, bound, float(sizes.max()))
             if node.bound >= closing:
                 return False
@@ -209,7 +234,7 @@ class BoxProof:
             if (spans[:, END] - spans[:, FIRST]).sum() > TRIMMED * before:
                 break
         node.spans, node.n_walls, node.low, node.high = spans, n_walls, low, high
-        node.found = Relaxation(box[0], box[1], place, lost, prices)
+        node.found = Relaxation(box[0], box[1], place, lost)
         return True
 
     def _where_to_split(self, node: Subproblem) -> tuple[int, float] | None:

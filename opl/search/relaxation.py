@@ -39,7 +39,7 @@ def pressed(cells, cell, end, face, low, high):  # type: ignore[no-untyped-def]
 def _pivot(table, basis, n_rows, n_columns, dual):  # type: ignore[no-untyped-def]
     """Bring a table of the simplex method to its optimum; return how many steps that took.
 
-    Its first row is the objective, what each variable gains, its last column the right-hand side.
+    Its first row is the objective, what each variable gains, its first column the right-hand side.
     The dual method begins where no variable gains but some rows are not kept, the primal one the
     other way about.
     """
@@ -48,12 +48,12 @@ def _pivot(table, basis, n_rows, n_columns, dual):  # type: ignore[no-untyped-de
         if dual:
             worst = -1e-12
             for row in range(n_rows):
-                if table[row + 1, n_columns] < worst:
-                    leave, worst = row + 1, table[row + 1, n_columns]
+                if table[row + 1, 0] < worst:
+                    leave, worst = row + 1, table[row + 1, 0]
             if leave < 0:
                 return step
             least = np.inf
-            for j in range(n_columns):
+            for j in range(1, n_columns):
                 if table[leave, j] < -PIVOT:
                     ratio = table[0, j] / table[leave, j]
                     if ratio < least:
@@ -62,7 +62,7 @@ def _pivot(table, basis, n_rows, n_columns, dual):  # type: ignore[no-untyped-de
                 return step
         else:
             best = ENTERS
-            for j in range(n_columns):
+            for j in range(1, n_columns):
                 if table[0, j] > best:
                     enter, best = j, table[0, j]
             if enter < 0:
@@ -70,30 +70,33 @@ def _pivot(table, basis, n_rows, n_columns, dual):  # type: ignore[no-untyped-de
             least = np.inf
             for row in range(n_rows):
                 if table[row + 1, enter] > PIVOT:
-                    ratio = table[row + 1, n_columns] / table[row + 1, enter]
+                    ratio = table[row + 1, 0] / table[row + 1, enter]
                     if ratio < least:
                         leave, least = row + 1, ratio
             if leave < 0:
                 return step
         divisor = table[leave, enter]
-        for j in range(n_columns + 1):
+        for j in range(n_columns):
             table[leave, j] /= divisor
         for row in range(n_rows + 1):
             factor = table[row, enter]
             if row != leave and factor != 0.0:
-                for j in range(n_columns + 1):
+                for j in range(n_columns):
                     table[row, j] -= factor * table[leave, j]
         basis[leave - 1] = enter
     return MOST_PIVOTS
 
 
 @njit(
-    "float64(float64[:,::1],int64[:,::1],int64,float64[::1],float64[::1],float64,float64[:,::1],"
+    "UniTuple(float64,2)(float64[:,::1],int64[:,::1],int64,float64[::1],float64[::1],float64,"
+    "float64[:,::1],"
     "float64[::1],float64[::1],float64[:,::1])",
     cache=True,
 )
 def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, prices):  # type: ignore[no-untyped-def]
     """Return a bound on the box that holds a core and a point of each wall, in [rad].
+
+    And how many numbers were worked on, about.
 
     Args:
         cells: The table of `Cells`.
@@ -112,7 +115,9 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
     for j in range(6):
         core += high[j] - low[j]
     begin, end = np.zeros(n_walls, dtype=np.int64), np.zeros(n_walls, dtype=np.int64)
+    n_cells = 0
     for k in range(len(spans) - 1, -1, -1):
+        n_cells += spans[k, 4] - spans[k, 3]
         begin[spans[k, 0]] = k
         end[spans[k, 0]] = max(end[spans[k, 0]], k + 1)
     # the point of each wall that is nearest to the core, and the faces it can press on at all
@@ -143,18 +148,18 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
                 n += 1
     # variables: a price for each of these, how much less than its first point a wall presses,
     # and slacks; rows: the objective, the faces, and points that press less than the first
-    n_columns = n + n_walls + 12 + MOST_POINTS
-    table = np.zeros((13 + MOST_POINTS, n_columns + 1))
+    faces, points = 1 + n + n_walls, 13 + n + n_walls  # first slack of either
+    table = np.zeros((13 + MOST_POINTS, points + MOST_POINTS))
     basis = np.empty(12 + MOST_POINTS, dtype=np.int64)
     for i in range(n):
-        table[0, i] = first[wall_of[i], face_of[i]]
-        table[1 + face_of[i], i] = 1.0
+        table[0, 1 + i] = first[wall_of[i], face_of[i]]
+        table[1 + face_of[i], 1 + i] = 1.0
     for w in range(n_walls):
-        table[0, n + w] = -1.0
+        table[0, 1 + n + w] = -1.0
     for f in range(12):
-        table[1 + f, n + n_walls + f] = 1.0
-        table[1 + f, n_columns] = 1.0 + 1e-9 * f  # no step is for nothing
-        basis[f] = n + n_walls + f
+        table[1 + f, faces + f] = 1.0
+        table[1 + f, 0] = 1.0 + 1e-9 * f  # no step is for nothing
+        basis[f] = faces + f
     point_wall = np.empty(MOST_POINTS, dtype=np.int64)
     point_place = np.empty(MOST_POINTS)
     now = np.empty((n_walls, 12))
@@ -162,16 +167,16 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
     n_points, bound = 0, -np.inf
     prices[:] = 0.0
     lost[:] = 0.0
-    _pivot(table, basis, 12, n_columns, False)
+    work = float(_pivot(table, basis, 12, points, False) * 13 * points)
     for _ in range(MOST_ROUNDS):
         now[:] = 0.0
         short = np.zeros(n_walls)
         for row in range(12 + n_points):
-            value = max(table[row + 1, n_columns], 0.0)
-            if basis[row] < n:
-                now[wall_of[basis[row]], face_of[basis[row]]] = value
-            elif basis[row] < n + n_walls:
-                short[basis[row] - n] = value
+            value, i = max(table[row + 1, 0], 0.0), basis[row] - 1
+            if i < n:
+                now[wall_of[i], face_of[i]] = value
+            elif i < n + n_walls:
+                short[i - n] = value
         for f in range(12):
             total = 0.0
             for w in range(n_walls):
@@ -207,16 +212,17 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
                 for i in range(n):
                     if wall_of[i] == w:
                         f = face_of[i]
-                        table[row, i] = first[w, f] - pressed(cells, at, at_side, f, low, high)
-                table[row, n + w] = -1.0
-                table[row, n + n_walls + 12 + n_points] = 1.0
-                table[row, n_columns] = 1e-12 * (1.0 + n_points)
-                basis[12 + n_points] = n + n_walls + 12 + n_points
+                        out = pressed(cells, at, at_side, f, low, high)
+                        table[row, 1 + i] = first[w, f] - out
+                table[row, 1 + n + w] = -1.0
+                table[row, points + n_points] = 1.0
+                table[row, 0] = 1e-12 * (1.0 + n_points)
+                basis[12 + n_points] = points + n_points
                 point_wall[n_points], point_place[n_points] = w, cells[at, 24 + at_side]
                 for other in range(12 + n_points):
                     factor = table[row, basis[other]]
                     if factor != 0.0:
-                        for j in range(n_columns + 1):
+                        for j in range(points + n_points):
                             table[row, j] -= factor * table[other + 1, j]
                 n_points += 1
                 added += 1
@@ -233,18 +239,20 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
         # closed, or as near to the best as matters to what is closed
         if added == 0 or bound >= closing or hoped - bound < ENOUGH * (closing - hoped):
             break
-        _pivot(table, basis, 12 + n_points, n_columns, True)
-        _pivot(table, basis, 12 + n_points, n_columns, False)
+        n_rows, n_columns = 12 + n_points, points + n_points
+        steps = _pivot(table, basis, n_rows, n_columns, True)
+        steps += _pivot(table, basis, n_rows, n_columns, False)
+        work += float((steps + added) * n_rows * n_columns + 24 * n_cells)
     for j in range(6):
-        box[1, j] = high[j] + max(-table[0, n + n_walls + j], 0.0)
-        box[0, j] = low[j] - max(-table[0, n + n_walls + 6 + j], 0.0)
+        box[1, j] = high[j] + max(-table[0, faces + j], 0.0)
+        box[0, j] = low[j] - max(-table[0, faces + 6 + j], 0.0)
     left = np.ones(n_walls)
     along = np.zeros(n_walls)
     for i in range(n_points):
-        share = max(-table[0, n + n_walls + 12 + i], 0.0)
+        share = max(-table[0, points + i], 0.0)
         share = min(share, left[point_wall[i]])
         left[point_wall[i]] -= share
         along[point_wall[i]] += share * point_place[i]
     for w in range(n_walls):
         place[w] = along[w] + left[w] * place[w]
-    return bound - ROUND_OFF
+    return bound - ROUND_OFF, work + 100.0 * n_cells
