@@ -68,11 +68,16 @@ Errors
 
 For command lines and editors, which show what is in files
     `describe_job`, `describe_cell`, `cell_figures`      jobs and cells in words and figures
-    `list_faces`, `preview_face`, `FaceSummary`          the faces of a part file
+    `list_faces`, `preview_face`, `FaceSummary`          the faces of a part file; `face_figures`
     `robot_path`, `read_robot_file`, `arm_view`          a robot: its data with sources; a picture
     `known_posts`, `find_post`                           controllers, and what their templates get
     `json_schema`, `keys_page`, `keys`                   keys of job and cell files
     `check_folder`, `write_files`, `write_file`          files written whole or not at all
+    `read_text`                                          a file read up to a size
+
+Jobs over HTTP
+    `serve`             answers requests until it is stopped, as its `ServiceSettings` say;
+                        `opl.client` talks to it, and needs nothing of opl
 """
 
 from __future__ import annotations
@@ -97,6 +102,7 @@ if TYPE_CHECKING:
     from opl.errors import UnsafeError as UnsafeError
     from opl.files.claiming import release_folders as release_folders
     from opl.files.claiming import write_files as write_files
+    from opl.files.reading import read_text as read_text
     from opl.files.resources import start_job as start_job
     from opl.files.writing import check_folder as check_folder
     from opl.files.writing import write_file as write_file
@@ -126,6 +132,7 @@ if TYPE_CHECKING:
     from opl.run.descriptions import cell_figures as cell_figures
     from opl.run.descriptions import describe_cell as describe_cell
     from opl.run.descriptions import describe_job as describe_job
+    from opl.run.descriptions import face_figures as face_figures
     from opl.run.listings import compare_programs as compare_programs
     from opl.run.listings import describe_program as describe_program
     from opl.run.other_pages import batch_page as batch_page
@@ -153,6 +160,8 @@ if TYPE_CHECKING:
     from opl.run.viewing import find_page as find_page
     from opl.run.watch import Stage as Stage
     from opl.run.watch import Watch as Watch
+    from opl.service.serving import ServiceSettings as ServiceSettings
+    from opl.service.serving import serve as serve
 
 __version__ = VERSION
 
@@ -163,6 +172,7 @@ _HOMES = {
     "opl.cell.urdf_import": "import_urdf",
     "opl.errors": "Cancelled InputError NoFreeMoveError NoPathError OplError UnsafeError",
     "opl.files.claiming": "release_folders write_files",
+    "opl.files.reading": "read_text",
     "opl.files.resources": "start_job",
     "opl.files.writing": "check_folder write_file",
     "opl.findings": "Finding",
@@ -178,7 +188,7 @@ _HOMES = {
     "opl.report.arm_view": "arm_view",
     "opl.run.batch": "BatchRow find_jobs run_batch",
     "opl.run.delivery": "claim_folder deliver",
-    "opl.run.descriptions": "cell_figures describe_cell describe_job",
+    "opl.run.descriptions": "cell_figures describe_cell describe_job face_figures",
     "opl.run.other_pages": "batch_page cell_page",
     "opl.run.page": "run_page",
     "opl.run.points": "points_files report_points",
@@ -191,6 +201,7 @@ _HOMES = {
     "opl.run.values": "Planned Prepared Proven Refused Run Surfaced Written",
     "opl.run.viewing": "find_page",
     "opl.run.watch": "Stage Watch",
+    "opl.service.serving": "ServiceSettings serve",
 }
 __all__ = sorted(name for names in _HOMES.values() for name in names.split())
 

@@ -19,14 +19,16 @@ PACKAGE = Path(opl.__file__).parent
 # floor do not know each other. A room is a folder, or a module that lies in the package itself.
 FLOORS = [
     {"errors", "findings", "version"},
-    {"files"},
-    {"geometry"},
+    {"files", "client"},
+    {"geometry", "store"},
     {"cell", "search"},
     {"motion"},
     {"planning", "verification", "program", "report"},
     {"job"},
     {"proof"},
     {"run"},
+    {"work"},
+    {"service"},
     {"__init__"},
     {"cli"},
 ]
@@ -53,6 +55,11 @@ HOMES = {
     "xacro": {"cell/xacro_file"},
     "toppra": {"motion/time_law"},
     "ompl": {"motion/sampling"},
+    "fastapi": {"service"},
+    "starlette": {"service"},
+    "uvicorn": {"service"},
+    "distributed": {"work/cluster"},
+    "sqlite3": {"store"},
     "numba": {"cell/wheel_distance", "search"},
 }
 

@@ -17,6 +17,7 @@ from opl.cli.programs import show, templates, verify
 from opl.cli.progress import progress_bar
 from opl.cli.robots import robots
 from opl.cli.run_text import show_batch, show_run
+from opl.cli.services import serve
 from opl.cli.stopping import STATUS, Stopped, stopped_at_once, stopped_by_raising
 
 METHODS = ("recursive", "optimal")
@@ -193,5 +194,5 @@ def schema(of_cells: bool, markdown: bool) -> None:
         click.echo(opl.to_json(opl.json_schema("cell" if of_cells else "job")))
 
 
-for _command in (cell, robots, show, templates, faces, points, verify, view):
+for _command in (cell, robots, show, templates, faces, points, verify, view, serve):
     main.add_command(_command)

@@ -92,6 +92,8 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
                 f"read back from {', '.join(found.file.files)}: {found.file.postures} "
                 "configurations, moves and speeds as proven"
             )
+            if job.program.one_job_per_pass:
+                yield "each pass is a job from home to home: it may be left out or repeated"
     if program is not None:
         if not program.read_back:
             yield (
@@ -99,13 +101,18 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
                 "nothing is proven of the file itself"
             )
         worst = max((abs(one.error_percent) for one in program.passes), default=0.0)
-        yield f"program: {program.moves} moves, passes within {worst:.2f} % of their time"
+        single = max((one.largest_move_error_percent for one in program.passes), default=0.0)
+        yield (
+            f"program: {program.moves} moves, passes within {worst:.2f} % of their time, single "
+            f"moves on the wheel within {single:.1f} % of theirs"
+        )
         yield from feed_and_cycle(report, job.cell.robot.title)
         yield from _caution(
             report.robot.unverified_pulse_ratios,
             job.cell.robot.title,
             "compare a configuration at the pendant before playing",
         )
+        yield from _belt(job.program)
 
 
 def _extremes(found: Mapping[str, Any], joint_names: Sequence[str]) -> Iterator[str]:
@@ -169,6 +176,17 @@ def _caution(unverified: Sequence[str], robot: str, what: str) -> Iterator[str]:
     if unverified:
         joints = ", ".join(unverified)
         yield f"caution: the pulse ratios of {joints} of {robot} are not verified; {what}"
+
+
+def _belt(settings: Any) -> Iterator[str]:
+    """Say who switches the belt, as far as the job tells."""
+    if settings.belt_switched_by is not None:
+        yield f"the belt is switched by {settings.belt_switched_by}, says the job"
+    elif not settings.actions.switches:
+        yield (
+            "caution: nothing in the program switches the belt; name outputs in program.at_start "
+            "and at_end, or who does it in program.belt_switched_by"
+        )
 
 
 def show_batch(rows: Sequence[opl.BatchRow]) -> None:

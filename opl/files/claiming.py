@@ -92,6 +92,18 @@ def release_folders() -> None:
         _remove_empty(missing)
 
 
+def clear_after_others(parent: Path) -> None:
+    """Bring the folders in a folder to a whole state whose processes were killed.
+
+    Those that stay empty are removed; those that a process still holds are left alone.
+    """
+    for lock in sorted(parent.glob(f"*/{LOCK}")):
+        with suppress(InputError):
+            with claimed(lock.parent):
+                pass
+            _remove_empty([lock.parent])
+
+
 def _unlock(place: Path) -> None:
     with suppress(OSError):
         (place / LOCK).unlink(missing_ok=True)

@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opl.cell.full_turns import nearest_turn
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
-from opl.geometry.frames import Array, inverse, pose, transform
+from opl.geometry.frames import Array, inverse, rotation_angle, transform
+from opl.geometry.rotations import straight_between
 from opl.program.moves import Program, Purpose
 
 _BETWEEN = np.array([0.25, 0.5, 0.75])
@@ -62,30 +62,14 @@ def stray(robot: Robot, q: Array, T_flange_tool: Array, corners: Array) -> Array
     start, end = q[:-1], q[1:]
     s = _BETWEEN[:, None, None]
     Ts_joint = forward_kinematics(robot, start + s * (end - start))
-    Ts_straight = _straight(
-        forward_kinematics(robot, start) @ T_flange_tool,
-        forward_kinematics(robot, end) @ T_flange_tool,
+    Ts_start, Ts_end = (forward_kinematics(robot, one) @ T_flange_tool for one in (start, end))
+    Ts_straight = np.stack(
+        [straight_between(Ts_start, Ts_end, np.full(len(start), one)) for one in _BETWEEN]
     ) @ inverse(T_flange_tool)
     apart = transform(Ts_joint[..., None, :, :], corners) - transform(
         Ts_straight[..., None, :, :], corners
     )
     return np.asarray(np.linalg.norm(apart, axis=-1).max(axis=(0, 2)))
-
-
-def _straight(Ts_start: Array, Ts_end: Array) -> Array:
-    """Return poses between two, origin on a line and turned about one axis, shape (3, n, 4, 4)."""
-    first = Rotation.from_matrix(Ts_start[:, :3, :3])
-    turn = (first.inv() * Rotation.from_matrix(Ts_end[:, :3, :3])).as_rotvec()
-    p_start, p_end = Ts_start[:, :3, 3], Ts_end[:, :3, 3]
-    return np.stack(
-        [
-            pose(
-                (first * Rotation.from_rotvec(s * turn)).as_matrix(),
-                p_start + s * (p_end - p_start),
-            )
-            for s in _BETWEEN
-        ]
-    )
 
 
 def straight_configurations(
@@ -104,20 +88,15 @@ def straight_configurations(
         singularity, or ends in another configuration.
     """
     T_start, T_end = forward_kinematics(robot, np.stack([start, end])) @ T_flange_tool
-    first = Rotation.from_matrix(T_start[:3, :3])
-    turn = (first.inv() * Rotation.from_matrix(T_end[:3, :3])).as_rotvec()
-    distance = T_end[:3, 3] - T_start[:3, 3]
     longest = max(
-        np.linalg.norm(distance) / LINE_STEP,
-        np.linalg.norm(turn) / LINE_TURN,
+        np.linalg.norm(T_end[:3, 3] - T_start[:3, 3]) / LINE_STEP,
+        float(rotation_angle(T_start, T_end)) / LINE_TURN,
         np.abs(end - start).max() / LINE_TURN,
         1.0,
     )
-    s = np.arange(1, int(np.ceil(longest)) + 1)[:, None] / np.ceil(longest)
-    Ts_base_tool = pose(
-        (first * Rotation.from_rotvec(s * turn)).as_matrix(), T_start[:3, 3] + s * distance
-    )
-    guess = start + s * (end - start)
+    s = np.arange(1, int(np.ceil(longest)) + 1) / np.ceil(longest)
+    Ts_base_tool = straight_between(T_start, T_end, s)
+    guess = start + s[:, None] * (end - start)
     slots = inverse_kinematics(robot.arm, Ts_base_tool @ inverse(T_flange_tool), guess)
     found, q = [], start
     for candidates in slots:

@@ -27,7 +27,7 @@ from opl.errors import InputError, PassTimeError, SettingError
 from opl.geometry.frames import Array
 from opl.program.moves import PassTime, Program, Purpose
 from opl.program.played import Corners, Reading, WrittenSpeed
-from opl.program.settings import ProgramSettings
+from opl.program.settings import MotionForm, ProgramSettings
 
 GROUP = "opl.posts"
 
@@ -99,6 +99,7 @@ class Post:
         template: The layout that comes with the post.
         variables: What its templates get: name and meaning.
         counts_pulses: Whether positions may be written in encoder pulses.
+        motion: How moves on the wheel are written unless the job says so.
         reader: Reads its programs back; None where they are written and not read back.
     """
 
@@ -107,6 +108,7 @@ class Post:
     template: Path
     variables: Mapping[str, str]
     counts_pulses: bool = False
+    motion: MotionForm = MotionForm.JOINT
     reader: Reader | None = None
 
 
@@ -174,13 +176,16 @@ def pass_times(
     Raises:
         PassTimeError: If a pass does not keep its time.
     """
-    sums: dict[int, tuple[float, float]] = {}
+    moves: dict[int, list[tuple[float, float]]] = {}
     for move in program.moves:
         if move.ground_pass is not None and move.duration is not None:
-            wanted, written = sums.get(move.ground_pass, (0.0, 0.0))
-            both = wanted + move.duration, written + times[move.motion_index]
-            sums[move.ground_pass] = both
-    found = {index: PassTime(*both) for index, both in sorted(sums.items())}
+            pair = move.duration, times[move.motion_index]
+            moves.setdefault(move.ground_pass, []).append(pair)
+    found = {}
+    for index, pairs in sorted(moves.items()):
+        wanted, written = np.array(pairs).T
+        single = float(np.abs(written / wanted - 1.0).max())
+        found[index] = PassTime(float(wanted.sum()), float(written.sum()), single)
     for index, one in found.items():
         if abs(one.error) > PASS_TIME_TOLERANCE:
             raise PassTimeError(

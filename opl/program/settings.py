@@ -42,6 +42,19 @@ class UserFrame:
     T_base_user: Array
 
 
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What the flange carries in the tool data of a controller.
+
+    Attributes:
+        mass: In [kg].
+        p_flange: Its centre of gravity in the flange frame in [m], shape (3,).
+    """
+
+    mass: float
+    p_flange: Array
+
+
 @dataclass(frozen=True)
 class ByKind:
     """A number for each kind of move, none where the controller's own is to hold.
@@ -78,6 +91,9 @@ class ProgramSettings:
         deceleration: The same for slowing down.
         actions: What is done around the passes.
         accepted_pulses: Joints whose unverified pulse ratios are accepted.
+        one_job_per_pass: Whether each pass is a job of its own, called by a master.
+        load: The part in the hand, None where nobody says what it weighs.
+        belt_switched_by: Who switches the belt if not the program, None where nobody says.
         title: A line about the program, None without one.
         template: The user's own template, None for the one that comes with opl.
     """
@@ -94,5 +110,8 @@ class ProgramSettings:
     deceleration: ByKind = ByKind()
     actions: Actions = NO_ACTIONS
     accepted_pulses: tuple[str, ...] = ()
+    one_job_per_pass: bool = False
+    load: Load | None = None
+    belt_switched_by: str | None = None
     title: str | None = None
     template: Path | None = None

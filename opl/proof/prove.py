@@ -17,6 +17,7 @@ from opl.motion.motion import TimedMotion
 from opl.program.posts import Reader, find_post, readers
 from opl.proof.events import name_findings
 from opl.proof.written import written_findings
+from opl.verification.common_shift import common_shift
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import Verification, replay
 
@@ -83,13 +84,17 @@ def prove(
         job.process.approach_turn,
         job.process.approach_run,
     )
-    found = recognise(job.cell, points, playback.q, playback.duration, playback.stations, rule)
+    motion = playback.q, playback.duration, playback.stations
+    found = recognise(job.cell, points, *motion, rule)
     replayed = replay(job.cell, points, found.timed, search.max_contact_error, progress)
     # the written configurations; of one that grinds several cutter points, the first of its rows:
     # the time to the others goes to the move that follows
     rows = np.searchsorted(found.source, playback.stations, side="left")
+    astray = {"order", "contact"} & {one.kind for one in (*replayed.findings, *found.findings)}
+    shift = common_shift(job.cell, points, *motion, rule) if astray else None
     findings = (
         *reading.findings,
+        *([shift] if shift is not None else []),
         *replayed.findings,
         *found.findings,
         *written_findings(job, points, found.timed.take(rows), playback, reader),

@@ -20,7 +20,7 @@ from opl.cell.wheel_distance import use_threads
 from opl.errors import InputError, OplError
 from opl.files import documents
 from opl.files.apart import end_with_parent
-from opl.files.claiming import release_folders
+from opl.files.claiming import clear_after_others, release_folders
 from opl.job import keys
 from opl.job.load import load_job
 from opl.run.delivery import claim_folder, deliver
@@ -122,7 +122,7 @@ def _rows(jobs: Sequence[Path], out: Path, workers: int) -> Iterator[BatchRow]:
     bereft = []
     with _pool(workers) as pool:
         waiting = _submitted(pool, jobs, out)
-        with _ended_with(pool):
+        with _ended_with(pool, out):
             for future in as_completed(waiting):
                 try:
                     yield future.result()
@@ -133,9 +133,10 @@ def _rows(jobs: Sequence[Path], out: Path, workers: int) -> Iterator[BatchRow]:
         with _pool(1) as pool:
             (alone,) = _submitted(pool, [job], out)
             try:
-                with _ended_with(pool):
+                with _ended_with(pool, out):
                     yield alone.result()
             except BrokenProcessPool:
+                clear_after_others(out)
                 yield _failed(job, "error", BUG, f"{job}: its worker process died")
 
 
@@ -157,8 +158,8 @@ def _submitted(
 
 
 @contextmanager
-def _ended_with(pool: ProcessPoolExecutor) -> Iterator[None]:
-    """End the processes of a pool with whatever ends the work on it."""
+def _ended_with(pool: ProcessPoolExecutor, out: Path) -> Iterator[None]:
+    """End the processes of a pool with whatever ends the work on it, and clear up after them."""
     try:
         yield
     except BaseException:
@@ -168,7 +169,9 @@ def _ended_with(pool: ProcessPoolExecutor) -> Iterator[None]:
         deadline = time.monotonic() + GRACE
         for worker in workers:
             worker.join(max(0.0, deadline - time.monotonic()))
-            worker.kill()
+            worker.kill()  # it may be busy in a library that does not know of signals
+            worker.join()
+        clear_after_others(out)
         raise
 
 
@@ -191,10 +194,9 @@ def _clashes(jobs: Sequence[Path]) -> dict[Path, BatchRow]:
 
 def _start_worker() -> None:
     signal.signal(signal.SIGTERM, _stop)
-    end_with_parent()
     parent = multiprocessing.parent_process()
-    if parent is not None and not parent.is_alive():  # it ended while this process started
-        os._exit(BUG)
+    assert parent is not None and parent.pid is not None, "a worker is started by another process"
+    end_with_parent(parent.pid)
     use_threads(1)  # the processes share the cores
 
 

@@ -33,6 +33,7 @@ def points_page(surfaced: Surfaced, figures: str) -> str:
     """
     job, packer = surfaced.job, Packer()
     points, paints = passes_data(surfaced, packer)
+    missed = surfaced.inspection.uncovered.points
     part = DrawnSolid(Body(PART, job.cell.part, np.eye(4)), BASE, False)
     normal = surfaced.points.Ts_workpiece_cutter[:, :3, 2].mean(axis=0)
     data = {
@@ -49,6 +50,7 @@ def points_page(surfaced: Surfaced, figures: str) -> str:
             f"<p>{text(figures)}</p></header>",
             view_frame("The part", data["views"], paints, ["frames"], False),
             hover(),
+            bullets(["orange dots: no pass comes by here"] if len(missed) else []),
             section("warnings", "Warnings", bullets(map(str, surfaced.warnings))),
         ]
     )
@@ -76,7 +78,7 @@ def cell_page(cell: Cell) -> str:
         **EMPTY,
         "name": name,
         "joints": joints_data(cell.robot),
-        "cell": drawn_cell(chain, solids, packer),
+        "cell": drawn_cell(chain, solids, packer, [one.name for one in cell.wheels]),
         "views": views(wheel),
         "home": (np.zeros(6) if cell.home is None else cell.home).tolist(),
         "wheel": drawn_wheel(wheel),
@@ -118,7 +120,7 @@ def batch_page(rows: Sequence[BatchRow], folder: Path) -> str:
             "" if path is None else _small_bars(path.joint_ranges_rad),
             "" if cycle is None else f"{cycle.total_s:.1f}",
             "" if found is None else f"{found.min_clearance_mm:.1f}",
-            text(row.message),
+            _folded(row.message),
         ]
         lines.append((job, cells))
     heads = (
@@ -134,6 +136,15 @@ def batch_page(rows: Sequence[BatchRow], folder: Path) -> str:
     )
     summary = f"{good} of {len(rows)} jobs have a program"
     return sortable_page("Batch", summary, heads, lines)
+
+
+def _folded(message: str) -> str:
+    """Return the first line of a message, the others where they are asked for."""
+    first, *others = message.split("\n")
+    if not others:
+        return text(first)
+    inside = text("\n".join(others))
+    return f"<details><summary>{text(first)}</summary>{inside}</details>"
 
 
 def _small_bars(values: Sequence[float]) -> str:

@@ -42,7 +42,8 @@ MOST_LOOKS = 600  # at the nearest pair along the motion, evenly in time, beside
 KINDS = tuple(MoveKind)
 NEARLY_FREE = (
     NodeState.FREE,
-    NodeState.COLLISION,
+    NodeState.SCENE,
+    NodeState.ROBOT,
     NodeState.WHEEL,
     NodeState.LIMITS,
     NodeState.REACH,

@@ -187,11 +187,12 @@ class VerificationReport:
 
 @dataclass(frozen=True)
 class PassTimeReport:
-    """How long a pass should take, takes, and by how much that is off."""
+    """How long a pass should take, takes, and by how much that and a single move of it is off."""
 
     wanted_s: float
     written_s: float
     error_percent: float
+    largest_move_error_percent: float
 
 
 @dataclass(frozen=True)
@@ -214,6 +215,7 @@ class Report:
         status: ``ok``, ``no_path`` or ``unsafe``.
         reasons: Why there is no program, one line each.
         remedies: Single changes that would open the job, one line each.
+        tried_in_vain: Kinds of changes that were tried and do not, one line each.
         compared: The figures of the paths that exist: ``fixed``, ``paper_start``, ``recursive``,
             ``optimal``.
         seconds: Time of each stage, and their ``total``.
@@ -230,6 +232,7 @@ class Report:
     warnings: Sequence[str]
     reasons: Sequence[str]
     remedies: Sequence[str]
+    tried_in_vain: Sequence[str]
     fixed: FixedReport
     path: PathReport | None
     compared: Mapping[str, FiguresReport]

@@ -143,4 +143,4 @@ def _without_path(prepared: Prepared, error: NoPathError, watch: Watch) -> Refus
     surfaced = prepared.surfaced
     with watch.stage(Stage.REMEDIES) as progress:
         remedies = find_remedies(surfaced.job, surfaced.points, progress)
-    return Refused(prepared, error, tuple(remedies), watch.seconds)
+    return Refused(prepared, error, remedies.found, watch.seconds, remedies.in_vain)

@@ -176,12 +176,14 @@ class Refused:
             what was proven.
         remedies: Single changes of the job that would open a path, one line each.
         seconds: Time of each stage in [s].
+        in_vain: Kinds of changes that were tried and open none, one line each.
     """
 
     reached: Prepared | Planned | Proven
     cause: NoPathError | Verification | FileProof
     remedies: tuple[str, ...]
     seconds: Mapping[Stage, float]
+    in_vain: tuple[str, ...] = ()
 
     @property
     def status(self) -> str:

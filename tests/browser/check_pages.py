@@ -160,9 +160,10 @@ def test_scrubbing_moves_chart_and_curves_together(runs, opened):
         cursor = one.page.locator("#chart-cursor")
         assert cursor.is_visible()
         count = one.page.evaluate("() => window.opl.chart.count")
-        left = float(cursor.evaluate("mark => parseFloat(mark.style.left)"))
+        left = float(cursor.evaluate("mark => parseFloat(mark.style.transform.slice(10))"))
         assert left == pytest.approx(100.0 * (motion.cutter_point[move] + 0.5) / count, abs=0.05)
-        x = float(one.page.locator("#curves .cursor").evaluate("one => parseFloat(one.style.left)"))
+        cursor = one.page.locator("#curves .cursor")
+        x = float(cursor.evaluate("one => parseFloat(one.style.transform.slice(11))"))
         assert x == pytest.approx(100.0 * times[move] / times[-1], abs=0.01)
         seen.add((left, x))
     assert len(seen) == 2

@@ -184,6 +184,7 @@ def written(request, tmp_path_factory):
         "robot": language.robot,
         "process.home_deg": list(language.home),
         "program.controller": request.param,
+        "program.motion": "joint",
     }
     if request.param == "KRL":  # whole percents are too coarse for moves as slow as the others'
         changes["process.feed_mm_s"] = 60.0

@@ -55,6 +55,9 @@ def test_the_page_says_what_the_result_says(good):
         f"{report.path.lower_bound_rad:.6f} rad",
         f"{report.cycle.total_s:.3f}",
         *report.program.sha256.values(),
+        *report.inputs.values(),
+        f"made by opl {report.opl}, replayed in {report.verification.engine}",
+        *(f"<td>{part.seconds:.3f}</td>" for part in report.cycle.parts),
     ):
         assert figure in page
     assert "pulse ratios of R, B, T" in page and "wherever the robot stands" in page
@@ -95,9 +98,9 @@ def test_a_refused_job_begins_where_it_is_blocked(blocked):
     named = re.search(r"cutter points? (\d+)(?: to (\d+))?", blocked.reasons[1])
     assert int(named[1]) <= start["point"] <= int(named[2] or named[1])
     assert "No path: no program was written" in page
-    for line in (*blocked.reasons, *blocked.remedies):
+    for line in (*blocked.reasons, *blocked.remedies, *blocked.in_vain):
         assert line.split(":")[0] in page
-    assert "of these: part and post" in page
+    assert "of these: part and post" in page and "collides with what stands around" in page
 
 
 def test_a_motion_that_the_replay_refuses_begins_at_its_first_finding(tmp_path, monkeypatch):

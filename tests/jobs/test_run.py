@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import opl
+from opl.run.remedies import Remedies
 from opl.run.result import to_json
 from opl.verification.replay import Verification
 from tests.support.jobs import POST, write_job
@@ -151,12 +152,14 @@ def refused(run, status, reached, cause):
 
 
 def test_without_a_path_the_comparison_is_reached(tmp_path, monkeypatch):
-    monkeypatch.setattr("opl.run.stages.find_remedies", lambda *arguments: ["a larger wheel"])
+    told = Remedies(("a larger wheel",), ("another width: 6 tried, none opens the job",))
+    monkeypatch.setattr("opl.run.stages.find_remedies", lambda *arguments: told)
     job = opl.load_job(write_job(tmp_path, {**QUICK, "obstacles": [POST]}))
     run = opl.run_job(job)
     report = refused(run, "no_path", opl.Prepared, opl.NoPathError)
     assert report.path is None and report.verification is None and report.fixed is not None
-    assert report.remedies == ("a larger wheel",) and "a larger wheel" in str(run.error)
+    assert report.remedies == told.found and "a larger wheel" in str(run.error)
+    assert report.tried_in_vain == told.in_vain
     assert run.error.exit_status == 3
 
 

@@ -99,18 +99,21 @@ class SmallProgram:
         return reader_of(self.job).read(files, self.job.cell.robot, self.job.program)
 
 
-def small_program(controller, part="v_shape"):
-    """Return the small program of a controller: of a part that comes with opl, or ``arch``."""
-    return _made(controller, part)
+def small_program(controller, part="v_shape", motion="joint"):
+    """Return the small program of a controller: of a part that comes with opl, or ``arch``.
+
+    Of joint moves, or with straight ones on the wheel.
+    """
+    return _made(controller, part, motion)
 
 
 @cache
-def _made(controller, part):
+def _made(controller, part, motion):
     drawn = stages.draw_charts
     stages.draw_charts = lambda planned: {}  # pictures take longer than all the rest
     try:
         with tempfile.TemporaryDirectory() as folder:
-            job = _arch() if part == "arch" else _shipped(controller, part, Path(folder))
+            job = _arch() if part == "arch" else _shipped(controller, part, motion, Path(folder))
             run = run_job(job)
     finally:
         stages.draw_charts = drawn
@@ -120,7 +123,7 @@ def _made(controller, part):
     return SmallProgram(job, cut_surface(job).points, run, name, text)
 
 
-def _shipped(controller, part, home):
+def _shipped(controller, part, motion, home):
     robot, home_deg = ARMS[controller]
     keys = {
         "robot": robot,
@@ -135,6 +138,7 @@ def _shipped(controller, part, home):
         # rows this short end where the arms pivot; what is attacked is the file
         "process.max_dwell_s": 10,
         "program.controller": controller,
+        "program.motion": motion,
         **ACTIONS,
     }
     if controller != "DX200":

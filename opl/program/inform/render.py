@@ -15,7 +15,7 @@ from opl.cell.robot import Robot
 from opl.errors import InputError, SettingError
 from opl.files import resources
 from opl.program.controller import ControllerProfile
-from opl.program.inform.conditions import frame_comments
+from opl.program.inform.conditions import frame_comments, load_comments
 from opl.program.inform.faults import job_faults
 from opl.program.inform.heads import attributes, frame
 from opl.program.inform.job_layout import JobLayout, JobStep, differences
@@ -35,7 +35,9 @@ _STOP_LEVEL = 0
 _FAULTS_SHOWN = 10
 
 
-def split_for(program: Program, profile: ControllerProfile) -> tuple[Program, ...]:
+def split_for(
+    program: Program, profile: ControllerProfile, by_pass: bool = False
+) -> tuple[Program, ...]:
     """Return the jobs of a program, their names legal: one, or a master and the parts it calls.
 
     Raises:
@@ -43,7 +45,7 @@ def split_for(program: Program, profile: ControllerProfile) -> tuple[Program, ..
         OplError: If a pass has more moves than a job can hold.
     """
     program = replace(program, name=short_name(program.name, profile.name_length))
-    return split(program, profile.step_limit, profile.name_length)
+    return split(program, profile.step_limit, profile.name_length, by_pass)
 
 
 def render(
@@ -86,7 +88,7 @@ def _layout(
     pulses = form is PositionForm.PULSES
     postype = "PULSE" if pulses else form.value.upper()
     notes = _ratio_notes(robot, profile.comment_length) if pulses else []
-    notes += frame_comments(settings, profile)
+    notes += [*frame_comments(settings, profile), *load_comments(settings)]
     return JobLayout(
         name=part.name,
         tool=str(settings.tool),

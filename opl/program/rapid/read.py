@@ -9,9 +9,9 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opl.geometry.frames import pose
+from opl.geometry.rotations import from_quaternion
 from opl.program.played import Corner, Corners, ReadMove, SpeedUnit, WrittenSpeed
 from opl.program.statements import NUMBER, Listing, Notes, Words, code_lines
 
@@ -101,7 +101,7 @@ def _statement(notes: Notes, line: int, code: str, free: bool) -> None:
         if abs(np.linalg.norm([w, *xyz]) - 1.0) > 1e-4:
             notes.doubt(line, "the quaternion is not of length 1")
             return
-        target = pose(Rotation.from_quat([*xyz, w]).as_matrix(), p * 1e-3)
+        target = pose(from_quaternion(np.array([*xyz, w])), p * 1e-3)
         quarters = tuple(int(turn) for turn in turns[:3])
     else:
         notes.other(line, code)

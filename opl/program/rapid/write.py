@@ -11,11 +11,11 @@ import re
 from datetime import datetime
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import Robot, controller_poses
 from opl.files import resources
 from opl.geometry.frames import Array
+from opl.geometry.rotations import quaternion
 from opl.program.dialect import ActionTexts, Dialect, rounded_times
 from opl.program.digits import degrees
 from opl.program.moves import Move, Program
@@ -81,7 +81,7 @@ def _move(move: Move, T_base_tool: Array, time: float, tool: str) -> tuple[str, 
 
 def _robtarget(q: Array, T_base_tool: Array) -> str:
     x, y, z = T_base_tool[:3, 3] * 1e3
-    qx, qy, qz, qw = Rotation.from_matrix(T_base_tool[:3, :3]).as_quat(canonical=True)
+    qx, qy, qz, qw = quaternion(T_base_tool[:3, :3])
     # quarter turns of axes 1, 4 and 6; the module switches the check of the rest off
     cf1, cf4, cf6 = (int(np.floor(np.rad2deg(q[joint]) / 90.0)) for joint in (0, 3, 5))
     return (

@@ -6,11 +6,11 @@ import re
 from datetime import datetime
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import Robot, controller_poses
 from opl.files import resources
 from opl.geometry.frames import Array
+from opl.geometry.rotations import rotation_vector
 from opl.program.dialect import ActionTexts, Dialect, rounded_times
 from opl.program.digits import fixed
 from opl.program.moves import Program
@@ -58,7 +58,7 @@ def tool_name(settings: ProgramSettings) -> str:
 
 def _tool_pose(settings: ProgramSettings) -> list[str]:
     x, y, z = settings.T_flange_tool[:3, 3]
-    turn = Rotation.from_matrix(settings.T_flange_tool[:3, :3]).as_rotvec()
+    turn = rotation_vector(settings.T_flange_tool[:3, :3])
     return [f"{value + 0.0:.6f}" for value in (x, y, z, *turn)]
 
 

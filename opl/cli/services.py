@@ -1,0 +1,71 @@
+"""Commands that keep running: the service."""
+
+from __future__ import annotations
+
+import logging
+import os
+from pathlib import Path
+
+import click
+
+import opl
+from opl.cli.inputs import FILE
+
+TOKEN = "OPL_TOKEN"
+
+
+@click.command()
+@click.option("--store", type=FILE, default=Path("opl-service"), show_default=True,
+              help="Folder for jobs and their files.")  # fmt: skip
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
+@click.option("--port", type=click.IntRange(0, 65535), default=8765, show_default=True,
+              help="0 takes one that is free.")  # fmt: skip
+@click.option("--workers", type=click.IntRange(min=1), help="Processes; default one per core.")
+@click.option("--token-file", type=FILE, help=f"File with the token; or in {TOKEN}.")
+@click.option("--time-limit", type=click.FloatRange(min=1.0), default=600.0, show_default=True,
+              help="Seconds that a job may take.")  # fmt: skip
+@click.option("--memory-limit", type=click.IntRange(min=1000), default=3000, show_default=True,
+              help="MB of data that a worker may have.")  # fmt: skip
+@click.option("--max-upload", type=click.IntRange(min=1), default=100, show_default=True,
+              help="MB that a request may have.")  # fmt: skip
+@click.option("--log", type=FILE, help="Write what happens to this file, a line of JSON each.")
+def serve(
+    store: Path,
+    host: str,
+    port: int,
+    workers: int | None,
+    token_file: Path | None,
+    time_limit: float,
+    memory_limit: int,
+    max_upload: int,
+    log: Path | None,
+) -> None:
+    """Serve jobs over HTTP: submit, follow, cancel, fetch the files and the page.
+
+    Listens on this machine only; beyond it each request has to carry a token. docs/service.md says
+    what can be asked, /docs of the service shows it. Needs the extra opl[service].
+
+    Example: opl serve --store jobs --workers 2
+    """
+    token = os.environ.get(TOKEN) if token_file is None else opl.read_text(token_file, 1000).strip()
+    log_to(log)
+    settings = opl.ServiceSettings(
+        folder=store,
+        host=host,
+        port=port,
+        workers=workers or os.cpu_count() or 1,
+        token=token or None,
+        seconds=time_limit,
+        memory=memory_limit * 1_000_000,
+        most_bytes=max_upload * 1_000_000,
+    )
+    opl.serve(settings, lambda address: click.echo(f"opl serves {address}, {address}/docs"))
+
+
+def log_to(path: Path | None) -> None:
+    """Write what happens to jobs to the end of a file, a line of JSON each; None for nowhere."""
+    if path is not None:
+        opl.check_folder(path.parent)
+        handler = logging.FileHandler(path, encoding="utf-8")
+        handler.setFormatter(logging.Formatter("%(message)s"))
+        logging.getLogger("opl.jobs").addHandler(handler)
