@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,9 +71,15 @@ class Columns:
             float(after[0]) if len(after) else None,
         )
 
-    def missing(self, box: JointBox) -> Array:
-        """Return by how much a box must grow for each place, in [rad], shape (n,)."""
-        return missing_chords(self.q, self.free, box)
+    def missed(self, box: JointBox, known: Collection[float], allowed: float) -> list[float]:
+        """Return the places that a box misses by more than allowed in [rad], the worst first.
+
+        Those in ``known`` are left out.
+        """
+        missing = missing_chords(self.q, self.free, box)
+        missing[np.isin(self.places, list(known))] = 0.0
+        worst = np.argsort(-missing, kind="stable")
+        return [float(self.places[k]) for k in worst if missing[k] > allowed]
 
 
 class ColumnSampler:

@@ -61,7 +61,7 @@ class BoxTracks:
         most: Travel,
     ) -> None:
         self._problem = problem
-        self._sampler = sampler
+        self.sampler = sampler
         self._costs = costs
         self._max_contact_change = max_contact_change
         self._most = most
@@ -103,7 +103,7 @@ class BoxTracks:
         inner = box.widened(room / 2.0)
         t, spacing = samples_in(columns.t, columns.q, columns.free, inner, SAMPLES)
         t = np.concatenate([t, levels(columns.places, rows, inner, t[:, :1])], axis=1)
-        at = self._sampler.at(columns.places, columns.points, columns.placements, t)
+        at = self.sampler.at(columns.places, columns.points, columns.placements, t)
         coarse = sampled = _Sampled(self, at, rows, inner)
         track = sampled.smoothest()
         if track is None:
@@ -149,12 +149,14 @@ class _Sampled:
             wheel_distance=np.zeros(columns.t.shape),
         )
         self.matrices = open_matrices(self.problem)
+        self._swept = False
         shut = shut_edges(columns.places, columns.t, rows, box)
         for matrix in self.matrices:
             matrix.blocked.update(shut)
 
     def sweep(self) -> None:
         """Close every node that collides."""
+        self._swept = True
         hits: dict[int, np.ndarray] = {}
         asked: dict[int, np.ndarray] = {}
         for matrix in self.matrices:
@@ -206,7 +208,7 @@ class _Sampled:
         about = np.linspace(-1.0, 1.0, SAMPLES)
         last = search._problem.cell.wheel.last_position
         t = np.clip(own[:, None] + about * spacing[:, None], -last, last)
-        around = search._sampler.at(columns.places, columns.points, columns.placements, t)
+        around = search.sampler.at(columns.places, columns.points, columns.placements, t)
         return _Sampled(search, around, self._rows, self._box)
 
     def bulges(self, track: Track, box: JointBox) -> Bulges | None:
@@ -249,18 +251,20 @@ class _Sampled:
         most = search.checks + MOST_CHECKS
         while search.checks < most:
             proposals = twins(self.matrices, track, self.problem.cell.robot)
-            outcome = propose_and_check(self.problem, self.matrices, proposals, search.checks)
-            before, search.checks = search.checks, search.checks + len(proposals)
-            if isinstance(outcome, Found):
-                plan = outcome.plan
-                search.checks = plan.checks
+            before = search.checks
+            outcome = propose_and_check(self.problem, self.matrices, proposals, before)
+            now = outcome.plan if isinstance(outcome, Found) else outcome
+            search.checks = now.checks
             search.places_checked += (search.checks - before) * len(places)
             if isinstance(outcome, Found):
+                plan = outcome.plan
                 path, motion = plan.path, plan.motion
                 columns = np.arange(len(places))
                 original = np.interp(path.cutter_point, columns, places)
                 motion = motion.renumbered(np.interp(motion.cutter_point, columns, places))
                 return replace(plan, path=replace(path, cutter_point=original), motion=motion)
+            if not self._swept:
+                self.sweep()
             following = self.smoothest()
             if following is None:
                 break

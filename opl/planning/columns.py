@@ -24,18 +24,15 @@ from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.cut_cells import cells_of, cut_finer
+from opl.planning.enclosed import ROUND_OFF, EnclosedCells, enclosing
 from opl.planning.images import Images
 from opl.planning.obstructed import Obstructions
-from opl.search.walls import UNKNOWN, Image, Line, Piece, Wall
+from opl.search.walls import Image, Line, Piece, Wall
 
-MOST_PARTS = 16  # of a cell whose pads are large, at once
 MOST_CUTS = 3  # of such cells, each finer than the one before
 ROW_PARTS = 16  # cells between two places of a wall along a contact position
 PART_OF_A_WALL = 0.3  # of the work for one: a cell cut finer
 FINER = 8  # cells that one is cut into where a proof needs it
-COARSE = 5e-4  # [rad] sum of the pads that is small enough
-WIDEST = 0.5  # [rad] that an angle is enclosed to; wider is not known
-ROUND_OFF = 1e-9  # [rad] of inverse kinematics and enclosures
 
 
 @dataclass(frozen=True)
@@ -152,7 +149,7 @@ class ColumnWalls:
         cells = self._enclosed(q, flange, radius, grids, none, np.empty((len(grids), 4, 4)))
         return [list(self._pieces(cells, k, t)) for k, t in enumerate(contact_positions)]
 
-    def _pieces(self, cells: _Cells, wall: int, row: float | None = None) -> Iterator[Piece]:
+    def _pieces(self, cells: EnclosedCells, wall: int, row: float | None = None) -> Iterator[Piece]:
         """Yield the pieces of one of several walls."""
         t = cells.grids[wall]
         first, corner = cells.first[wall], cells.first[wall] + wall
@@ -181,7 +178,7 @@ class ColumnWalls:
                 steps -= 2.0 * np.pi * np.round(steps / (2.0 * np.pi))
                 corners = np.concatenate([start[None], start + np.cumsum(steps, axis=0)])
                 radius = cells.radius[family][:, now][:, low:high].T
-                off_low, off_high = _enclosing(corners, middle, radius)
+                off_low, off_high = enclosing(corners, middle, radius)
                 pad_low = np.where(sure, np.maximum(pad_low, off_low), off_low)
                 pad_high = np.where(sure, np.minimum(pad_high, off_high), off_high)
                 piece = Piece(family, line, t[low : high + 1], corners, pad_low, pad_high)
@@ -203,7 +200,7 @@ class ColumnWalls:
 
     def _cells(
         self, Ts_workpiece_cutter: Array, grids: list[Array], cuts: list[np.ndarray]
-    ) -> _Cells:
+    ) -> EnclosedCells:
         """Enclose the postures over all cells of some places."""
         arm = self._cell.robot.arm
         corners = np.concatenate(
@@ -229,7 +226,7 @@ class ColumnWalls:
         grids: list[Array],
         cuts: list[np.ndarray],
         Ts_workpiece_cutter: Array,
-    ) -> _Cells:
+    ) -> EnclosedCells:
         """Return cells, the motion of the flange over each of them enclosed."""
         found = joint_derivatives(self._cell.robot.arm, flange)
         counts = np.array([len(t) - 1 for t in grids])
@@ -239,72 +236,10 @@ class ColumnWalls:
         known = np.isfinite(pad_low) & np.isfinite(pad_high)
         known &= 2.0 * radius * found.first < np.pi / 2.0
         first = np.concatenate([[0], np.cumsum(counts)[:-1]])
-        return _Cells(
+        return EnclosedCells(
             Ts_workpiece_cutter, grids, cuts, first, corners, pad_low, pad_high, known,
             found.middle, found.radius, found.none, np.array(self.images.families),
         )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class _Cells:
-    """The cells of several places, one place after the other.
-
-    Attributes:
-        Ts_workpiece_cutter: The places, shape (k, 4, 4).
-        grids: Ends of the cells of each.
-        cuts: In which cells of each the part surely cuts into the wheel.
-        first: First cell of each, shape (k,).
-        q: Postures at the ends, principal angles in [rad], shape (n + k, 8, 6).
-        pad_low: As in `Piece`, shape (8, 6, n).
-        pad_high: As in `Piece`.
-        known: Which pads are, shape (8, 6, n).
-        middle: Middle of what holds the angle all over a cell in [rad], shape (8, 6, n).
-        radius: Half of what holds it, shape (8, 6, n).
-        none: Where there is certainly no posture, shape (8, n).
-        families: Those that matter.
-    """
-
-    Ts_workpiece_cutter: Array
-    grids: list[Array]
-    cuts: list[np.ndarray]
-    first: np.ndarray
-    q: Array
-    pad_low: Array
-    pad_high: Array
-    known: np.ndarray
-    middle: Array
-    radius: Array
-    none: np.ndarray
-    families: np.ndarray
-
-    def parts(self) -> list[np.ndarray]:
-        """Return into how many parts each cell of each place should be cut."""
-        bent = np.where(self.known, self.pad_high - self.pad_low, np.nan)[self.families]
-        about = 2.0 * self.radius[self.families]
-        pads = np.fmin(bent, about).sum(axis=1)
-        # what is known of the bend falls with the square
-        wanted = np.where((bent <= about).all(axis=1), np.ceil(np.sqrt(pads / COARSE)), MOST_PARTS)
-        wanted = np.where(pads <= COARSE, 1, wanted)
-        wanted = np.where(self.none[self.families], 1, wanted)
-        parts = np.minimum(wanted.max(axis=0), MOST_PARTS).astype(int)
-        return np.split(parts, self.first[1:])
-
-
-def _enclosing(corners: Array, middle: Array, radius: Array) -> tuple[Array, Array]:
-    """Return the pads of chords that hold angles known only up to a radius and full turns.
-
-    Args:
-        corners: Ends of the chords in [rad], shape (n + 1, 6).
-        middle: Of the angles over each cell, shape (n, 6).
-        radius: Of what holds them, shape (n, 6).
-    """
-    low, high = np.minimum(corners[:-1], corners[1:]), np.maximum(corners[:-1], corners[1:])
-    turns = np.round(((low + high) / 2.0 - middle) / (2.0 * np.pi))
-    middle = middle + 2.0 * np.pi * turns
-    known = radius <= WIDEST
-    below = np.where(known, np.minimum(middle - radius - high, 0.0) - ROUND_OFF, -UNKNOWN)
-    above = np.where(known, np.maximum(middle + radius - low, 0.0) + ROUND_OFF, UNKNOWN)
-    return below, above
 
 
 def _runs(kind: np.ndarray) -> list[tuple[int, int]]:

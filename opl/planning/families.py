@@ -109,6 +109,11 @@ def _grown(by_joint: Array, free: np.ndarray, box: JointBox) -> JointBox | None:
     return JointBox(low, high)
 
 
+def alike(placements: Sequence[Placement]) -> bool:
+    """Return whether all passes are ground in one family with the wrist to one side."""
+    return len({(one.family, one.number) for one in placements}) == 1
+
+
 def few_columns(pass_index: np.ndarray) -> np.ndarray:
     """Return columns spread over all of them, both ends of each pass among them."""
     step = -(-len(pass_index) // MOST_COLUMNS)

@@ -19,7 +19,8 @@ from opl.search.walls import Image, Piece, Wall
 PRESSES = 0.05  # share of a face's price below which a wall is not said to hold it
 LEAST_SHARE = 0.01  # of the sum that a joint must turn to be told of
 MOST_HOLDERS = 6
-MOST_SUBPROBLEMS = 2000  # for what a box needs without a wall
+MOST_SUBPROBLEMS = 500  # for what a box needs without a wall
+MOST_NUMBERS = 3e8  # worked on in linear programs for it
 GAP = 2e-3  # to which these proofs are taken
 
 
@@ -82,7 +83,9 @@ def _least(
     proof = BoxProof(images, cut, value * (1.0 + GAP), GAP / 2.0)
     for wall in walls:
         proof.add(wall)
-    while not proof.closed and proof.subproblems < MOST_SUBPROBLEMS:
+    while not proof.closed:
+        if proof.subproblems >= MOST_SUBPROBLEMS or proof.work >= MOST_NUMBERS:
+            break
         bound = proof.lower_bound
         candidate = proof.take_next()
         if candidate is None:

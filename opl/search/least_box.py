@@ -22,6 +22,7 @@ from opl.search.walls import Image, Piece, Wall
 
 SETTLED = 0.1  # of the gap wanted: what the bend of the spans may lose where none is split further
 MOST_TRIMS = 3  # of spans, before one is split
+MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
 SMALLEST = 1e-6  # along a wall: a cell that is not cut further
 TRIMMED = 0.9  # of the cells: more left, and trimming goes on no longer
 FEWEST_UNSEEN = 8  # subproblems split before a box is shown that is not settled
@@ -220,8 +221,9 @@ class BoxProof:
             spans = spans[: tighten(table, spans, *passes, low, high, closing, sizes)]
             if not len(spans):
                 return False
+            few = spans[self._few_cells(spans)]
             bound, numbers = least_box(
-                table, spans, n_walls, low, high, closing, box, place, lost, prices
+                table, few, n_walls, low, high, closing, box, place, lost, prices
             )
             self.work += numbers
             node.bound = max(node.bound, bound, float(sizes.max()))
@@ -236,6 +238,11 @@ class BoxProof:
         node.spans, node.n_walls, node.low, node.high = spans, n_walls, low, high
         node.found = Relaxation(box[0], box[1], place, lost)
         return True
+
+    def _few_cells(self, spans: np.ndarray) -> np.ndarray:
+        """Return which spans are of walls with so few cells left that they are worth a price."""
+        cells = np.bincount(spans[:, WALL], weights=spans[:, END] - spans[:, FIRST])
+        return np.asarray(cells[spans[:, WALL]] <= MOST_PRICED)
 
     def _where_to_split(self, node: Subproblem) -> tuple[int, float] | None:
         """Return the wall to be split, and where along it; None if that gains nothing."""
@@ -258,8 +265,17 @@ class BoxProof:
     def _split(self, node: Subproblem, wall: int, place: float) -> None:
         before, end = np.searchsorted(node.spans[:, WALL], [wall, wall + 1])
         own = node.spans[before:end]
-        halves = [own[k : k + 1] for k in range(len(own))]
-        if len(own) == 1:
+        if len(own) > 1:
+            # the nearest, and all others
+            table, box = self._cells.table, node.found
+            assert box is not None
+            away = [
+                distance(table, first, end, box.low, box.high)
+                for first, end in own[:, FIRST:].tolist()
+            ]
+            k = int(np.argmin(away))
+            halves = [own[k : k + 1], np.delete(own, k, axis=0)]
+        else:
             if own[0, END] == own[0, FIRST] + 1:
                 own = self._cells.finer(own[0])
             halves = [own]

@@ -100,7 +100,8 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
 
     Args:
         cells: The table of `Cells`.
-        spans: What is left of each wall, sorted by their walls, shape (n, 5).
+        spans: What is left of walls, sorted by their walls, shape (n, 5). Walls without any are
+            left out.
         n_walls: How many walls.
         low: The lower faces are not above these, in [rad], shape (6,).
         high: The upper faces are not below these.
@@ -112,6 +113,7 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
             lower one, from 0 to 1, shape (n_walls, 12).
     """
     core = 0.0
+    place[:] = 0.0
     for j in range(6):
         core += high[j] - low[j]
     begin, end = np.zeros(n_walls, dtype=np.int64), np.zeros(n_walls, dtype=np.int64)
@@ -121,7 +123,7 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
         begin[spans[k, 0]] = k
         end[spans[k, 0]] = max(end[spans[k, 0]], k + 1)
     # the point of each wall that is nearest to the core, and the faces it can press on at all
-    first, most = np.empty((n_walls, 12)), np.full((n_walls, 12), -np.inf)
+    first, most = np.zeros((n_walls, 12)), np.full((n_walls, 12), -np.inf)
     for w in range(n_walls):
         nearest = np.inf
         for k in range(begin[w], end[w]):
