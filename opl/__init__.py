@@ -36,8 +36,14 @@ Runs
     `verify_motion`     `Planned` -> `Proven`
     `write_program`     `Proven` -> `Written`: the program as texts, read back and proven
     `Watch`             reports each `Stage` of a run while it goes on, and cancels it
-    `run_batch`         many jobs in processes, each a `BatchRow`; `find_jobs` finds them
-    `batch_page`        `BatchRow`s -> a page of all, with links to theirs
+
+Many jobs
+    `run_batch`         job files -> a `BatchRow` each, run in processes as `BatchSettings` say;
+                        what has not changed is left as it is; `find_jobs` finds them
+    `write_batch_page`  `BatchRow`s -> a page of all, with links to theirs; `junit` -> JUnit XML
+    `batch_standing`    what a batch would do: a `JobStanding` each; `audit` reads all files again
+    `watch_inbox`       runs what comes into a folder, until it is stopped
+    `open_store`        folder -> the `Store` of its `StoredJob`s
 
 Results
     `make_report`       `Run` -> `Report`: the content of ``result.json``
@@ -78,6 +84,7 @@ For command lines and editors, which show what is in files
 Jobs over HTTP
     `serve`             answers requests until it is stopped, as its `ServiceSettings` say;
                         `opl.client` talks to it, and needs nothing of opl
+    `install_plugin`    copies the workbench for FreeCAD, which talks to it too
 """
 
 from __future__ import annotations
@@ -103,6 +110,7 @@ if TYPE_CHECKING:
     from opl.files.claiming import release_folders as release_folders
     from opl.files.claiming import write_files as write_files
     from opl.files.reading import read_text as read_text
+    from opl.files.resources import install_plugin as install_plugin
     from opl.files.resources import start_job as start_job
     from opl.files.writing import check_folder as check_folder
     from opl.files.writing import write_file as write_file
@@ -126,7 +134,6 @@ if TYPE_CHECKING:
     from opl.report.arm_view import arm_view as arm_view
     from opl.run.batch import BatchRow as BatchRow
     from opl.run.batch import find_jobs as find_jobs
-    from opl.run.batch import run_batch as run_batch
     from opl.run.delivery import claim_folder as claim_folder
     from opl.run.delivery import deliver as deliver
     from opl.run.descriptions import cell_figures as cell_figures
@@ -135,7 +142,6 @@ if TYPE_CHECKING:
     from opl.run.descriptions import face_figures as face_figures
     from opl.run.listings import compare_programs as compare_programs
     from opl.run.listings import describe_program as describe_program
-    from opl.run.other_pages import batch_page as batch_page
     from opl.run.other_pages import cell_page as cell_page
     from opl.run.page import run_page as run_page
     from opl.run.points import points_files as points_files
@@ -162,6 +168,17 @@ if TYPE_CHECKING:
     from opl.run.watch import Watch as Watch
     from opl.service.serving import ServiceSettings as ServiceSettings
     from opl.service.serving import serve as serve
+    from opl.store.jobs import Store as Store
+    from opl.store.values import StoredJob as StoredJob
+    from opl.work.batch import BatchSettings as BatchSettings
+    from opl.work.batch import run_batch as run_batch
+    from opl.work.batch import write_batch_page as write_batch_page
+    from opl.work.inbox import watch_inbox as watch_inbox
+    from opl.work.junit import junit as junit
+    from opl.work.state import JobStanding as JobStanding
+    from opl.work.state import audit as audit
+    from opl.work.state import batch_standing as batch_standing
+    from opl.work.state import open_store as open_store
 
 __version__ = VERSION
 
@@ -173,7 +190,7 @@ _HOMES = {
     "opl.errors": "Cancelled InputError NoFreeMoveError NoPathError OplError UnsafeError",
     "opl.files.claiming": "release_folders write_files",
     "opl.files.reading": "read_text",
-    "opl.files.resources": "start_job",
+    "opl.files.resources": "install_plugin start_job",
     "opl.files.writing": "check_folder write_file",
     "opl.findings": "Finding",
     "opl.geometry.faces": "FaceSummary list_faces preview_face",
@@ -186,10 +203,10 @@ _HOMES = {
     "opl.program.posts": "find_post known_posts",
     "opl.program.ratios": "import_pulse_ratios with_ratios",
     "opl.report.arm_view": "arm_view",
-    "opl.run.batch": "BatchRow find_jobs run_batch",
+    "opl.run.batch": "BatchRow find_jobs",
     "opl.run.delivery": "claim_folder deliver",
     "opl.run.descriptions": "cell_figures describe_cell describe_job face_figures",
-    "opl.run.other_pages": "batch_page cell_page",
+    "opl.run.other_pages": "cell_page",
     "opl.run.page": "run_page",
     "opl.run.points": "points_files report_points",
     "opl.run.listings": "compare_programs describe_program",
@@ -202,6 +219,12 @@ _HOMES = {
     "opl.run.viewing": "find_page",
     "opl.run.watch": "Stage Watch",
     "opl.service.serving": "ServiceSettings serve",
+    "opl.store.jobs": "Store",
+    "opl.store.values": "StoredJob",
+    "opl.work.batch": "BatchSettings run_batch write_batch_page",
+    "opl.work.inbox": "watch_inbox",
+    "opl.work.junit": "junit",
+    "opl.work.state": "JobStanding audit batch_standing open_store",
 }
 __all__ = sorted(name for names in _HOMES.values() for name in names.split())
 

@@ -211,8 +211,37 @@ def show_batch(rows: Sequence[opl.BatchRow]) -> None:
             message = row.message if named else f"{row.job}: {row.message}"
             lines.append(message.replace("\n", "\n  "))
     console.print(table)
-    good = sum(row.exit_status == 0 for row in rows)
-    _print(console, [*lines, f"{good} of {len(rows)} jobs have a program"])
+    if any(row.variant for row in rows):
+        console.print(_sweep(rows))
+    good, same = sum(row.exit_status == 0 for row in rows), sum(row.unchanged for row in rows)
+    unchanged = f"; {same} unchanged, not run again" if same else ""
+    _print(console, [*lines, f"{good} of {len(rows)} jobs have a program{unchanged}"])
+
+
+def _sweep(rows: Sequence[opl.BatchRow]) -> Table:
+    """Return what the values of sweeps make of their jobs."""
+    swept = list(dict.fromkeys(key for row in rows for key in row.variant))
+    figures = ("status", "range sum [rad]", "gap [%]", "cycle [s]", "clearance [mm]")
+    table = Table(title="sweeps", title_justify="left")
+    for heading in ("folder", *swept, *figures):
+        table.add_column(Text(heading), overflow="fold")
+    for row in rows:
+        if not row.variant:
+            continue
+        path = cycle = found = None
+        if row.result is not None:
+            path, cycle, found = row.result.path, row.result.cycle, row.result.verification
+        cells = (
+            "" if row.folder is None else row.folder.name,
+            *(str(row.variant.get(key, "")) for key in swept),
+            row.status,
+            "" if path is None else f"{path.joint_range_sum_rad:.4f}",
+            "" if path is None or path.gap is None else f"{100.0 * path.gap:.3f}",
+            "" if cycle is None else f"{cycle.total_s:.1f}",
+            "" if found is None else f"{found.min_clearance_mm:.1f}",
+        )
+        table.add_row(*(Text(cell) for cell in cells))
+    return table
 
 
 def _console() -> Console:

@@ -1,15 +1,17 @@
-"""Commands that keep running: the service."""
+"""Commands that keep running, a service and a folder that is watched; a plug-in that asks it."""
 
 from __future__ import annotations
 
-import logging
 import os
 from pathlib import Path
 
 import click
 
 import opl
+from opl.cli.batches import limits, settings_of
 from opl.cli.inputs import FILE
+from opl.cli.logs import log_to
+from opl.cli.stopping import Stopped, stopped_by_raising
 
 TOKEN = "OPL_TOKEN"
 
@@ -62,10 +64,50 @@ def serve(
     opl.serve(settings, lambda address: click.echo(f"opl serves {address}, {address}/docs"))
 
 
-def log_to(path: Path | None) -> None:
-    """Write what happens to jobs to the end of a file, a line of JSON each; None for nowhere."""
-    if path is not None:
-        opl.check_folder(path.parent)
-        handler = logging.FileHandler(path, encoding="utf-8")
-        handler.setFormatter(logging.Formatter("%(message)s"))
-        logging.getLogger("opl.jobs").addHandler(handler)
+@click.command()
+@click.argument("inbox", type=FILE)
+@click.argument("outbox", type=FILE)
+@limits
+def watch(
+    inbox: Path,
+    outbox: Path,
+    workers: int | None,
+    time_limit: float | None,
+    memory_limit: int | None,
+    log: Path | None,
+) -> None:
+    """Run the jobs of a folder as they come or change, until it is stopped.
+
+    As `opl batch INBOX --out OUTBOX` again and again: what has not changed is left as it is, and
+    what a kill has left half done is done again.
+
+    Example: opl watch inbox programs
+    """
+    opl.check_folder(outbox)
+    log_to(log)
+    watch_inbox = opl.watch_inbox  # loaded before signals raise
+    settings = settings_of(workers, time_limit, memory_limit)
+
+    def done(row: opl.BatchRow) -> None:
+        click.echo(f"{row.status}: {row.job}")
+        if row.message:
+            click.echo("  " + row.message.replace("\n", "\n  "), err=True)
+
+    try:
+        with stopped_by_raising():
+            watch_inbox(inbox, outbox, settings, done)
+    except Stopped:
+        click.echo("stopped", err=True)
+
+
+@click.command()
+@click.argument("folder", type=FILE, metavar="MOD")
+def plugin(folder: Path) -> None:
+    """Copy the workbench for FreeCAD into the folder of its add-ons.
+
+    That is the folder Mod of FreeCAD's user data: on Linux ~/.local/share/FreeCAD/Mod; its
+    Python console tells it: App.getUserAppDataDir(). docs/plugin.md says how to work with it.
+
+    Example: opl plugin ~/.local/share/FreeCAD/Mod
+    """
+    click.echo(f"wrote {opl.install_plugin(folder)}; start FreeCAD anew, and opl serve")

@@ -13,12 +13,10 @@ from opl.files.claiming import Claim, claimed
 from opl.files.reading import MB, read_text
 from opl.run.page import run_page
 from opl.run.reporting import make_report
-from opl.run.result import to_json
+from opl.run.result import PAGE, RESULT, to_json
 from opl.run.values import Refused, Written
 
-RESULT = "result.json"
 MOST_RESULT = 20 * MB
-PAGE = "report.html"
 
 
 @contextmanager

@@ -13,13 +13,14 @@ from opl.files.digests import STAMP, stamped
 from opl.geometry.frames import transform
 from opl.geometry.mesh import box_corners
 from opl.job.load import Job
-from opl.planning.survey import NodeState
+from opl.planning.plan import Plan
+from opl.planning.survey import NodeState, NodeSurvey
 from opl.program.export import StraightLimit, export_program
 from opl.program.moves import Program
 from opl.proof.digest import inputs_mark
 from opl.report.pictures import contact_chart, joint_chart
 from opl.report.trace import motion_trace
-from opl.run.values import Planned, Proven
+from opl.run.values import Prepared, Proven
 
 
 def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
@@ -49,19 +50,19 @@ def _home_moved(job: Job) -> list[str]:
     ]
 
 
-def draw_charts(planned: Planned) -> Mapping[str, str]:
+def draw_charts(prepared: Prepared, plan: Plan, survey: NodeSurvey) -> Mapping[str, str]:
     """Return the contact chart and the joint angles, by file name."""
-    surfaced, prepared, path = planned.surfaced, planned.prepared, planned.plan.path
+    surfaced, path = prepared.surfaced, plan.path
     job, pass_index = surfaced.job, surfaced.points.pass_index
     contact = contact_chart(
         title=f"{job.name}: where the part touches the wheel",
         contact_positions=prepared.problem.field.contact_positions,
-        states=planned.survey.states,
+        states=survey.states,
         state_names=[state.value for state in NodeState],
         pass_index=pass_index,
         flat_end=job.cell.wheel.flat_end,
         path=path,
-        held_at=[one.place for one in planned.plan.holders],
+        held_at=[one.place for one in plan.holders],
     )
     joints = joint_chart(
         title=f"{job.name}: joint angles along the path",

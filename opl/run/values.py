@@ -12,8 +12,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
+from opl.cell.nearest import Nearest
 from opl.errors import NoPathError, OplError, UnsafeError
+from opl.files.beside import Beside
 from opl.findings import Finding
+from opl.geometry.frames import Array
 from opl.geometry.inspection import Inspection
 from opl.geometry.passes import LaidPasses
 from opl.geometry.toolpath import CutterPoints
@@ -79,6 +82,23 @@ class Prepared:
 
 
 @dataclass(frozen=True, eq=False)
+class Pictured:
+    """What pictures show of a planned motion, and those that are files of their own.
+
+    Attributes:
+        survey: Every node of the path's IK branch.
+        times: Moments of the motion in [s], ascending, shape (n,).
+        nearest: The nearest pair at each.
+        charts: Pictures as SVG texts by file name.
+    """
+
+    survey: NodeSurvey
+    times: Array
+    nearest: Nearest
+    charts: Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
 class Planned:
     """A path and the motion that it became, not verified yet.
 
@@ -89,6 +109,7 @@ class Planned:
             ``fixed``, ``paper_start``, ``recursive``, ``optimal``; those that exist.
         timing: The motion in the digits of the program, its times, and what sets them.
         slow: Where the ground point is slower than the feed.
+        pictured: What pictures show of it, worked out when it is first asked for, or beside.
     """
 
     prepared: Prepared
@@ -96,14 +117,12 @@ class Planned:
     compared: Mapping[str, Figures]
     timing: Timing
     slow: tuple[SlowStretch, ...]
+    pictured: Beside[Pictured]
 
-    @cached_property
+    @property
     def survey(self) -> NodeSurvey:
         """Every node of the path's IK branch, for pictures."""
-        path = self.plan.path
-        return survey_nodes(
-            self.prepared.problem, path.ik_branch, path.q[path.cutter_point % 1.0 == 0.0]
-        )
+        return self.pictured.value().survey
 
     @property
     def surfaced(self) -> Surfaced:

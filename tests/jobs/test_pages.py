@@ -16,7 +16,9 @@ from tests.support.jobs import opl as run_opl
 @pytest.fixture(scope="module")
 def good(tmp_path_factory):
     home = tmp_path_factory.mktemp("good")
-    run = opl.run_job(opl.load_job(write_job(home)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+        run = opl.run_job(opl.load_job(write_job(home)))
     deliver(run, home / "out" / "V_SHAPE")
     return run, home
 
@@ -44,6 +46,14 @@ def test_a_page_asks_for_nothing_and_its_policy_forbids_it(good):
     body = page[: page.rindex("<script>")]  # the bundle of three.js names addresses in comments
     assert not re.search(r"""(?:src|href)=["'](?!data:)""", body)
     assert "@import" not in page and "url(" not in page[: page.index("</style>")]
+
+
+def test_pictures_drawn_beside_the_verification_are_the_same_to_the_byte(good, monkeypatch):
+    run, home = good
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    other = opl.run_job(opl.load_job(home / "job.yaml"), workers=2)
+    assert other.files == run.files and list(other.files) == list(run.files)
+    assert opl.run_page(other, opl.make_report(other)) == page_of(good)
 
 
 def test_the_page_says_what_the_result_says(good):

@@ -19,7 +19,7 @@ QUICK = {"search.method": "recursive"}
 @pytest.fixture(scope="module", autouse=True)
 def _no_pictures():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
+        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
         yield
 
 
@@ -44,7 +44,7 @@ def test_every_stage_reports_from_its_begin_to_its_end(watched):
     stages = [(stage, [f for _, f in part]) for stage, part in groupby(seen, lambda one: one[0])]
     assert [stage.value for stage, _ in stages] == [
         "cutter_points", "nodes", "clearance", "comparison", "search", "comparison", "motion",
-        "verification", "export", "read_back",
+        "verification", "export", "read_back", "export",
     ]  # fmt: skip
     for _, fractions in stages:
         assert fractions[0] == 0.0 and fractions[-1] == 1.0 and fractions == sorted(fractions)

@@ -22,7 +22,7 @@ SHIFT = Rotation.from_rotvec([0.2, -0.3, 0.25], degrees=True)
 @pytest.fixture(scope="module", autouse=True)
 def _no_pictures():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
+        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
         yield
 
 

@@ -45,7 +45,7 @@ HOMES = []
 def _no_pictures():
     """Leave the pictures out: they take longer than the proof."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
+        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
         yield
 
 
