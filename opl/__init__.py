@@ -48,6 +48,7 @@ Many jobs
 Results
     `make_report`       `Run` -> `Report`: the content of ``result.json``
     `deliver`           `Run` -> program, table, pictures, page and ``result.json`` in a folder
+    `with_png`          `Run` -> the same, its charts as PNG too
     `run_page`          `Run` -> its page: HTML that opens from disk; `find_page` finds one
     `claim_folder`      keeps a folder for the run of one job, from before its work
     `release_folders`   of this process, where a signal ends it
@@ -140,6 +141,7 @@ if TYPE_CHECKING:
     from opl.run.descriptions import describe_cell as describe_cell
     from opl.run.descriptions import describe_job as describe_job
     from opl.run.descriptions import face_figures as face_figures
+    from opl.run.exporting import with_png as with_png
     from opl.run.listings import compare_programs as compare_programs
     from opl.run.listings import describe_program as describe_program
     from opl.run.other_pages import cell_page as cell_page
@@ -205,6 +207,7 @@ _HOMES = {
     "opl.report.arm_view": "arm_view",
     "opl.run.batch": "BatchRow find_jobs",
     "opl.run.delivery": "claim_folder deliver",
+    "opl.run.exporting": "with_png",
     "opl.run.descriptions": "cell_figures describe_cell describe_job face_figures",
     "opl.run.other_pages": "cell_page",
     "opl.run.page": "run_page",

@@ -60,7 +60,7 @@ HOMES = {
     "uvicorn": {"service"},
     "distributed": {"work/cluster"},
     "sqlite3": {"store"},
-    "numba": {"cell/wheel_distance", "search"},
+    "numba": {"cell/wheel_distance", "cell/separating", "search"},
 }
 
 # rooms that run inside of other programs, with Python's own library and what the host has

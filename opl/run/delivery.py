@@ -62,11 +62,15 @@ def deliver(run: Written | Refused, folder: Path | Claim) -> list[Path]:
     if isinstance(folder, Path):
         with claim_folder(folder, run.surfaced.job.name) as claim:
             return deliver(run, claim)
-    files = run.files if isinstance(run, Written) else {}
+    files = run.contents if isinstance(run, Written) else {}
     leaving = _files_of(_earlier_result(folder.folder)) - files.keys()
     report = make_report(run)
     # the result last: it describes the others
-    whole = {**files, PAGE: run_page(run, report), RESULT: to_json(report) + "\n"}
+    whole: dict[str, str | bytes] = {
+        **files,
+        PAGE: run_page(run, report),
+        RESULT: to_json(report) + "\n",
+    }
     return folder.switch(whole, leaving)
 
 

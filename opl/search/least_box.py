@@ -22,6 +22,7 @@ from opl.search.walls import Image, Piece, Wall
 
 SETTLED = 0.1  # of the gap wanted: what the bend of the spans may lose where none is split further
 MOST_TRIMS = 3  # of spans, before one is split
+NUMBERS_OF_A_CELL = 200  # worked on to cut off what no box can hold
 MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
 SMALLEST = 1e-6  # along a wall: a cell that is not cut further
 TRIMMED = 0.9  # of the cells: more left, and trimming goes on no longer
@@ -159,6 +160,9 @@ class BoxProof:
                 return None
         self._kept, self._branch = node, self._where_to_split(node)
         settled = self._branch is None
+        if node.n_walls < len(self.walls):
+            self.put_back() if settled else self.split()
+            return None
         self._unseen += 1
         if not settled and self._unseen < self._show_after:
             self.split()
@@ -208,6 +212,8 @@ class BoxProof:
     def _bound(self, node: Subproblem) -> bool:
         """Bound a subproblem; return whether it is still of interest."""
         cells, closing, n_walls = self._cells, self.closing, len(self.walls)
+        if len(node.spans) != 1 and node.n_walls <= 1:
+            n_walls = 1  # one span of the first wall tells which images of the others matter
         new = [
             cells.spans_of(wall, node.low, node.high, closing)
             for wall in range(node.n_walls, n_walls)
@@ -217,7 +223,8 @@ class BoxProof:
         sizes, place, lost = (np.empty(n_walls) for _ in range(3))
         box, prices = np.empty((2, 6)), np.empty((n_walls, 12))
         for _ in range(MOST_TRIMS):
-            passes = cells.pass_index, cells.n_keys
+            self.work += NUMBERS_OF_A_CELL * float((spans[:, END] - spans[:, FIRST]).sum())
+            passes = cells.pass_index[:n_walls], cells.n_keys
             spans = spans[: tighten(table, spans, *passes, low, high, closing, sizes)]
             if not len(spans):
                 return False
