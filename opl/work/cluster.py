@@ -60,7 +60,7 @@ class Cluster:
 
     def __init__(self, address: str) -> None:
         try:
-            import distributed
+            distributed: Any = import_module("distributed")
         except ImportError as error:
             raise InputError(
                 "--scheduler", "needs the extra: pip install 'opl[cluster]'"
@@ -130,9 +130,8 @@ class ClusterDoer:
             except Exception as error:  # what Python could not do there, e.g. import opl
                 message = f"{task.job}: {type(error).__name__} on the cluster: {error}"
                 return Outcome("error", BUG, message, final=False)
-        return _delivered(
-            task, replace(outcome, message=_here(outcome.message, parcel, task)), files
-        )
+        message = outcome.message.replace(parcel.task.job, task.job)
+        return _delivered(task, replace(outcome, message=message), files)
 
 
 def packed(task: Task, limits: Limits) -> Parcel:
