@@ -48,6 +48,7 @@ Many jobs
 Results
     `make_report`       `Run` -> `Report`: the content of ``result.json``
     `deliver`           `Run` -> program, table, pictures, page and ``result.json`` in a folder
+    `with_png`          `Run` -> the same, its charts as PNG too
     `run_page`          `Run` -> its page: HTML that opens from disk; `find_page` finds one
     `claim_folder`      keeps a folder for the run of one job, from before its work
     `release_folders`   of this process, where a signal ends it
@@ -84,6 +85,7 @@ For command lines and editors, which show what is in files
 Jobs over HTTP
     `serve`             answers requests until it is stopped, as its `ServiceSettings` say;
                         `opl.client` talks to it, and needs nothing of opl
+    `install_plugin`    copies the workbench for FreeCAD, which talks to it too
 """
 
 from __future__ import annotations
@@ -109,6 +111,7 @@ if TYPE_CHECKING:
     from opl.files.claiming import release_folders as release_folders
     from opl.files.claiming import write_files as write_files
     from opl.files.reading import read_text as read_text
+    from opl.files.resources import install_plugin as install_plugin
     from opl.files.resources import start_job as start_job
     from opl.files.writing import check_folder as check_folder
     from opl.files.writing import write_file as write_file
@@ -137,6 +140,7 @@ if TYPE_CHECKING:
     from opl.run.descriptions import describe_cell as describe_cell
     from opl.run.descriptions import describe_job as describe_job
     from opl.run.descriptions import face_figures as face_figures
+    from opl.run.exporting import with_png as with_png
     from opl.run.job_folder import claim_folder as claim_folder
     from opl.run.listings import compare_programs as compare_programs
     from opl.run.listings import describe_program as describe_program
@@ -188,7 +192,7 @@ _HOMES = {
     "opl.errors": "Cancelled InputError NoFreeMoveError NoPathError OplError UnsafeError",
     "opl.files.claiming": "release_folders write_files",
     "opl.files.reading": "read_text",
-    "opl.files.resources": "start_job",
+    "opl.files.resources": "install_plugin start_job",
     "opl.files.writing": "check_folder write_file",
     "opl.findings": "Finding",
     "opl.geometry.faces": "FaceSummary list_faces preview_face",
@@ -204,6 +208,7 @@ _HOMES = {
     "opl.run.batch": "BatchRow find_jobs",
     "opl.run.delivery": "deliver",
     "opl.run.job_folder": "claim_folder",
+    "opl.run.exporting": "with_png",
     "opl.run.descriptions": "cell_figures describe_cell describe_job face_figures",
     "opl.run.other_pages": "cell_page",
     "opl.run.page": "run_page",

@@ -1,4 +1,4 @@
-"""Commands that keep running: the service, and a folder that is watched."""
+"""Commands that keep running, a service and a folder that is watched; a plug-in that asks it."""
 
 from __future__ import annotations
 
@@ -104,3 +104,16 @@ def watch(
             watch_inbox(inbox, outbox, settings, done)
     except Stopped:
         click.echo("stopped", err=True)
+
+
+@click.command()
+@click.argument("folder", type=FILE, metavar="MOD")
+def plugin(folder: Path) -> None:
+    """Copy the workbench for FreeCAD into the folder of its add-ons.
+
+    That is the folder Mod of FreeCAD's user data: on Linux ~/.local/share/FreeCAD/Mod; its
+    Python console tells it: App.getUserAppDataDir(). docs/plugin.md says how to work with it.
+
+    Example: opl plugin ~/.local/share/FreeCAD/Mod
+    """
+    click.echo(f"wrote {opl.install_plugin(folder)}; start FreeCAD anew, and opl serve")

@@ -34,7 +34,11 @@ def deliver(run: Written | Refused, folder: Path | Claim) -> list[Path]:
     if isinstance(folder, Path):
         with claim_folder(folder, run.surfaced.job.name) as claim:
             return deliver(run, claim)
-    files = run.files if isinstance(run, Written) else {}
+    files = run.contents if isinstance(run, Written) else {}
     report = make_report(run)
-    whole = {**files, PAGE: run_page(run, report), RESULT: to_json(report) + "\n"}
+    whole: dict[str, str | bytes] = {
+        **files,
+        PAGE: run_page(run, report),
+        RESULT: to_json(report) + "\n",
+    }
     return put_files(folder, whole)

@@ -37,7 +37,7 @@ def claim_folder(folder: Path, job_name: str) -> Iterator[Claim]:
         yield claim
 
 
-def put_files(claim: Claim, texts: Mapping[str, str]) -> list[Path]:
+def put_files(claim: Claim, contents: Mapping[str, str | bytes]) -> list[Path]:
     """Put all that a run made into its folder in one step; what an earlier run left goes with it.
 
     Program files of an earlier run leave: a folder never holds a program that its ``result.json``
@@ -46,7 +46,7 @@ def put_files(claim: Claim, texts: Mapping[str, str]) -> list[Path]:
 
     Args:
         claim: The folder.
-        texts: The files by name, ``result.json`` last: it describes the others.
+        contents: Texts or bytes by name, ``result.json`` last: it describes the others.
 
     Returns:
         The files, in this order.
@@ -54,7 +54,7 @@ def put_files(claim: Claim, texts: Mapping[str, str]) -> list[Path]:
     Raises:
         InputError: If the folder cannot be written to.
     """
-    return claim.switch(texts, _files_of(_earlier_result(claim.folder)) - texts.keys())
+    return claim.switch(contents, _files_of(_earlier_result(claim.folder)) - contents.keys())
 
 
 def _earlier_result(folder: Path) -> dict[str, Any]:

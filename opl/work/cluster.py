@@ -207,15 +207,14 @@ def _delivered(task: Task, outcome: Outcome, files: Mapping[str, bytes]) -> Outc
     """Put what came back where it belongs, as a run on this machine would."""
     if outcome.folder is None:
         return outcome
-    texts = {name: content.decode("utf-8") for name, content in files.items()}
     home = Path.cwd() / task.home
     try:
         if task.kind != "run":
-            written = write_files(home / task.out, texts)
+            written = write_files(home / task.out, files)
             return replace(outcome, folder=task.out, files=note_files(written))
         name = Path(outcome.folder).name
         with claim_folder(home / task.out / name, name) as claim:
-            written = put_files(claim, texts)
+            written = put_files(claim, files)
             return replace(outcome, folder=os.path.join(task.out, name), files=note_files(written))
     except InputError as error:
         return Outcome("bad input", error.exit_status, str(error))
