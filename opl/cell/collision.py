@@ -157,7 +157,7 @@ class CollisionScene:
         for first in range(0, len(q), BLOCK):
             block = q[first : first + BLOCK]
             near = self._separation.near(block, self._enough)
-            for k in np.flatnonzero(near.any(axis=1)):
+            for k in np.flatnonzero(near.any(axis=1)) if near.any() else ():
                 found[first + k] = any(True for _ in self._hits(block[k], near[k]))
         return found
 
