@@ -136,26 +136,6 @@ def test_stationary_tool_point_is_the_cutter_point_where_the_contact_stays_in_th
     assert len(re.findall(r"MoveL .*\[[0-9.]+,500,5000,1000\], ", program.text)) > 80
 
 
-def test_speed_that_is_read_in_the_file_is_the_feed_wherever_the_contact_stays():
-    """Of the bar with an arched top, where the contact stays or slides over the wheel by steps."""
-    program = small_program("RAPID", "arch", "straight")
-    timing, moves = program.run.proven.planned.timing, program.run.program.moves
-    slid = np.abs(np.diff(program.motion.contact_position, prepend=np.nan))
-    read = re.findall(r"MoveL .*\[([0-9.]+),500,5000,1000\], ", program.text)
-    speeds = [
-        float(number)
-        for move, number, way in zip(
-            [move for move in moves if move.straight],
-            read,
-            [way for move, way in zip(moves, slid, strict=True) if move.straight],
-            strict=True,
-        )
-        if way < 0.05 and timing.cause[move.motion_index] is Cause.NONE
-    ]
-    assert len(speeds) > 10
-    np.testing.assert_allclose(speeds, 1e3 * program.job.process.feed, rtol=AS_WANTED)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
