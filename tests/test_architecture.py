@@ -53,7 +53,7 @@ HOMES = {
     "contourpy": {"geometry/section_curves"},
     "OCP": {"geometry/cad"},
     "xacro": {"cell/xacro_file"},
-    "toppra": {"motion/time_law"},
+    "toppra": {"motion/engine"},
     "ompl": {"motion/sampling"},
     "fastapi": {"service"},
     "starlette": {"service"},

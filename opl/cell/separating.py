@@ -13,7 +13,7 @@ DIRECTIONS = 18  # that are tried for a pair
 SHORTEST = 1e-4  # of a vector that gives a direction
 
 
-@njit("float64(float64[:,::1],float64[::1],float64,float64,float64)", cache=True)
+@njit(cache=True)
 def _reach(T, size, x, y, z):  # type: ignore[no-untyped-def]
     """How far a body reaches from its middle along a unit vector."""
     c = abs(x * T[0, 2] + y * T[1, 2] + z * T[2, 2])
@@ -24,7 +24,7 @@ def _reach(T, size, x, y, z):  # type: ignore[no-untyped-def]
     return a * size[0] + b * size[1] + c * size[2]
 
 
-@njit("float64(float64[:,::1],float64[::1],float64[:,::1],float64[::1],float64[::1])", cache=True)
+@njit(cache=True)
 def _between(T, size, other, other_size, way):  # type: ignore[no-untyped-def]
     """What is between two bodies along a vector of any length, -inf if that is none."""
     length = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
@@ -35,7 +35,7 @@ def _between(T, size, other, other_size, way):  # type: ignore[no-untyped-def]
     return abs(away) - _reach(T, size, x, y, z) - _reach(other, other_size, x, y, z)
 
 
-@njit("void(float64[:,::1],float64[::1],float64[:,::1],float64[::1])", cache=True)
+@njit(cache=True)
 def _towards(T, size, other, way):  # type: ignore[no-untyped-def]
     """Set a vector from the nearest point of a body to the middle of another one."""
     dx, dy, dz = other[0, 3] - T[0, 3], other[1, 3] - T[1, 3], other[2, 3] - T[2, 3]
@@ -55,9 +55,7 @@ def _towards(T, size, other, way):  # type: ignore[no-untyped-def]
         way[k] = a * T[k, 0] + b * T[k, 1] + c * T[k, 2]
 
 
-@njit(
-    "void(float64[:,::1],float64[::1],float64[:,::1],float64[::1],int64,float64[::1])", cache=True
-)
+@njit(cache=True)
 def _direction(T, size, other, other_size, number, way):  # type: ignore[no-untyped-def]
     """Set one of the `DIRECTIONS` likely ones, as a vector of any length; 0 where it is none."""
     way[:] = 0.0
@@ -89,7 +87,7 @@ def _direction(T, size, other, other_size, number, way):  # type: ignore[no-unty
             way[2] = T[0, i] * other[1, j] - T[1, i] * other[0, j]
 
 
-@njit("void(float64[:,::1],float64[:,::1],float64[:,::1])", cache=True)
+@njit(cache=True)
 def _product(A, B, C):  # type: ignore[no-untyped-def]
     """Set C to A B, poses all."""
     for i in range(3):
@@ -98,7 +96,7 @@ def _product(A, B, C):  # type: ignore[no-untyped-def]
         C[i, 3] += A[i, 3]
 
 
-@njit("void(float64[::1],float64,float64[:,::1])", cache=True)
+@njit(cache=True)
 def _turn_about(axis, angle, T):  # type: ignore[no-untyped-def]
     """Set the rotation of a pose to the turn about a unit axis."""
     s, c = np.sin(angle), np.cos(angle)
@@ -144,6 +142,10 @@ def separate(  # type: ignore[no-untyped-def]
     at: np.ndarray = np.full(n_bodies, -1)  # number of the configuration a body was placed at
     # how far each body can have moved by the joints up to one
     moved = np.zeros((n_bodies, n_joints + 1))
+    radii = np.empty(n_bodies)
+    for b in range(n_bodies):
+        last_edge = max(sizes[b, 2], 0.0)
+        radii[b] = np.sqrt(sizes[b, 0] ** 2 + sizes[b, 1] ** 2 + last_edge**2)
     for n in range(len(q)):
         for b in range(n_bodies):
             for k in range(joint[b]):
@@ -166,10 +168,17 @@ def separate(  # type: ignore[no-untyped-def]
                 if at[body] < n and (at[body] < 0 or joint[body] > 0):
                     _product(placed[joint[body]], joint_body[body], bodies[body])
                     at[body] = n
+            x = bodies[b, 0, 3] - bodies[a, 0, 3]
+            y = bodies[b, 1, 3] - bodies[a, 1, 3]
+            z = bodies[b, 2, 3] - bodies[a, 2, 3]
+            apart[p] = np.sqrt(x * x + y * y + z * z) - radii[a] - radii[b]
+            if apart[p] > enough[p]:
+                near[n, p] = False
+                continue
             T, size, other, other_size = bodies[a], sizes[a], bodies[b], sizes[b]
             # what was the best direction the last time mostly still is
             _direction(T, size, other, other_size, best[p], way)
-            apart[p] = _between(T, size, other, other_size, way)
+            apart[p] = max(apart[p], _between(T, size, other, other_size, way))
             if apart[p] <= enough[p]:
                 for number in range(DIRECTIONS):
                     _direction(T, size, other, other_size, number, way)

@@ -101,7 +101,7 @@ class Separation:
         near: np.ndarray = np.empty((len(q), len(self._pairs)), dtype=bool)
         bodies = self._bodies
         separate(
-            np.ascontiguousarray(q, dtype=float),
+            np.array(q, dtype=float, order="C"),  # compiled for arrays that can be written to
             bodies.Ts_before_joint,
             bodies.axes,
             bodies.joint,

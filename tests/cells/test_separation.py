@@ -86,6 +86,14 @@ def test_collisions_are_those_of_every_pair_asked_one_by_one(robot):
             assert set(one.colliding_pairs(configuration)) == names
 
 
+def test_configurations_may_be_read_only():
+    scene = CollisionScene(v_job().cell)
+    q = np.tile(v_job().process.home, (3, 1))
+    q.setflags(write=False)
+    assert not scene.collides(q).any()
+    assert scene.colliding_pairs(q[0]) == []
+
+
 def test_the_nearest_pair_is_the_least_of_all_pairs_that_keep_a_distance():
     cell = crowded("mh24", seed=8)
     scene = CollisionScene(cell)
