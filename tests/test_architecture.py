@@ -53,7 +53,7 @@ HOMES = {
     "xacro": {"cell/xacro_file"},
     "toppra": {"motion/time_law"},
     "ompl": {"motion/sampling"},
-    "numba": {"cell/wheel_distance", "search"},
+    "numba": {"cell/wheel_distance", "search", "motion/fewest", "motion/line_error"},
 }
 
 LONGEST = 300  # lines

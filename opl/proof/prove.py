@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
@@ -82,17 +80,15 @@ def prove(
         job.process.approach_length,
         job.process.approach_turn,
         job.process.approach_run,
+        job.process.feed,
     )
     found = recognise(job.cell, points, playback.q, playback.duration, playback.stations, rule)
     replayed = replay(job.cell, points, found.timed, search.max_contact_error, progress)
-    # the written configurations; of one that grinds several cutter points, the first of its rows:
-    # the time to the others goes to the move that follows
-    rows = np.searchsorted(found.source, playback.stations, side="left")
     findings = (
         *reading.findings,
         *replayed.findings,
         *found.findings,
-        *written_findings(job, points, found.timed.take(rows), playback, reader),
+        *written_findings(job, points, found.timed.motion, playback, reader),
         *name_findings(job, reading.name),
     )
     moves = len(playback.moves)

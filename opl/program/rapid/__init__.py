@@ -20,4 +20,6 @@ POST = Post(
     reader=listing_reader(
         DIALECT.suffix, parse, tool_name, rounded_degrees(DECIMALS), lambda robot: START, CORNERS
     ),
+    # externally guided motion of IRC5 takes positions every 4 ms (its manual); assumed for moves
+    period=0.004,
 )
