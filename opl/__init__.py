@@ -36,12 +36,19 @@ Runs
     `verify_motion`     `Planned` -> `Proven`
     `write_program`     `Proven` -> `Written`: the program as texts, read back and proven
     `Watch`             reports each `Stage` of a run while it goes on, and cancels it
-    `run_batch`         many jobs in processes, each a `BatchRow`; `find_jobs` finds them
-    `batch_page`        `BatchRow`s -> a page of all, with links to theirs
+
+Many jobs
+    `run_batch`         job files -> a `BatchRow` each, run in processes as `BatchSettings` say;
+                        what has not changed is left as it is; `find_jobs` finds them
+    `write_batch_page`  `BatchRow`s -> a page of all, with links to theirs; `junit` -> JUnit XML
+    `batch_standing`    what a batch would do: a `JobStanding` each; `audit` reads all files again
+    `watch_inbox`       runs what comes into a folder, until it is stopped
+    `open_store`        folder -> the `Store` of its `StoredJob`s
 
 Results
     `make_report`       `Run` -> `Report`: the content of ``result.json``
     `deliver`           `Run` -> program, table, pictures, page and ``result.json`` in a folder
+    `with_png`          `Run` -> the same, its charts as PNG too
     `run_page`          `Run` -> its page: HTML that opens from disk; `find_page` finds one
     `claim_folder`      keeps a folder for the run of one job, from before its work
     `release_folders`   of this process, where a signal ends it
@@ -68,11 +75,17 @@ Errors
 
 For command lines and editors, which show what is in files
     `describe_job`, `describe_cell`, `cell_figures`      jobs and cells in words and figures
-    `list_faces`, `preview_face`, `FaceSummary`          the faces of a part file
+    `list_faces`, `preview_face`, `FaceSummary`          the faces of a part file; `face_figures`
     `robot_path`, `read_robot_file`, `arm_view`          a robot: its data with sources; a picture
     `known_posts`, `find_post`                           controllers, and what their templates get
     `json_schema`, `keys_page`, `keys`                   keys of job and cell files
     `check_folder`, `write_files`, `write_file`          files written whole or not at all
+    `read_text`                                          a file read up to a size
+
+Jobs over HTTP
+    `serve`             answers requests until it is stopped, as its `ServiceSettings` say;
+                        `opl.client` talks to it, and needs nothing of opl
+    `install_plugin`    copies the workbench for FreeCAD, which talks to it too
 """
 
 from __future__ import annotations
@@ -97,6 +110,8 @@ if TYPE_CHECKING:
     from opl.errors import UnsafeError as UnsafeError
     from opl.files.claiming import release_folders as release_folders
     from opl.files.claiming import write_files as write_files
+    from opl.files.reading import read_text as read_text
+    from opl.files.resources import install_plugin as install_plugin
     from opl.files.resources import start_job as start_job
     from opl.files.writing import check_folder as check_folder
     from opl.files.writing import write_file as write_file
@@ -120,15 +135,15 @@ if TYPE_CHECKING:
     from opl.report.arm_view import arm_view as arm_view
     from opl.run.batch import BatchRow as BatchRow
     from opl.run.batch import find_jobs as find_jobs
-    from opl.run.batch import run_batch as run_batch
     from opl.run.delivery import claim_folder as claim_folder
     from opl.run.delivery import deliver as deliver
     from opl.run.descriptions import cell_figures as cell_figures
     from opl.run.descriptions import describe_cell as describe_cell
     from opl.run.descriptions import describe_job as describe_job
+    from opl.run.descriptions import face_figures as face_figures
+    from opl.run.exporting import with_png as with_png
     from opl.run.listings import compare_programs as compare_programs
     from opl.run.listings import describe_program as describe_program
-    from opl.run.other_pages import batch_page as batch_page
     from opl.run.other_pages import cell_page as cell_page
     from opl.run.page import run_page as run_page
     from opl.run.points import points_files as points_files
@@ -153,6 +168,19 @@ if TYPE_CHECKING:
     from opl.run.viewing import find_page as find_page
     from opl.run.watch import Stage as Stage
     from opl.run.watch import Watch as Watch
+    from opl.service.serving import ServiceSettings as ServiceSettings
+    from opl.service.serving import serve as serve
+    from opl.store.jobs import Store as Store
+    from opl.store.values import StoredJob as StoredJob
+    from opl.work.batch import BatchSettings as BatchSettings
+    from opl.work.batch import run_batch as run_batch
+    from opl.work.batch import write_batch_page as write_batch_page
+    from opl.work.inbox import watch_inbox as watch_inbox
+    from opl.work.junit import junit as junit
+    from opl.work.state import JobStanding as JobStanding
+    from opl.work.state import audit as audit
+    from opl.work.state import batch_standing as batch_standing
+    from opl.work.state import open_store as open_store
 
 __version__ = VERSION
 
@@ -163,7 +191,8 @@ _HOMES = {
     "opl.cell.urdf_import": "import_urdf",
     "opl.errors": "Cancelled InputError NoFreeMoveError NoPathError OplError UnsafeError",
     "opl.files.claiming": "release_folders write_files",
-    "opl.files.resources": "start_job",
+    "opl.files.reading": "read_text",
+    "opl.files.resources": "install_plugin start_job",
     "opl.files.writing": "check_folder write_file",
     "opl.findings": "Finding",
     "opl.geometry.faces": "FaceSummary list_faces preview_face",
@@ -176,10 +205,11 @@ _HOMES = {
     "opl.program.posts": "find_post known_posts",
     "opl.program.ratios": "import_pulse_ratios with_ratios",
     "opl.report.arm_view": "arm_view",
-    "opl.run.batch": "BatchRow find_jobs run_batch",
+    "opl.run.batch": "BatchRow find_jobs",
     "opl.run.delivery": "claim_folder deliver",
-    "opl.run.descriptions": "cell_figures describe_cell describe_job",
-    "opl.run.other_pages": "batch_page cell_page",
+    "opl.run.exporting": "with_png",
+    "opl.run.descriptions": "cell_figures describe_cell describe_job face_figures",
+    "opl.run.other_pages": "cell_page",
     "opl.run.page": "run_page",
     "opl.run.points": "points_files report_points",
     "opl.run.listings": "compare_programs describe_program",
@@ -191,6 +221,13 @@ _HOMES = {
     "opl.run.values": "Planned Prepared Proven Refused Run Surfaced Written",
     "opl.run.viewing": "find_page",
     "opl.run.watch": "Stage Watch",
+    "opl.service.serving": "ServiceSettings serve",
+    "opl.store.jobs": "Store",
+    "opl.store.values": "StoredJob",
+    "opl.work.batch": "BatchSettings run_batch write_batch_page",
+    "opl.work.inbox": "watch_inbox",
+    "opl.work.junit": "junit",
+    "opl.work.state": "JobStanding audit batch_standing open_store",
 }
 __all__ = sorted(name for names in _HOMES.values() for name in names.split())
 

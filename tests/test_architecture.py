@@ -19,14 +19,16 @@ PACKAGE = Path(opl.__file__).parent
 # floor do not know each other. A room is a folder, or a module that lies in the package itself.
 FLOORS = [
     {"errors", "findings", "version"},
-    {"files"},
-    {"geometry"},
+    {"files", "client", "plugins"},
+    {"geometry", "store"},
     {"cell", "search"},
     {"motion"},
     {"planning", "verification", "program", "report"},
     {"job"},
     {"proof"},
     {"run"},
+    {"work"},
+    {"service"},
     {"__init__"},
     {"cli"},
 ]
@@ -53,8 +55,17 @@ HOMES = {
     "xacro": {"cell/xacro_file"},
     "toppra": {"motion/time_law"},
     "ompl": {"motion/sampling"},
+    "fastapi": {"service"},
+    "starlette": {"service"},
+    "uvicorn": {"service"},
+    "distributed": {"work/cluster"},
+    "sqlite3": {"store"},
     "numba": {"cell/wheel_distance", "search", "motion/fewest", "motion/line_error"},
 }
+
+# rooms that run inside of other programs, with Python's own library and what the host has
+GUESTS = {"plugins"}
+HOSTS = {"FreeCAD", "FreeCADGui", "Part", "PySide2", "pivy"}
 
 LONGEST = 300  # lines
 
@@ -215,9 +226,24 @@ def test_every_room_is_there():
     assert {"geometry", "cell", "search", "planning", "verification", "program", "job"} <= rooms
 
 
+def test_guests_in_other_programs_use_nothing_of_opl():
+    guests = {name for name in modules_of(PACKAGE) if room_of(name) in GUESTS}
+    folder = PACKAGE / "plugins" / "freecad"
+    own_names = {path.stem for path in folder.iterdir()}
+    for name in guests:
+        own, others = imports_of(PACKAGE, name, modules_of(PACKAGE)[name])
+        assert own <= guests, name
+        assert others <= {*sys.stdlib_module_names, *HOSTS, *own_names}, name
+    # what talks to the service is the client of opl itself, copied: the folder is whole
+    copied = folder / "opl_workbench" / "client.py"
+    assert copied.read_bytes() == (PACKAGE / "client.py").read_bytes()
+
+
 def test_every_name_that_a_module_offers_exists():
     offering = 0
     for name in modules_of(PACKAGE):
+        if room_of(name) in GUESTS:
+            continue
         offered = importable(name).__dict__.get("__all__", ())
         offering += bool(offered)
         missing = [one for one in offered if not hasattr(importable(name), one)]

@@ -180,15 +180,15 @@ class CollisionScene:
             self._model, self._data, self._geometry, self._geometry_data, q
         )
 
-    def distance(self, index: int) -> tuple[float, Array]:
-        """Return how far a pair is apart as placed in [m], and where it is nearest, shape (2, 3).
+    def distance(self, index: int) -> float:
+        """Return how far a pair is apart as placed in [m], 0 or less in collision."""
+        return float(pin.computeDistance(self._geometry, self._geometry_data, index).min_distance)
 
-        The places are in the base frame; the distance is 0 or less in collision.
-        """
-        pin.computeDistance(self._geometry, self._geometry_data, index)
+    def nearest_points(self, index: int) -> Array:
+        """Return where a pair was nearest when last measured, base frame, [m], shape (2, 3)."""
         found = self._geometry_data.distanceResults[index]
         places = np.array([found.getNearestPoint1(), found.getNearestPoint2()])
-        return float(found.min_distance), transform(self._T_base_world, places)
+        return transform(self._T_base_world, places)
 
     def _compute(self, q: Array, stop_at_first: bool) -> bool:
         return bool(pin.computeCollisions(self._model, self._data, self._manager, q, stop_at_first))

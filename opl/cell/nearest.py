@@ -54,7 +54,9 @@ def nearest_pairs(scene: CollisionScene, q: Array) -> Nearest:
         for index in least.argsort(kind="stable"):
             if least[index] >= distance[k]:
                 break
-            least[index], ends = scene.distance(int(kept[index]))
+            least[index] = scene.distance(int(kept[index]))
             if least[index] < distance[k]:
-                distance[k], chosen[k], points[k] = least[index], index, ends
+                distance[k], chosen[k] = least[index], index
+        if np.isfinite(distance[k]):
+            points[k] = scene.nearest_points(int(kept[chosen[k]]))
     return Nearest(distance, chosen, points, tuple(scene.pair(int(index)) for index in kept))

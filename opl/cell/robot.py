@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from opl.cell.full_turns import angular_distance
 from opl.cell.inverse_kinematics import Arm, inverse_kinematics
@@ -25,8 +24,9 @@ from opl.cell.robot_file import N_JOINTS, RobotFile, read_robot_file
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.cell.urdf_tree import UrdfTree
 from opl.errors import InputError
+from opl.files.confining import require_inside
 from opl.files.resources import folder
-from opl.geometry.frames import Array, pose, read_only
+from opl.geometry.frames import Array, from_roll_pitch_yaw, read_only
 
 # In which a joint is taken to reach its top speed where nobody knows its acceleration, in [s].
 # Integrators guess 0.1 s for arms of this kind; slower is the safe side.
@@ -100,8 +100,8 @@ class Robot:
     @property
     def T_controller_base(self) -> Array:
         """The base frame, as the maker's controller counts, shape (4, 4)."""
-        return pose(
-            Rotation.from_rotvec([0.0, 0.0, -self.controller_base_turn]).as_matrix(),
+        return from_roll_pitch_yaw(
+            np.array([0.0, 0.0, -self.controller_base_turn]),
             np.array([0.0, 0.0, self.base_height - self.controller_base_height]),
         )
 
@@ -139,6 +139,7 @@ def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
     """
     path = robot_path(name_or_folder, relative_to)
     robot = _robot(read_robot_file(path), path.parent)
+    require_inside(robot.urdf)
     if not robot.urdf.is_file():
         raise InputError(str(path), f"urdf: no such file, got {robot.urdf.name!r}")
     UrdfTree(robot.urdf).require_shapes_on_joints()

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opl.errors import InputError
 from opl.files.reading import MB, read_bytes
-from opl.geometry.frames import Array, pose
+from opl.geometry.frames import Array, from_roll_pitch_yaw, roll_pitch_yaw
 from opl.geometry.mesh import load_shell
 
 BASE = "base"
@@ -130,8 +129,7 @@ class UrdfTree:
                     origin = ET.Element("origin")
                     shape.insert(0, origin)
                 origin.set("xyz", _text(T_carrier_shape[:3, 3]))
-                turn = Rotation.from_matrix(T_carrier_shape[:3, :3])
-                origin.set("rpy", _text(turn.as_euler("xyz")))
+                origin.set("rpy", _text(roll_pitch_yaw(T_carrier_shape)))
                 parent.append(shape)
 
     def require_shapes_on_joints(self) -> None:
@@ -268,7 +266,7 @@ def _pose(origin: ET.Element | None) -> Array:
     if origin is None:
         return np.eye(4)
     xyz, rpy = (np.array(origin.get(key, _NOWHERE).split(), dtype=float) for key in ("xyz", "rpy"))
-    return pose(Rotation.from_euler("xyz", rpy).as_matrix(), xyz)
+    return from_roll_pitch_yaw(rpy, xyz)
 
 
 def _text(numbers: Array) -> str:

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
 import opl
+from opl.cli.batches import batch, jobs
 from opl.cli.inputs import FILE, cell, faces, points
 from opl.cli.pages import show_page, view
 from opl.cli.programs import show, templates, verify
 from opl.cli.progress import progress_bar
 from opl.cli.robots import robots
-from opl.cli.run_text import show_batch, show_run
-from opl.cli.stopping import STATUS, Stopped, stopped_at_once, stopped_by_raising
+from opl.cli.run_text import show_run
+from opl.cli.services import plugin, serve, watch
+from opl.cli.stopping import stopped_at_once
 
 METHODS = ("recursive", "optimal")
 
@@ -54,6 +55,11 @@ def main() -> None:
     type=click.Choice(METHODS),
     help="Search; default as in the job.",
 )
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    help="Processes that work at a time; default one per core. The files are the same.",
+)
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @click.option(
     "-v",
@@ -62,14 +68,17 @@ def main() -> None:
     help="Print the time of each part of the cycle and of each stage too.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print result.json instead of tables.")
+@click.option("--png", is_flag=True, help="Write the charts as PNG too.")
 @click.option("--open", "opened", is_flag=True, help="Open report.html when the run has ended.")
 def run_job(
     job: Path,
     out: Path | None,
     method: str | None,
+    workers: int | None,
     quiet: bool,
     verbose: bool,
     as_json: bool,
+    png: bool,
     opened: bool,
 ) -> None:
     """Plan, prove and write the program of one job.
@@ -80,8 +89,8 @@ def run_job(
     folder = out or Path("out") / loaded.name
     with opl.claim_folder(folder, loaded.name) as claim:
         with progress_bar(quiet or as_json) as watch:
-            run = opl.run_job(loaded, watch)
-        written = opl.deliver(run, claim)
+            run = opl.run_job(loaded, watch, workers or os.cpu_count() or 1)
+        written = opl.deliver(opl.with_png(run) if png else run, claim)
     report = opl.make_report(run)
     if as_json:
         click.echo(opl.to_json(report))
@@ -118,57 +127,6 @@ def check(job: Path, as_json: bool) -> None:
 
 
 @main.command()
-@click.argument("paths", type=FILE, nargs=-1, required=True)
-@click.option("--out", type=FILE, default=Path("out"), help="Folder for the jobs' folders.")
-@click.option("--workers", type=click.IntRange(min=1), help="Processes; default one per core.")
-@click.option("-q", "--quiet", is_flag=True, help="Print the last table only.")
-@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON.")
-def batch(
-    paths: tuple[Path, ...], out: Path, workers: int | None, quiet: bool, as_json: bool
-) -> None:
-    """Run many jobs in worker processes; a folder means every job file in it.
-
-    Ends with a table, and with a status other than 0 if any job failed. Stopped by Ctrl-C or
-    SIGTERM, the table has the jobs that ended.
-
-    Example: opl batch workpieces --out programs --workers 2
-    """
-    jobs = opl.find_jobs(paths)
-    opl.check_folder(out)
-    count = min(workers or os.cpu_count() or 1, len(jobs))
-
-    ended: list[opl.BatchRow] = []
-
-    def done(row: opl.BatchRow) -> None:
-        ended.append(row)
-        if not (quiet or as_json):
-            click.echo(f"{row.status}: {row.job}", err=True)
-
-    run_batch = opl.run_batch  # loaded before signals raise
-    try:
-        with stopped_by_raising():
-            try:
-                rows = run_batch(jobs, out, count, done)
-            except Stopped:
-                _show_rows(ended, as_json)
-                raise
-    except Stopped:
-        click.echo(f"error: stopped; {len(jobs) - len(ended)} jobs have not ended", err=True)
-        sys.exit(STATUS)
-    out.mkdir(parents=True, exist_ok=True)
-    opl.write_file(out / "report.html", opl.batch_page(rows, out))
-    _show_rows(rows, as_json)
-    sys.exit(max(row.exit_status for row in rows))
-
-
-def _show_rows(rows: Sequence[opl.BatchRow], as_json: bool) -> None:
-    if as_json:
-        click.echo(opl.to_json(rows))
-    else:
-        show_batch(rows)
-
-
-@main.command()
 @click.argument("directory", type=FILE)
 def init(directory: Path) -> None:
     """Start a job: copy the V-shaped example to a new folder, to be changed.
@@ -193,5 +151,19 @@ def schema(of_cells: bool, markdown: bool) -> None:
         click.echo(opl.to_json(opl.json_schema("cell" if of_cells else "job")))
 
 
-for _command in (cell, robots, show, templates, faces, points, verify, view):
+for _command in (
+    cell,
+    robots,
+    show,
+    templates,
+    faces,
+    points,
+    verify,
+    view,
+    batch,
+    jobs,
+    watch,
+    serve,
+    plugin,
+):
     main.add_command(_command)

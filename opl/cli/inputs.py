@@ -77,7 +77,7 @@ def faces(part: Path, unit: str | None, crease: float, as_json: bool) -> None:
         part, "m" if unit == "m" else "mm" if unit else None, math.radians(crease)
     )
     if as_json:
-        click.echo(opl.to_json([_figures(face) for face in found]))
+        click.echo(opl.to_json([opl.face_figures(face) for face in found]))
         return
     for face in found:
         size = " x ".join(f"{edge:g}" for edge in (1e3 * (face.high - face.low)).round(2))
@@ -91,15 +91,3 @@ def faces(part: Path, unit: str | None, crease: float, as_json: bool) -> None:
         )
         click.echo("\n".join(f"    {line}" for line in lines))
     click.echo(f"{len(found)} faces; a job names some as {opl.keys.FACES}, e.g. [1]")
-
-
-def _figures(face: opl.FaceSummary) -> dict[str, object]:
-    return {
-        "id": face.number,
-        "type": face.type,
-        "area_mm2": round(1e6 * face.area, 3),
-        "low_mm": (1e3 * face.low).round(3).tolist(),
-        "high_mm": (1e3 * face.high).round(3).tolist(),
-        "mean_normal": face.normal.round(4).tolist(),
-        "holes": face.holes,
-    }

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import opl
 
+REDRAWN = 0.1  # [s] between two drawings of the bar
 STAGES = {
     "cutter_points": "cutter points",
     "nodes": "node matrix",
@@ -32,14 +34,20 @@ def progress_bar(quiet: bool) -> Iterator[opl.Watch]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (TextColumn("{task.description:30}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    # no thread that draws it: the pictures are drawn in a copy of a process that has none
+    quiet_bar = Progress(*columns, console=Console(stderr=True), transient=True, auto_refresh=False)
+    with quiet_bar as bar:
         task = bar.add_task("", total=len(STAGES))
         order = list(STAGES)
         furthest = 0.0  # a stage may come twice
+        drawn = [0.0]
 
         def show(stage: opl.Stage, fraction: float) -> None:
             nonlocal furthest
             furthest = max(furthest, order.index(stage.value) + fraction)
             bar.update(task, description=STAGES[stage.value], completed=furthest)
+            if time.monotonic() - drawn[0] > REDRAWN or fraction == 0.0:
+                drawn[0] = time.monotonic()
+                bar.refresh()
 
         yield opl.Watch(show)

@@ -92,6 +92,8 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
                 f"read back from {', '.join(found.file.files)}: {found.file.postures} "
                 "configurations, moves and speeds as proven"
             )
+            if job.program.one_job_per_pass:
+                yield "each pass is a job from home to home: it may be left out or repeated"
     if program is not None:
         if not program.read_back:
             yield (
@@ -99,13 +101,18 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
                 "nothing is proven of the file itself"
             )
         worst = max((abs(one.error_percent) for one in program.passes), default=0.0)
-        yield f"program: {program.moves} moves, passes within {worst:.2f} % of their time"
+        single = max((one.largest_move_error_percent for one in program.passes), default=0.0)
+        yield (
+            f"program: {program.moves} moves, passes within {worst:.2f} % of their time, single "
+            f"moves on the wheel within {single:.1f} % of theirs"
+        )
         yield from feed_and_cycle(report, job.cell.robot.title)
         yield from _caution(
             report.robot.unverified_pulse_ratios,
             job.cell.robot.title,
             "compare a configuration at the pendant before playing",
         )
+        yield from _belt(job.program)
 
 
 def _extremes(found: Mapping[str, Any], joint_names: Sequence[str]) -> Iterator[str]:
@@ -171,6 +178,17 @@ def _caution(unverified: Sequence[str], robot: str, what: str) -> Iterator[str]:
         yield f"caution: the pulse ratios of {joints} of {robot} are not verified; {what}"
 
 
+def _belt(settings: Any) -> Iterator[str]:
+    """Say who switches the belt, as far as the job tells."""
+    if settings.belt_switched_by is not None:
+        yield f"the belt is switched by {settings.belt_switched_by}, says the job"
+    elif not settings.actions.switches:
+        yield (
+            "caution: nothing in the program switches the belt; name outputs in program.at_start "
+            "and at_end, or who does it in program.belt_switched_by"
+        )
+
+
 def show_batch(rows: Sequence[opl.BatchRow]) -> None:
     """Print what became of the jobs of a batch."""
     console = _console()
@@ -193,8 +211,37 @@ def show_batch(rows: Sequence[opl.BatchRow]) -> None:
             message = row.message if named else f"{row.job}: {row.message}"
             lines.append(message.replace("\n", "\n  "))
     console.print(table)
-    good = sum(row.exit_status == 0 for row in rows)
-    _print(console, [*lines, f"{good} of {len(rows)} jobs have a program"])
+    if any(row.variant for row in rows):
+        console.print(_sweep(rows))
+    good, same = sum(row.exit_status == 0 for row in rows), sum(row.unchanged for row in rows)
+    unchanged = f"; {same} unchanged, not run again" if same else ""
+    _print(console, [*lines, f"{good} of {len(rows)} jobs have a program{unchanged}"])
+
+
+def _sweep(rows: Sequence[opl.BatchRow]) -> Table:
+    """Return what the values of sweeps make of their jobs."""
+    swept = list(dict.fromkeys(key for row in rows for key in row.variant))
+    figures = ("status", "range sum [rad]", "gap [%]", "cycle [s]", "clearance [mm]")
+    table = Table(title="sweeps", title_justify="left")
+    for heading in ("folder", *swept, *figures):
+        table.add_column(Text(heading), overflow="fold")
+    for row in rows:
+        if not row.variant:
+            continue
+        path = cycle = found = None
+        if row.result is not None:
+            path, cycle, found = row.result.path, row.result.cycle, row.result.verification
+        cells = (
+            "" if row.folder is None else row.folder.name,
+            *(str(row.variant.get(key, "")) for key in swept),
+            row.status,
+            "" if path is None else f"{path.joint_range_sum_rad:.4f}",
+            "" if path is None or path.gap is None else f"{100.0 * path.gap:.3f}",
+            "" if cycle is None else f"{cycle.total_s:.1f}",
+            "" if found is None else f"{found.min_clearance_mm:.1f}",
+        )
+        table.add_row(*(Text(cell) for cell in cells))
+    return table
 
 
 def _console() -> Console:

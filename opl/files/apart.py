@@ -26,9 +26,9 @@ _CHILD = """
 import os, pickle, sys
 answer = os.fdopen(os.dup(1), "wb")
 os.dup2(2, 1)
-sys.path[:] = pickle.load(sys.stdin.buffer)
+sys.path[:], parent = pickle.load(sys.stdin.buffer)
 from opl.files.apart import answer_for
-answer.write(answer_for(sys.stdin.buffer.read()))
+answer.write(answer_for(parent, sys.stdin.buffer.read()))
 answer.close()
 os._exit(0)
 """
@@ -48,7 +48,7 @@ def apart(function: Callable[..., Result], *arguments: object, about: str) -> Re
         InputError: If the function raises one, or the process ends without an answer: it crashed,
             or came to a limit.
     """
-    request = pickle.dumps(sys.path) + pickle.dumps((function, arguments))
+    request = pickle.dumps((sys.path, os.getpid())) + pickle.dumps((function, arguments))
     # threads of numerical libraries would each take memory
     threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     ended = subprocess.run(
@@ -76,16 +76,21 @@ def _end(status: int) -> str:
     return f"what reads it ended with status {status}"
 
 
-def end_with_parent() -> None:
-    """Let the system end this process when the one that started it ends, where it can (Linux)."""
+def end_with_parent(parent: int) -> None:
+    """Let the system end this process when the one that started it ends, where it can (Linux).
+
+    If that process, given its number, ended while this one started, it ends here.
+    """
     call = getattr(ctypes.CDLL(None), "prctl", None)
     if call is not None:
         call(1, signal.SIGKILL, 0, 0, 0)  # PR_SET_PDEATHSIG
+    if os.getppid() != parent:
+        os._exit(1)
 
 
-def answer_for(request: bytes) -> bytes:
-    """Return the answer of the process to a request, within its limits."""
-    end_with_parent()
+def answer_for(parent: int, request: bytes) -> bytes:
+    """Return the answer of the process to a request of another one, within its limits."""
+    end_with_parent(parent)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS + 1))
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))

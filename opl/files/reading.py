@@ -7,6 +7,7 @@ import stat
 from pathlib import Path
 
 from opl.errors import InputError
+from opl.files.confining import require_inside
 
 MB = 1_000_000
 
@@ -19,8 +20,10 @@ def read_bytes(path: Path, most: int) -> bytes:
         most: Size in bytes above which it is refused.
 
     Raises:
-        InputError: If it cannot be read, is no file or too large.
+        InputError: If it cannot be read, is no file or too large, or lies outside of what may be
+            read.
     """
+    require_inside(path)
     try:
         opened = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with open(opened, "rb") as file:

@@ -1,7 +1,8 @@
-"""Where the robots, templates and example workpieces that come with opl lie."""
+"""Where robots, templates, workpieces and plug-ins that come with opl lie; copies of them."""
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 from opl.errors import InputError
@@ -32,3 +33,27 @@ def start_job(directory: Path) -> Path:
     check_folder(directory)
     write_folder(folder("workpieces") / "v_shape", directory)
     return directory / "job.yaml"
+
+
+def install_plugin(directory: Path) -> Path:
+    """Copy the workbench for FreeCAD into the folder of its add-ons.
+
+    Returns:
+        The folder of the workbench; one that was there, of an older opl, is replaced.
+
+    Raises:
+        InputError: If the folder is not there, or cannot be written to.
+    """
+    if not directory.is_dir():
+        raise InputError(str(directory), "is not there; name the folder Mod of FreeCAD's user data")
+    target = directory / "opl"
+    try:
+        if target.exists():
+            if not (target / "opl_workbench").is_dir():
+                raise InputError(str(target), "is there, and is not the workbench of opl")
+            shutil.rmtree(target)
+        source = Path(__file__).resolve().parents[1] / "plugins" / "freecad"
+        shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
+    except OSError as error:
+        raise InputError(str(target), f"cannot be written: {error.strerror}") from error
+    return target

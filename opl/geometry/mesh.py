@@ -5,16 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from opl.errors import InputError
 from opl.files.reading import MB, read_bytes
 from opl.geometry.crossings import crossing_triangles
 from opl.geometry.frames import Array, in_mm, read_only
+
+if TYPE_CHECKING:
+    import trimesh
 
 # more of them take gigabytes and minutes to be looked through
 MOST_TRIANGLES = 400_000
@@ -77,6 +79,13 @@ class TriangleMesh:
         """Return the enclosed volume in [m^3], negative if the triangles face inwards."""
         a, b, c = np.moveaxis(self.triangles, 1, 0)
         return float(np.sum(np.cross(a, b) * c) / 6.0)
+
+    @property
+    def centre_of_volume(self) -> Array:
+        """Return the centre of gravity of the enclosed volume in [m], shape (3,)."""
+        a, b, c = np.moveaxis(self.triangles, 1, 0)
+        parts = np.sum(np.cross(a, b) * c, axis=1)  # six times a tetrahedron from the origin
+        return np.asarray(parts @ (a + b + c) / 4.0 / parts.sum())
 
 
 def winding_number(mesh: TriangleMesh, point: Array) -> float:
@@ -163,6 +172,8 @@ def load_shell(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
 
 def _read(path: Path) -> trimesh.Trimesh:
     """Return what a file holds, in its own unit, corners at the same place merged."""
+    import trimesh  # with all that it loads, longer than most commands take that read no mesh
+
     if path.suffix.lower() not in _SUFFIXES:
         raise InputError(str(path), f"must be one of {', '.join(_SUFFIXES)}")
     content = read_bytes(path, MOST_BYTES)

@@ -22,9 +22,9 @@ from itertools import product
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.spatial.transform import Rotation
 
 from opl.geometry.frames import Array, inverse, pose, rotation_angle, transform
+from opl.geometry.rotations import from_rotation_vector
 
 KINDS = ("left_edge", "right_edge", "front", "axle", "rim", "left_side", "right_side")
 DEGREES_OF_FREEDOM = 6
@@ -222,7 +222,7 @@ def _fit(rows: _Equations, T_base_start: Array) -> Array:
     """Return the pose that a least-squares fit ends at."""
 
     def moved(change: Array) -> Array:
-        turn = Rotation.from_rotvec(change[:3]).as_matrix()
+        turn = from_rotation_vector(change[:3])
         return T_base_start @ pose(turn, change[3:])
 
     def values(change: Array) -> Array:

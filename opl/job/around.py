@@ -85,7 +85,7 @@ def _own(source: Source, file: JobFile) -> Surroundings:
 
 def _from_cell(source: Source, cell_name: str, file: JobFile) -> Surroundings:
     """Return the surroundings in the cell file that a job names."""
-    path = source.file(cell_name)
+    path = source.file(cell_name, "cell")
     cell = load_cell(path)
     for key in ("robot", "wheel", "obstacles", keys.CLEARANCE):
         if key in file.model_fields_set:

@@ -134,6 +134,7 @@ def robot_of(source: Source, name: str) -> Robot:
         InputError: If there is none of the name, or its own file is unusable.
     """
     try:
+        source.file(name, "robot")  # refused if it is none that may be read
         return load_robot(name, source.folder)
     except InputError as error:
         # a fault in a robot's own file is reported with that file's name

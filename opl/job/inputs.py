@@ -7,7 +7,6 @@ byte. Surfaces and solids that a program gives as values count with all their nu
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
@@ -18,12 +17,9 @@ import numpy as np
 from opl.cell.robot import Robot
 from opl.files.digests import digest
 from opl.files.documents import content_of
-from opl.files.reading import MB, read_bytes
+from opl.files.reading import read_bytes
+from opl.job.files import MOST_BYTES, named_files, shape_files
 from opl.job.source import Source
-
-MOST_BYTES = 100 * MB  # of a file that a job names
-_FILES = ("surface", "mesh", "pulse_ratios", "template")  # keys that name a file
-_SHAPE = re.compile(r"""filename\s*=\s*["']([^"']+)["']""")
 
 
 def input_digests(
@@ -60,30 +56,14 @@ def _said(content: object) -> str:
 
 def _files_in(source: Source, content: object) -> dict[str, str]:
     """Return the digests of the files that a job or cell file names, by the names it has."""
-    return {name: _of_file(source.file(name)) for name in _named(content)}
-
-
-def _named(content: object) -> Iterator[str]:
-    if isinstance(content, Mapping):
-        for key, value in content.items():
-            if key in _FILES and isinstance(value, str):
-                yield value
-            else:
-                yield from _named(value)
-    elif isinstance(content, (list, tuple)):
-        for item in content:
-            yield from _named(item)
+    return {name: _of_file(source.file(name)) for name in named_files(content)}
 
 
 def _robot_files(robot: Robot) -> Iterator[tuple[str, Path]]:
     folder = robot.urdf.parent
     yield "robot.yaml", folder / "robot.yaml"
     yield robot.urdf.name, robot.urdf
-    names = _SHAPE.findall(read_bytes(robot.urdf, MOST_BYTES).decode("utf-8", "replace"))
-    for name in sorted(set(names)):
-        path = folder / name.split("://")[-1]
-        if path.is_file():
-            yield name, path
+    yield from shape_files(robot.urdf)
 
 
 def _of_file(path: Path) -> str:

@@ -8,6 +8,17 @@ CLEARANCE = "clearance_mm"
 # a YAML file that has one of these keys is a job
 OF_A_JOB = frozenset({"workpiece", "wheel", "passes"})
 
+# what holds a list; a list at any other key is a sweep
+LISTS = frozenset(
+    {
+        "T_base_contact0_mm", "T_base_user_mm", "T_flange_tool_mm", "T_flange_workpiece_mm",
+        "accept_unverified_pulses", "after_pass", "at_end", "at_mm", "at_start", "axle",
+        "before_pass", "bodies", "box_mm", "cylinder_mm", "faces", "front", "home_deg", "joints",
+        "left_edge", "left_side", "max_acceleration_deg_s2", "obstacles", "plane_normal",
+        "right_edge", "right_side", "rim", "rotation_deg", "rx_ry_rz_deg", "xyz_mm",
+    }
+)  # fmt: skip
+
 WHEEL_POSE = "wheel.T_base_contact0_mm"
 WHEEL_WIDTH = "wheel.width_mm"
 WHEEL_MAX_ROLL = "wheel.max_roll_deg"
@@ -50,5 +61,6 @@ OF_PROGRAM = {
 }
 PROGRAM_CONTROLLER = "program.controller"
 PROGRAM_MOTION = "program.motion"
+PROGRAM_TOOL_POSE = "program.T_flange_tool_mm"
 PROGRAM_PULSE_RATIOS = "program.pulse_ratios"
 PROGRAM_ACCEPT_UNVERIFIED_PULSES = "program.accept_unverified_pulses"

@@ -23,8 +23,11 @@ from opl.job.file import JobFile
 from opl.job.inputs import input_digests
 from opl.job.search import Method, Search
 from opl.job.source import Source
+from opl.job.sweeps import with_value
+from opl.job.user_frame import home_in_user_frame
 from opl.job.workpiece import GIVEN
 from opl.motion.process_settings import ProcessSettings
+from opl.program.led import StationaryTool
 from opl.program.settings import ProgramSettings
 
 
@@ -62,6 +65,7 @@ def load_job(
     *,
     folder: Path | None = None,
     method: str | None = None,
+    changes: Mapping[str, Any] | None = None,
     surface: NurbsSurface | MachinedSurface | None = None,
     part: TriangleMesh | None = None,
 ) -> Job:
@@ -72,6 +76,7 @@ def load_job(
         folder: Where the relative file names in it are looked up; else the folder of the file, or
             the current folder for a mapping.
         method: Search to use instead of the job's own.
+        changes: Values by key path, as ``wheel.radius_mm``, that stand instead of the job's own.
         surface: The surface to be ground, in the workpiece frame, instead of the one that
             ``workpiece`` names. The outside of a `NurbsSurface` is that of du x dv.
         part: The solid for collisions, in the workpiece frame, instead of the one that
@@ -87,6 +92,8 @@ def load_job(
     else:
         origin, content = Source.of_file(Path(source)), content_of(Path(source))
         origin = replace(origin, folder=folder or origin.folder)
+    for path, value in (changes or {}).items():
+        content = with_value(content, path, value)
     given = {key for key, value in (("surface", surface), ("part", part)) if value is not None}
     if len(given) == 2 and isinstance(content, dict):
         content = {"workpiece": {}, **content}  # nothing is left for it to say
@@ -130,7 +137,13 @@ def _in_si(file: JobFile, source: Source, method: str | None,
     search = file.search.in_si(file.passes.max_chord_error_mm)
     if method is not None:
         search = replace(search, method=Method(method))
-    home = file.program.home_as_written(robot, around.home)
+    home = around.home
+    if file.program.positions == "user":
+        home = home_in_user_frame(robot, home)
+    at_wheel = StationaryTool(cell.wheel.T_base_contact0, cell.T_flange_workpiece)
+    load = file.workpiece.load_in_hand(part, cell.T_flange_workpiece)
+    if file.program.gripper is not None and load is None:
+        raise InputError(source.at("program.gripper"), "goes with workpiece.density_kg_m3")
     return Job(
         source=source,
         name=file.name,
@@ -139,6 +152,6 @@ def _in_si(file: JobFile, source: Source, method: str | None,
         surface=surface,
         passes=file.passes.in_si(source, surface, cell.wheel.radius),
         search=search,
-        process=file.process.in_si(home),
-        program=file.program.in_si(source, file.name, robot, home, cell.wheel.T_base_contact0),
+        process=file.process.in_si(home, file.program.one_job_per_pass),
+        program=file.program.in_si(source, file.name, robot, home, at_wheel, load),
     )

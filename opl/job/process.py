@@ -88,7 +88,7 @@ class ProcessSection(Document):
         limits = np.deg2rad(self.max_acceleration_deg_s2)
         return replace(robot, max_acceleration=limits, acceleration_assumed=False)
 
-    def in_si(self, home: Array) -> ProcessSettings:
+    def in_si(self, home: Array, home_between: bool) -> ProcessSettings:
         """Return the section's values; home in [rad], shape (6,)."""
         return ProcessSettings(
             feed=self.feed_mm_s * MM,
@@ -101,4 +101,5 @@ class ProcessSection(Document):
             contact_speed=self.max_contact_speed,
             max_dwell=self.max_dwell_s,
             home=home,
+            home_between=home_between,
         )

@@ -19,18 +19,25 @@ from opl.job.actions import ActionSection
 from opl.job.bodies import Matrix, pose_of
 from opl.job.refusals import keys_named
 from opl.job.source import Source
+from opl.job.user_frame import UserFrameSection
+from opl.job.workpiece import GripperSection
 from opl.program.actions import Actions
 from opl.program.export import try_out
-from opl.program.inform.cartesian import beside_half_turns
+from opl.program.led import StationaryTool
 from opl.program.posts import Post, find_post, known_posts
 from opl.program.ratios import with_ratios
-from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
+from opl.program.settings import (
+    ByKind,
+    Load,
+    MotionForm,
+    PositionForm,
+    ProgramSettings,
+)
 
-HOME_MARGIN = np.deg2rad(3.0)  # of home from half a turn, in a user frame
 _MAY_COUNT_PULSES = ("Yaskawa", "unknown")  # makers
 _YASKAWA_ONLY = (
     *("positions", "user_frame"),
-    *("position_levels", "acceleration_percent", "deceleration_percent"),
+    *("position_levels", "acceleration_percent", "deceleration_percent", "one_job_per_pass"),
 )
 
 _Level = Annotated[int, Field(ge=0, le=8)]
@@ -67,25 +74,6 @@ class _Percents(Document):
         return ByKind(self.on_wheel, self.lead, self.free_move)
 
 
-class _UserFrame(Document):
-    """A user frame as it is set on the controller."""
-
-    model_config = ConfigDict(title="User frame")
-
-    number: Annotated[int, between(1, 999)] = Field(
-        default=1, description="Number of the user frame."
-    )
-    T_base_user_mm: Matrix | None = Field(
-        default=None,
-        description="Pose of the user frame in the robot's base frame, 4x4 with its origin in mm; "
-        "else contact frame 0 of the wheel.",
-    )
-
-    def in_si(self, T_base_contact0: Array) -> UserFrame:
-        given = self.T_base_user_mm
-        return UserFrame(self.number, T_base_contact0 if given is None else pose_of(given))
-
-
 class ProgramSection(Document):
     """The controller, and how the program is written."""
 
@@ -105,17 +93,18 @@ class ProgramSection(Document):
         description="Pose of that tool in the flange frame as it is set on the controller, 4x4 "
         "with its origin in mm; else the flange itself.",
     )
-    motion: Literal["joint", "straight"] = Field(
-        default="joint",
+    motion: Literal["joint", "straight"] | None = Field(
+        default=None,
         description="Moves on the wheel, approach and retract as joint moves, or straight where "
-        "that stays near the verified path.",
+        "that stays near the verified path; else joint moves, in KRL straight ones: its joint "
+        "speeds are whole percents, too coarse for the feed.",
     )
     positions: Literal["pulses", "base", "robot", "user"] = Field(
         default="pulses",
         description="Positions as encoder pulses, or as poses in the base, robot or user frame. "
         "For Yaskawa controllers.",
     )
-    user_frame: _UserFrame | None = Field(
+    user_frame: UserFrameSection | None = Field(
         default=None,
         description="The frame of `positions: user`, else user frame 1 at the wheel: touched up, "
         "it takes the whole program along, home included.",
@@ -141,6 +130,21 @@ class ProgramSection(Document):
         default=_Percents(),
         description="Deceleration (DEC) of each kind of move. For Yaskawa controllers.",
     )
+    one_job_per_pass: bool = Field(
+        default=False,
+        description="Each pass as a job of its own, from home to home, called by a master, so that "
+        "it can be repeated or left out at the pendant. For Yaskawa controllers.",
+    )
+    belt_switched_by: str | None = Field(
+        default=None,
+        description="Who switches the belt where the program does not, e.g. `the operator`; else "
+        "opl asks.",
+    )
+    gripper: GripperSection | None = Field(
+        default=None,
+        description="What the gripper weighs. With it and `workpiece.density_kg_m3` programs set "
+        "the load of both together: in TOOL.CND, $LOAD, set_target_payload; RAPID has them apart.",
+    )
     comment: str | None = Field(default=None, description="A line about the program, in its head.")
     at_start: Annotated[list[ActionSection], at_most(500)] = Field(
         default=[], description="Actions at home, before anything else."
@@ -163,13 +167,11 @@ class ProgramSection(Document):
     def _fits(self) -> ProgramSection:
         if self.positions != "user" and self.user_frame is not None:
             raise ValueError("user_frame goes with positions: user only")
-        cartesian = self.positions != "pulses" or self.motion == "straight"
-        if cartesian and self.tool and self.T_flange_tool_mm is None:
-            raise ValueError(
-                "positions in a frame and straight moves need T_flange_tool_mm, the data of tool "
-                f"{self.tool} on the controller"
-            )
         return self
+
+    def _form(self, post: Post) -> MotionForm:
+        """Return how moves on the wheel are written."""
+        return post.motion if self.motion is None else MotionForm(self.motion)
 
     def robot_as_counted(self, source: Source, robot: Robot) -> Robot:
         """Return the robot with the pulse ratios and soft limits that the job names.
@@ -184,19 +186,14 @@ class ProgramSection(Document):
         except InputError as error:
             raise InputError(source.at(keys.PROGRAM_PULSE_RATIOS), str(error)) from error
 
-    def home_as_written(self, robot: Robot, home: Array) -> Array:
-        """Return home as the program leads to it, joint positions in [rad], shape (6,).
-
-        In a user frame, R, T and S stand clear of half a turn: a frame that is touched up moves the
-        joints, and beyond it the same position is another one, a full turn away.
-        """
-        if self.positions != "user":
-            return home
-        clear: Array = beside_half_turns(home[None], robot, HOME_MARGIN, HOME_MARGIN)[0]
-        return clear
-
     def in_si(
-        self, source: Source, name: str, robot: Robot, home: Array, T_base_contact0: Array
+        self,
+        source: Source,
+        name: str,
+        robot: Robot,
+        home: Array,
+        at_wheel: StationaryTool,
+        load: Load | None,
     ) -> ProgramSettings:
         """Return the settings, tried out on a program that only goes home.
 
@@ -205,7 +202,8 @@ class ProgramSection(Document):
             name: The program's name.
             robot: Whose program.
             home: Joint positions in [rad], shape (6,).
-            T_base_contact0: Contact frame 0 of the wheel, shape (4, 4).
+            at_wheel: Contact frame 0 of the wheel, and the part in the hand.
+            load: The part in the hand, None where nobody says what it weighs.
 
         Raises:
             InputError: If something in it is unknown, or the controller does not take it.
@@ -216,7 +214,7 @@ class ProgramSection(Document):
                 if joint not in robot.joint_names:
                     known = ", ".join(robot.joint_names)
                     raise SettingError("accepted_pulses", f"no such joint {joint!r}; have: {known}")
-            settings = self._settings(source, T_base_contact0)
+            settings = self._settings(source, find_post(self.controller), at_wheel, load)
             try:
                 try_out(name, home, robot, settings)
             except SettingError:
@@ -225,30 +223,47 @@ class ProgramSection(Document):
                 raise InputError(source.label, str(error)) from error
         return settings
 
-    def _settings(self, source: Source, T_base_contact0: Array) -> ProgramSettings:
+    def _settings(
+        self, source: Source, post: Post, at_wheel: StationaryTool, load: Load | None
+    ) -> ProgramSettings:
         levels, tool = self.position_levels, self.T_flange_tool_mm
-        frame = (
-            (self.user_frame or _UserFrame.model_validate({})) if self.positions == "user" else None
-        )
+        stands = post.knows_stationary_tools and self._form(post) is MotionForm.STRAIGHT
+        frame = self.user_frame
+        if frame is None and self.positions == "user":
+            frame = UserFrameSection.model_validate({})
         actions = (self.at_start, self.before_pass, self.after_pass, self.at_end)
         return ProgramSettings(
             controller=self.controller,
             tool=self.tool,
             T_flange_tool=np.eye(4) if tool is None else pose_of(tool),
-            motion=MotionForm(self.motion),
+            motion=self._form(post),
+            stationary=at_wheel if stands else None,
             positions=PositionForm(self.positions),
-            user_frame=None if frame is None else frame.in_si(T_base_contact0),
+            user_frame=None if frame is None else frame.in_si(at_wheel.T_base_tool),
             levels=ByKind(levels.on_wheel, levels.lead, levels.free_move),
             acceleration=self.acceleration_percent.in_si(),
             deceleration=self.deceleration_percent.in_si(),
             actions=Actions(*(tuple(action.in_si() for action in some) for some in actions)),
             accepted_pulses=tuple(self.accept_unverified_pulses),
+            one_job_per_pass=self.one_job_per_pass,
+            load=load,
+            gripper=None if self.gripper is None else self.gripper.in_si(),
+            belt_switched_by=self.belt_switched_by,
             title=self.comment,
-            template=None if self.template is None else source.file(self.template),
+            template=None
+            if self.template is None
+            else source.file(self.template, "program.template"),
         )
 
     def _require_possible(self, source: Source, post: Post, robot: Robot) -> None:
         """Refuse another maker's arm, and keys that the post would pass over in silence."""
+        led = self._form(post) is MotionForm.STRAIGHT and not post.knows_stationary_tools
+        if (led or self.positions != "pulses") and self.tool and not self.T_flange_tool_mm:
+            raise InputError(
+                source.at(keys.PROGRAM_TOOL_POSE),
+                "positions in a frame and straight moves need the data of tool "
+                f"{self.tool} on the controller",
+            )
         if post.counts_pulses:
             if robot.missing_pulses and robot.maker not in _MAY_COUNT_PULSES:
                 others = [name for name in known_posts() if not find_post(name).counts_pulses]

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from opl.errors import InputError
+from opl.files.confining import require_inside
+
 
 @dataclass(frozen=True)
 class Source:
@@ -27,6 +30,20 @@ class Source:
         """Return how a message names a key path in it, e.g. ``job.yaml: wheel.width_mm``."""
         return f"{self.label}: {key}"
 
-    def file(self, name: str) -> Path:
-        """Return the path of a file that it names."""
+    def file(self, name: str, key: str | None = None) -> Path:
+        """Return the path of a file or folder that it names.
+
+        Args:
+            name: The name.
+            key: The key that names it; not needed where the caller tells it.
+
+        Raises:
+            InputError: If it lies outside of what may be read.
+        """
+        try:
+            require_inside(self.folder / name)
+        except InputError as error:
+            raise InputError(
+                "" if key is None else self.at(key), f"{name} {error.message}"
+            ) from error
         return self.folder / name

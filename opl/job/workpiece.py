@@ -12,11 +12,14 @@ from pydantic_core import PydanticCustomError
 from opl.errors import InputError
 from opl.files.documents import Document
 from opl.files.quantities import between
+from opl.geometry.frames import Array, transform
 from opl.geometry.machined import CAD, MESHES, load_machined
 from opl.geometry.mesh import TriangleMesh, load_mesh
 from opl.geometry.passes import MachinedSurface
 from opl.geometry.surface_on_solid import SizeError, check_sizes, facing_inward
+from opl.job.bodies import MM, Triple
 from opl.job.source import Source
+from opl.program.settings import Load
 
 # so much of a surface may look as if it faced into the solid before it is refused
 MOST_INWARD = 0.1
@@ -25,6 +28,22 @@ _Id = Annotated[int, between(1, 1_000_000)]
 
 # key of the validation context: what a program gives as a value, ``surface`` or ``part`` or both
 GIVEN = "given"
+
+
+class GripperSection(Document):
+    """What the gripper weighs."""
+
+    model_config = ConfigDict(title="Gripper")
+
+    mass_kg: Annotated[float, between(0.001, 10_000.0)] = Field(
+        description="Mass of the gripper and all else between flange and part.",
+        json_schema_extra={"unit": "kg"},
+    )
+    centre_mm: Triple = Field(description="Its centre of gravity in the flange frame.")
+
+    def in_si(self) -> Load:
+        """Return the load."""
+        return Load(self.mass_kg, np.array(self.centre_mm) * MM)
 
 
 class WorkpieceSection(Document):
@@ -67,6 +86,14 @@ class WorkpieceSection(Document):
         default=None,
         validate_default=True,
         description="Unit of the mesh file, which does not carry one.",
+    )
+
+    density_kg_m3: Annotated[float, between(1.0, 25_000.0)] | None = Field(
+        default=None,
+        description="Density of the part: its mass and centre of gravity, from its mesh, are told "
+        "in the program and where its controller keeps them: TOOL.CND, RAPID's loaddata; with "
+        "`program.gripper` KRL's $LOAD and UR's payload too. FANUC's PAYLOAD is set there.",
+        json_schema_extra={"unit": "kg/m3"},
     )
 
     @field_validator("surface", "mesh", "mesh_unit")
@@ -134,6 +161,13 @@ class WorkpieceSection(Document):
             return load_mesh(source.file(str(self.mesh)), self.mesh_unit or "mm")
         except InputError as error:
             raise InputError(source.at("workpiece.mesh"), str(error)) from error
+
+    def load_in_hand(self, part: TriangleMesh, T_flange_workpiece: Array) -> Load | None:
+        """Return mass and centre of gravity of the part, None without a density."""
+        if self.density_kg_m3 is None:
+            return None
+        p_flange = transform(T_flange_workpiece, part.centre_of_volume[None])[0]
+        return Load(self.density_kg_m3 * part.volume, p_flange)
 
     def check_sizes(self, source: Source, surface: MachinedSurface, part: TriangleMesh) -> None:
         """Refuse a surface and a solid that are not of one part of a size that a robot holds.

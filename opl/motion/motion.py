@@ -178,6 +178,11 @@ class Motion:
         return np.array([phase is Phase.FREE for phase in self.phase], dtype=bool)
 
     @property
+    def at_home(self) -> NDArray[np.bool_]:
+        """Which configurations are the first one again, where the robot comes from, shape (n,)."""
+        return np.asarray((self.q == self.q[:1]).all(axis=1))
+
+    @property
     def ends_phase(self) -> NDArray[np.bool_]:
         """After which moves another phase begins, or the motion ends, shape (n,)."""
         changes = [one != other for one, other in pairwise(self._phase_and_pass)]

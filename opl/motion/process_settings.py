@@ -25,6 +25,8 @@ class ProcessSettings:
         max_dwell: Longest that the belt may stay on one spot beyond the time at the feed in [s].
         air_speed: Fraction of each joint's largest speed used for free moves, 0 to 1.
         home: Joint positions at the start and the end in [rad], shape (6,).
+        home_between: Whether the part comes home between passes, so that each may be left out or
+            repeated.
     """
 
     feed: float
@@ -37,6 +39,7 @@ class ProcessSettings:
     max_dwell: float
     air_speed: float
     home: Array
+    home_between: bool = False
 
     def lead_shape(self, run: float | None = None) -> LeadShape:
         """Return the shape of approaches and retracts, with another run in [m] if one is given."""

@@ -43,9 +43,10 @@ def shortened(motion: Motion, joined: Joined) -> Motion:
 def _gaps(motion: Motion) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     """Return the configurations of the leads on either side of each gap, off the wheel first.
 
-    Of the wheel outwards: those of a retract, and those of the approach that follows; at the ends
-    of the motion home alone.
+    Of the wheel outwards: those of a retract, and those of the approach that follows; home alone at
+    the ends of the motion, and wherever it comes by.
     """
+    at_home = motion.at_home
     sides = [(Phase.RETRACTING, np.array([0], dtype=np.intp))]
     for phase, moves in motion.runs():
         if phase is Phase.APPROACHING:
@@ -53,6 +54,9 @@ def _gaps(motion: Motion) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
             sides.append((phase, moves[::-1] - 1))
         elif phase is Phase.RETRACTING:
             sides.append((phase, moves))
+        elif at_home[moves[:-1]].any():
+            home = moves[:-1][at_home[moves[:-1]]][:1]
+            sides += [(Phase.APPROACHING, home), (Phase.RETRACTING, home)]
     sides.append((Phase.APPROACHING, np.array([len(motion) - 1], dtype=np.intp)))
     return [(sides[k][1], sides[k + 1][1]) for k in range(0, len(sides), 2)]
 

@@ -2,6 +2,7 @@
 
 The part comes to the wheel and leaves it as `opl.motion.leads` says; between passes, and from and
 to home, all joints move together on a straight line in joint space, or on several around obstacles.
+Where a job wants it, the robot comes home between passes too.
 """
 
 from __future__ import annotations
@@ -80,6 +81,8 @@ def whole_motion(
         )
         free = MoveKind.HOME if index == 0 else MoveKind.LINK
         place = path.cutter_point[on_pass]
+        if process.home_between and index > 0:
+            parts.append(Motion.off_wheel(home.q, free, index))
         parts += [
             Motion.off_wheel(lead_in[-1:], free, index),
             # the last move of the approach ends at the first cutter point

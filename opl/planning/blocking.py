@@ -78,11 +78,12 @@ def _block_link(
     index = int(motion.pass_index[move])
     after = len(track) if index < 0 else int(np.argmax(problem.points.pass_index == index))
     before = after - 1  # the cutter points on either side of the free move
-    if motion.kind[move] is MoveKind.LINK:
+    from_home, to_home = motion.at_home[[move - 1, move]]
+    if not from_home and not to_home:
         kind, cause, home_end = FreeMove.BETWEEN_PASSES, str(error), None
     else:
-        kind = FreeMove.TO_HOME if index < 0 else FreeMove.FROM_HOME
-        cause, home_end = f"{kind.value}: {error}", int(index < 0)
+        kind = FreeMove.TO_HOME if to_home else FreeMove.FROM_HOME
+        cause, home_end = f"{kind.value}: {error}", int(to_home)
     if error.end in (None, home_end):
         matrix.cut_off[kind, error.pair] += 1
     if kind is FreeMove.TO_HOME:

@@ -30,7 +30,8 @@ class NodeState(str, Enum):
     REACH = "out of reach"
     LIMITS = "beyond joint limits"
     WHEEL = f"{PART} cuts into {WHEEL}"
-    COLLISION = "robot or fixture collides"
+    ROBOT = "robot or what it holds collides"
+    SCENE = "collides with what stands around"
 
 
 CODES = {state: code for code, state in enumerate(NodeState)}
@@ -87,9 +88,11 @@ def survey_nodes(problem: GrindingProblem, ik_branch: int, near: Array) -> NodeS
     # full turns do not matter for collisions: one configuration of each node is checked
     column, position = np.nonzero(states == CODES[NodeState.FREE])
     struck = collision.collides(q[column, position])
+    around = {body.name for body in problem.cell.obstacles}
     for i, j in zip(column[struck], position[struck], strict=True):
         first = collision.colliding_pairs(q[i, j])[0]
-        states[i, j], hit[i, j] = CODES[NodeState.COLLISION], pairs.setdefault(first, len(pairs))
+        state = NodeState.ROBOT if around.isdisjoint(first) else NodeState.SCENE
+        states[i, j], hit[i, j] = CODES[state], pairs.setdefault(first, len(pairs))
     n_columns, n_positions = problem.cuts.shape
     columns, positions = _some(n_columns, _COLUMNS), _some(n_positions, _POSITIONS)
     grid = np.ix_(columns, positions)

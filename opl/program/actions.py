@@ -92,6 +92,11 @@ class Actions:
         return (*self.at_start, *self.before_pass, *self.after_pass, *self.at_end)
 
     @property
+    def switches(self) -> bool:
+        """Whether any of them could switch the belt: an output, or a program of the site's own."""
+        return any(isinstance(action, (SetOutput, Call)) for action in self.every)
+
+    @property
     def calls(self) -> frozenset[str]:
         """Names of the programs called."""
         return frozenset(action.name for action in self.every if isinstance(action, Call))

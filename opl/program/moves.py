@@ -112,10 +112,12 @@ class PassTime:
     Attributes:
         wanted: At constant feed in [s].
         written: As the controller will play the written speeds, ramps left out, in [s].
+        single: How far a single move is off its time at the most, as a fraction of it.
     """
 
     wanted: float
     written: float
+    single: float
 
     @property
     def error(self) -> float:
@@ -238,10 +240,10 @@ def plan_moves(
     stops, on_wheel = stops_at(motion), motion.on_wheel
     done_there = actions_at(motion, actions)
     moves = []
-    pass_before: int | None = None
+    at_home, place_before = motion.at_home, ""
     for m, (configuration, phase) in enumerate(zip(kept, motion.phase, strict=True)):
         pass_here = int(motion.pass_index[m])
-        comment = "HOME" if pass_here < 0 else f"PASS {pass_here + 1}"
+        place = "HOME" if pass_here < 0 or at_home[m] else f"PASS {pass_here + 1}"
         moves.append(
             Move(
                 q=motion.q[m],
@@ -253,11 +255,11 @@ def plan_moves(
                 kind=Purpose.of(phase),
                 ground_pass=pass_here if phase is Phase.GRINDING else None,
                 part=(Part.of(phase, motion.kind[m], pass_here), pass_here),
-                comment=comment if pass_here != pass_before else None,
+                comment=place if place != place_before else None,
                 actions=done_there.get(m, ()),
             )
         )
-        pass_before = pass_here
+        place_before = place
     return Program(name=name, comments=tuple(comments), moves=tuple(moves))
 
 

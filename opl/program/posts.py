@@ -27,7 +27,7 @@ from opl.errors import InputError, PassTimeError, SettingError
 from opl.geometry.frames import Array
 from opl.program.moves import PassTime, Program, Purpose
 from opl.program.played import Corners, Reading, WrittenSpeed
-from opl.program.settings import ProgramSettings
+from opl.program.settings import MotionForm, ProgramSettings
 
 GROUP = "opl.posts"
 
@@ -102,6 +102,8 @@ class Post:
         template: The layout that comes with the post.
         variables: What its templates get: name and meaning.
         counts_pulses: Whether positions may be written in encoder pulses.
+        motion: How moves on the wheel are written unless the job says so.
+        knows_stationary_tools: Whether straight moves lead the part past a tool that stands.
         reader: Reads its programs back; None where they are written and not read back.
         period: From one interpolated configuration to the next in [s]; 0 where nothing is known of
             it. No controller was asked: each says beside the number where it is from.
@@ -112,6 +114,8 @@ class Post:
     template: Path
     variables: Mapping[str, str]
     counts_pulses: bool = False
+    motion: MotionForm = MotionForm.JOINT
+    knows_stationary_tools: bool = False
     reader: Reader | None = None
     period: float = 0.0
 
@@ -185,13 +189,16 @@ def pass_times(
     Raises:
         PassTimeError: If a pass does not keep its time.
     """
-    sums: dict[int, tuple[float, float]] = {}
+    moves: dict[int, list[tuple[float, float]]] = {}
     for move in program.moves:
         if move.ground_pass is not None and move.duration is not None:
-            wanted, written = sums.get(move.ground_pass, (0.0, 0.0))
-            both = wanted + move.duration, written + times[move.motion_index]
-            sums[move.ground_pass] = both
-    found = {index: PassTime(*both) for index, both in sorted(sums.items())}
+            pair = move.duration, times[move.motion_index]
+            moves.setdefault(move.ground_pass, []).append(pair)
+    found = {}
+    for index, pairs in sorted(moves.items()):
+        wanted, written = np.array(pairs).T
+        single = float(np.abs(written / wanted - 1.0).max())
+        found[index] = PassTime(float(wanted.sum()), float(written.sum()), single)
     for index, one in found.items():
         if abs(one.error) > PASS_TIME_TOLERANCE:
             raise PassTimeError(

@@ -15,12 +15,11 @@ MAX_BLENDED_TURN = np.deg2rad(10.0)
 def stops_at(motion: Motion) -> list[bool]:
     """Return at which configurations, none like the one before it, the robot comes to rest.
 
-    At both ends, where leads and free moves meet, and at sharp corners of free moves; on the wheel
-    and where it is met and left, never.
+    At home, where leads and free moves meet, and at sharp corners of free moves; on the wheel and
+    where it is met and left, never.
     """
     free, on_wheel = motion.free, motion.on_wheel
-    stops = motion.ends_phase & ~on_wheel
-    stops[0] = True
+    stops = (motion.ends_phase | motion.at_home) & ~on_wheel
     steps = np.diff(motion.q, axis=0)
     directions = steps / np.linalg.norm(steps, axis=1, keepdims=True)
     cos_turn = np.sum(directions[:-1] * directions[1:], axis=1)

@@ -15,6 +15,7 @@ from opl.motion.motion import TimedMotion
 from opl.program.posts import Reader, find_post, readers
 from opl.proof.events import name_findings
 from opl.proof.written import written_findings
+from opl.verification.common_shift import common_shift
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import Verification, replay
 
@@ -82,10 +83,14 @@ def prove(
         job.process.approach_run,
         job.process.feed,
     )
-    found = recognise(job.cell, points, playback.q, playback.duration, playback.stations, rule)
+    motion = playback.q, playback.duration, playback.stations
+    found = recognise(job.cell, points, *motion, rule)
     replayed = replay(job.cell, points, found.timed, search.max_contact_error, progress)
+    astray = {"order", "contact"} & {one.kind for one in (*replayed.findings, *found.findings)}
+    shift = common_shift(job.cell, points, *motion, rule) if astray else None
     findings = (
         *reading.findings,
+        *([shift] if shift is not None else []),
         *replayed.findings,
         *found.findings,
         *written_findings(job, points, found.timed.motion, playback, reader),

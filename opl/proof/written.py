@@ -12,7 +12,7 @@ from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion, TimedMotion
 from opl.motion.timing import time_motion
-from opl.program.moves import Purpose
+from opl.program.moves import SAME_CONFIGURATION, Purpose
 from opl.program.played import Playback
 from opl.program.posts import Reader
 from opl.program.settings import PositionForm
@@ -53,7 +53,12 @@ def written_findings(
 def _first_moves(job: Job, playback: Playback, reader: Reader) -> Iterator[Finding]:
     """Look at the moves that a program begins with: nobody knows from where they start."""
     limit = reader.start(job.cell.robot)
-    for move in playback.moves:
+    places = playback.q[playback.stations]
+    for move, place in zip(playback.moves, places, strict=True):
+        away = np.abs(place - places[0]).max()
+        if move.starts and job.program.one_job_per_pass and away > SAME_CONFIGURATION:
+            message = f"{np.rad2deg(away):.3f} deg from home, so no pass could be left out"
+            yield _error("home", move.place, message)
         speed = move.speed
         slow = speed.unit is limit.unit and speed.value <= limit.value * (1.0 + ROUND_OFF)
         if move.starts and not slow:

@@ -26,10 +26,13 @@ HATCHES: tuple[Callable[[Any, Any], Any], ...] = (
     lambda x, y: (x % 6 < 2) & (y % 6 < 2),
     lambda x, y: (x + y) % 8 == 0,
     lambda x, y: ((x - y) % 5 == 0) | ((x + y) % 15 == 0),
+    lambda x, y: (y % 5 == 0) | ((x % 10 == 0) & (y % 10 < 5)),
 )
 LEAST, MOST = 0.005, 0.1  # [m] clearance that is shown darkest, and lightest
 LEAST_PIXELS = (1200, 420)  # across and up
 NEAR_SINGULAR = 0.1  # of the margin that is 0 at a singularity; the viewer's is the same
+MOST_TICKS = 16  # numbers of passes below the chart
+MM = 1e3
 STILL = 'vector-effect="non-scaling-stroke"'
 
 
@@ -120,6 +123,11 @@ def chart_image(
     return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode("ascii")
 
 
+def _tick(side: str, part: float, said: str) -> str:
+    """Return a label at a part of the length of its axis, 0 to 1."""
+    return f'<span style="{side}:{100.0 * part:.2f}%">{said}</span>'
+
+
 def _nearest(places: np.ndarray, count: int) -> np.ndarray:
     """Return which of some increasing places is nearest to each of 0, 1, ..., shape (count,)."""
     return np.asarray(np.abs(np.arange(count)[:, None] - places).argmin(axis=1))
@@ -166,18 +174,33 @@ def chart_frame(
         between = "".join(f"M{x[k]:.2f} {y[k]:.2f}h0" for k in rows if motion.cutter_point[k] % 1.0)
         lines += [("outline", path), ("path", path), ("between", between)]
     drawn = "".join(f'<path class="{kind}" d="{d}" {STILL}/>' for kind, d in lines if d)
+    shade = f", the darker the nearer ({MM * LEAST:g} to {MM * MOST:g} mm)"
     keys = "".join(
-        f'<li><span class="key state-{code}"></span>{text(name)} {100.0 * share:.1f} %</li>'
+        f'<li><span class="key state-{code}"></span>{text(name)}{"" if code else shade} '
+        f"{100.0 * share:.1f} %</li>"
         for code, name, share in legend
     )
-    ends = f"<span>t {contact_positions[-1]:g}</span><span>{contact_positions[0]:g}</span>"
+    inside = [t for t in (flat_end, 0.0, -flat_end) if 0.0 < down(t) < m]
+    ends = "".join(
+        _tick("top", float(down(t)) / m, f"{t:g}")
+        for t in (contact_positions[-1], *inside, contact_positions[0])
+    )
+    middles = [
+        (k, float(np.flatnonzero(pass_index == k).mean() + 0.5) / n)
+        for k in range(pass_index[-1] + 1)
+    ]
+    spaced = middles[:: -(-len(middles) // MOST_TICKS)]
+    passes = "".join(
+        _tick("left", at, f"pass {k + 1}" if k == 0 else f"{k + 1}") for k, at in spaced
+    )
     found = '<li><span class="key line-path"></span>path found, dots: intermediate nodes</li>'
     kept = '<li><span class="key line-fixed"></span>contact kept at t = 0</li>'
-    return f"""<div class="chart"><div class="axis">{ends}</div>
+    return f"""<div class="chart"><div class="axis"><b>t</b>{ends}</div>
 <div id="chart" tabindex="0" role="application" aria-label="{text(title)}">
 <img id="chart-cells" src="{image}" alt="{text(title)}">
 <svg id="chart-lines" viewBox="0 0 {n} {m}" preserveAspectRatio="none" aria-hidden="true">{drawn}
 </svg><div id="chart-cursor" hidden></div></div>
+<div class="passes">{passes}</div>
 <div class="ends"><span>0</span><span>cutter point</span><span>{n - 1}</span></div></div>
 <ul class="legend">{keys}{found if motion is not None else ""}{kept if fixed else ""}
 <li><span class="key singular"></span>near a singularity</li></ul>"""

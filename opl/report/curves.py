@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,16 +18,56 @@ from opl.report.packing import Packer
 MM = 1e3
 SHORTEST = 1e-6  # [s] of a move that has a speed
 AT_REST = "off the wheel"
+LIMIT = "limit"  # kind of a level line
+LEAST = 1e-3  # shown of a quantity that hardly changes
+NEAR = 1.2  # of what is shown, from its middle: a limit farther away is left out
 
 
-def panel(title: str, unit: str, lines: Sequence[dict[str, Any]], **more: Any) -> dict[str, Any]:
-    """Return one panel."""
-    return {"title": title, "unit": unit, "lines": list(lines), **more}
+@dataclass(frozen=True, eq=False)
+class Line:
+    """One line of a panel: what the viewer's style calls it, its places in [s], and its name."""
+
+    kind: str
+    x: Array | Sequence[float]
+    y: Array | Sequence[float]
+    name: str
 
 
-def limit(packer: Packer, end: float, value: float, name: str = "limit") -> dict[str, Any]:
-    """Return a level line; it is shown where a curve comes near."""
-    return _line(packer, "limit", [0.0, end], [value, value], name)
+def panel(
+    packer: Packer, title: str, unit: str, lines: Sequence[Line], **more: Any
+) -> dict[str, Any]:
+    """Return one panel; a limit is in what it shows only where a curve comes near to it."""
+    seen = np.concatenate([np.asarray(one.y) for one in lines if one.kind != LIMIT])
+    seen = seen[~np.isnan(seen)]
+    low, high = (float(seen.min()), float(seen.max())) if len(seen) else (0.0, 1.0)
+    caption = f"{title}: {low:.2f} to {high:.2f} {unit}"
+    room, middle = max(high - low, LEAST), (low + high) / 2.0
+    limits = [float(one.y[0]) for one in lines if one.kind == LIMIT]
+    near = [level for level in limits if abs(level - middle) < NEAR * room]
+    low, high = min([low, *near]), max([high, *near])
+    margin = 0.06 * max(high - low, LEAST)
+    return {
+        "title": title,
+        "unit": unit,
+        "caption": caption,
+        "low": low - margin,
+        "high": high + margin,
+        "lines": [
+            {
+                "name": one.name,
+                "kind": one.kind,
+                "x": packer.floats(one.x),
+                "y": packer.floats(one.y),
+            }
+            for one in lines
+        ],
+        **more,
+    }
+
+
+def limit(end: float, value: float, name: str = "limit") -> Line:
+    """Return a level line."""
+    return Line(LIMIT, [0.0, end], [value, value], name)
 
 
 def joint_panels(
@@ -39,16 +80,16 @@ def joint_panels(
     for joint, name in enumerate(robot.joint_names):
         on_wheel = q[ground, joint]
         lines = [
-            _line(packer, "range", [0.0, end], [on_wheel.min(), on_wheel.max()], "range on wheel"),
-            limit(packer, end, float(np.rad2deg(robot.lower[joint]))),
-            limit(packer, end, float(np.rad2deg(robot.upper[joint]))),
+            Line("range", [0.0, end], [on_wheel.min(), on_wheel.max()], "range on wheel"),
+            limit(end, float(np.rad2deg(robot.lower[joint]))),
+            limit(end, float(np.rad2deg(robot.upper[joint]))),
         ]
         if fixed is not None:
             points = np.arange(len(fixed))
             angles = np.interp(motion.cutter_point, points, np.rad2deg(fixed[:, joint]))
-            lines.append(_line(packer, "fixed", times, angles, "contact kept at t = 0"))
-        lines.append(_line(packer, "found", times, q[:, joint], "found"))
-        panels.append(panel(name, "deg", lines))
+            lines.append(Line("fixed", times, angles, "contact kept at t = 0"))
+        lines.append(Line("found", times, q[:, joint], "found"))
+        panels.append(panel(packer, name, "deg", lines))
     return panels
 
 
@@ -58,11 +99,12 @@ def speed_panels(timing: Timing, robot: Robot, packer: Packer) -> list[dict[str,
     most = np.rad2deg(robot.max_speed)
     return [
         panel(
+            packer,
             f"{name} speed",
             "deg/s",
             [
-                *(limit(packer, float(times[-1]), sign * most[joint]) for sign in (-1.0, 1.0)),
-                _line(packer, "found step", times, speeds[:, joint], "mean of a move"),
+                *(limit(float(times[-1]), sign * most[joint]) for sign in (-1.0, 1.0)),
+                Line("found step", times, speeds[:, joint], "mean of a move"),
             ],
         )
         for joint, name in enumerate(robot.joint_names)
@@ -84,16 +126,15 @@ def acceleration_panels(timing: Timing, robot: Robot, packer: Packer) -> list[di
     assumed = ", assumed" if robot.acceleration_assumed else ""
     return [
         panel(
+            packer,
             f"{name} acceleration",
             "deg/s2",
             [
                 *(
-                    limit(packer, float(times[-1]), sign * most[joint], f"limit{assumed}")
+                    limit(float(times[-1]), sign * most[joint], f"limit{assumed}")
                     for sign in (-1.0, 1.0)
                 ),
-                _line(
-                    packer, "found", times, np.rad2deg(found[:, joint]), "from speeds of neighbours"
-                ),
+                Line("found", times, np.rad2deg(found[:, joint]), "from speeds of neighbours"),
             ],
         )
         for joint, name in enumerate(robot.joint_names)
@@ -104,7 +145,7 @@ def feed_panels(timing: Timing, feed: float, robot: Robot, packer: Packer) -> li
     """Return the speed along the surface with what lowers it, and the contact position."""
     timed, times = timing.timed, moments(timing.timed)
     speed = MM * timing.surface_distance / np.maximum(timed.duration, SHORTEST)
-    told = [
+    causes = [
         AT_REST
         if np.isnan(distance)
         else "as set"
@@ -115,27 +156,27 @@ def feed_panels(timing: Timing, feed: float, robot: Robot, packer: Packer) -> li
             timing.surface_distance, timing.cause, timing.joint, strict=True
         )
     ]
-    names = list(dict.fromkeys(told))
-    slow = np.array([text.startswith("lowered") for text in told])
+    names = list(dict.fromkeys(causes))
+    slow = np.array([text.startswith("lowered") for text in causes])
     lines = [
-        limit(packer, float(times[-1]), MM * feed, "set"),
-        _line(packer, "found step", times, speed, "along the surface"),
-        _line(packer, "blame step", times, np.where(slow, speed, np.nan), "lowered"),
+        limit(float(times[-1]), MM * feed, "set"),
+        Line("found step", times, speed, "along the surface"),
+        Line("blame step", times, np.where(slow, speed, np.nan), "lowered"),
     ]
-    labels = {"codes": packer.counts([names.index(text) for text in told]), "names": names}
-    t = _line(packer, "found", times, timed.motion.contact_position, "t")
+    labels = {"codes": packer.counts([names.index(text) for text in causes]), "names": names}
+    t = Line("found", times, timed.motion.contact_position, "t")
     return [
-        panel("feed", "mm/s", lines, labels=labels),
-        panel("contact position t", "mm on the flat, deg on the edges", [t]),
+        panel(packer, "feed", "mm/s", lines, labels=labels),
+        panel(packer, "contact position t", "mm on the flat, deg on the edges", [t]),
     ]
 
 
 def clearance_panels(times: Array, nearest: Nearest, packer: Packer) -> list[dict[str, Any]]:
     """Return the distance of the nearest pair at moments in [s], with its names."""
-    line = _line(packer, "found", times, MM * nearest.distance, "nearest pair")
+    line = Line("found", times, MM * nearest.distance, "nearest pair")
     names = [" and ".join(pair) for pair in nearest.pairs]
     labels = {"codes": packer.counts(nearest.pair), "names": names}
-    return [panel("clearance", "mm", [line], labels=labels)]
+    return [panel(packer, "clearance", "mm", [line], labels=labels)]
 
 
 def moments(timed: TimedMotion) -> Array:
@@ -148,7 +189,3 @@ def _speeds(timed: TimedMotion) -> Array:
     moved = np.diff(timed.motion.q, axis=0, prepend=timed.motion.q[:1])
     lasting = timed.duration > SHORTEST
     return np.where(lasting[:, None], moved / np.maximum(timed.duration, SHORTEST)[:, None], np.nan)
-
-
-def _line(packer: Packer, kind: str, x: Any, y: Any, name: str) -> dict[str, Any]:
-    return {"name": name, "kind": kind, "x": packer.floats(x), "y": packer.floats(y)}

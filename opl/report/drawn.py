@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,21 +12,26 @@ from opl.cell.drawn_cell import DrawnChain, DrawnSolid
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh
-from opl.geometry.shapes import Box, Cylinder
-from opl.geometry.thinning import thinned
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import ContactWheel
 from opl.report.packing import Packer
+from opl.report.solids import is_thinned, triangles
 
-MOST_TRIANGLES = 12_000  # of a drawn mesh
 MOST_FRAMES = 60
+WHEEL_COLOUR = 0x6B5B4B
 FRAME, LIFT = 0.012, 4e-4  # [m] length of a drawn axis; how far lines are above the surface
 
 
 def drawn_cell(
-    chain: DrawnChain | None, solids: Sequence[DrawnSolid], packer: Packer
+    chain: DrawnChain | None,
+    solids: Sequence[DrawnSolid],
+    packer: Packer,
+    wheels: Collection[str] = (WHEEL,),
 ) -> dict[str, Any]:
-    """Return arm and solids, without a chain solids alone; large meshes thinned."""
+    """Return arm and solids, without a chain solids alone; large meshes thinned.
+
+    What stands around the arm is seen through, but for the wheels named.
+    """
     return {
         "joints": []
         if chain is None
@@ -35,29 +40,13 @@ def drawn_cell(
             for T, axis in zip(chain.Ts_parent_joint, chain.axes, strict=True)
         ],
         "flange": flat(np.eye(4) if chain is None else chain.T_joint_flange),
-        "solids": [
-            {
-                "name": solid.body.name,
-                "joint": solid.joint,
-                "robot": solid.of_robot,
-                "around": _is_around(solid),
-                "colour": _colour(solid),
-                "T": flat(solid.body.T_parent_body),
-                **_shape(solid.body.shape, packer),
-            }
-            for solid in solids
-        ],
+        "solids": [_drawn(group, wheels, packer) for group in _grouped(solids)],
     }
 
 
 def thinned_meshes(solids: Sequence[DrawnSolid]) -> list[str]:
     """Return the names of what is drawn with fewer triangles than it is proven with."""
-    return [
-        solid.body.name
-        for solid in solids
-        if isinstance(solid.body.shape, TriangleMesh)
-        and len(solid.body.shape.faces) > MOST_TRIANGLES
-    ]
+    return [solid.body.name for solid in solids if is_thinned(solid.body)]
 
 
 def views(wheel: ContactWheel) -> dict[str, list[list[float]]]:
@@ -143,25 +132,36 @@ def flat(T: Array) -> list[float]:
     return numbers
 
 
-def _is_around(solid: DrawnSolid) -> bool:
-    return solid.joint == 0 and not solid.of_robot and solid.body.name != WHEEL
+def _grouped(solids: Sequence[DrawnSolid]) -> list[list[DrawnSolid]]:
+    """Return the pieces of each body together: the viewer paints a few large meshes faster."""
+    groups: dict[tuple[str, int], list[DrawnSolid]] = {}
+    for solid in solids:
+        groups.setdefault((solid.body.name, solid.joint), []).append(solid)
+    return list(groups.values())
+
+
+def _drawn(pieces: Sequence[DrawnSolid], wheels: Collection[str], packer: Packer) -> dict[str, Any]:
+    first = pieces[0]
+    is_wheel = first.body.name in wheels
+    corners, faces = triangles([piece.body for piece in pieces])
+    return {
+        "name": first.body.name,
+        "joint": first.joint,
+        "robot": first.of_robot,
+        "around": _stands_around(first) and not is_wheel,
+        "colour": WHEEL_COLOUR if is_wheel else _colour(first),
+        "vertices": packer.floats(corners),
+        "faces": packer.counts(faces),
+    }
+
+
+def _stands_around(solid: DrawnSolid) -> bool:
+    return solid.joint == 0 and not solid.of_robot and solid.body.name != PART
 
 
 def _colour(solid: DrawnSolid) -> int:
     if solid.of_robot:  # neighbours differ
         return 0xE6A13C if solid.joint % 2 else 0xD2D7DB
-    known = {WHEEL: 0x6B5B4B, PART: 0x9FB4C4}
-    return known.get(solid.body.name, 0x5B6670 if solid.joint else 0x8FA0AD)
-
-
-def _shape(shape: Box | Cylinder | TriangleMesh, packer: Packer) -> dict[str, Any]:
-    if isinstance(shape, Box):
-        return {"kind": "box", "size": list(shape.size)}
-    if isinstance(shape, Cylinder):
-        return {"kind": "cylinder", "size": [shape.radius, shape.length]}
-    mesh = thinned(shape, MOST_TRIANGLES)
-    return {
-        "kind": "mesh",
-        "vertices": packer.floats(mesh.vertices),
-        "faces": packer.counts(mesh.faces),
-    }
+    if solid.body.name == PART:
+        return 0x9FB4C4
+    return 0x5B6670 if solid.joint else 0x8FA0AD

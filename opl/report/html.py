@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 _VIEWER = Path(__file__).parent / "viewer"
+MOST_ON_PAPER = 12  # rows of a table, or lines of a list; the style leaves out as many
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
 
 
@@ -51,6 +52,12 @@ def batch_page(
         f"<tbody>\n{lines}\n</tbody></table></div>"
     )
     return _whole(title, body, "batch.js")
+
+
+def _cut_on_paper(count: int) -> str:
+    """Return what paper says of more rows or lines than it shows."""
+    more = count - MOST_ON_PAPER
+    return f'<p class="paper">and {more} more: on the page</p>' if more > 0 else ""
 
 
 def _whole(title: str, body: str, script: str) -> str:
@@ -98,7 +105,9 @@ def bullets(lines: Iterable[str], marks: Sequence[str | None] = ()) -> str:
         f"<li>{marked(line, marks[k] if k < len(marks) else None)}</li>"
         for k, line in enumerate(lines)
     )
-    return f"<ul>\n{items}\n</ul>" if items else ""
+    if not items:
+        return ""
+    return f"<ul>\n{items}\n</ul>{_cut_on_paper(items.count('<li>'))}"
 
 
 def marked(said: object, mark: str | None) -> str:
@@ -135,7 +144,8 @@ def table(
     body = "\n".join(lines)
     return (
         f'<div class="scroll"><table class="{kind}"><caption>{text(caption)}</caption>'
-        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
+        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table>"
+        f"{_cut_on_paper(len(rows))}</div>"
     )
 
 

@@ -66,7 +66,8 @@ def view_frame(
         f"{ticks}{choice('paint', 'colour of the passes', painted)}"
         '<span id="scale" hidden><output id="scale-low"></output><i></i>'
         '<output id="scale-high"></output></span>'
-        '<button type="button" id="save">save as glTF</button></div>',
+        '<button type="button" id="save">save as glTF</button>'
+        '<button type="button" id="picture">save as PNG</button></div>',
     )
 
 

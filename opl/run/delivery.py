@@ -13,12 +13,10 @@ from opl.files.claiming import Claim, claimed
 from opl.files.reading import MB, read_text
 from opl.run.page import run_page
 from opl.run.reporting import make_report
-from opl.run.result import to_json
+from opl.run.result import PAGE, RESULT, to_json
 from opl.run.values import Refused, Written
 
-RESULT = "result.json"
 MOST_RESULT = 20 * MB
-PAGE = "report.html"
 
 
 @contextmanager
@@ -64,11 +62,15 @@ def deliver(run: Written | Refused, folder: Path | Claim) -> list[Path]:
     if isinstance(folder, Path):
         with claim_folder(folder, run.surfaced.job.name) as claim:
             return deliver(run, claim)
-    files = run.files if isinstance(run, Written) else {}
+    files = run.contents if isinstance(run, Written) else {}
     leaving = _files_of(_earlier_result(folder.folder)) - files.keys()
     report = make_report(run)
     # the result last: it describes the others
-    whole = {**files, PAGE: run_page(run, report), RESULT: to_json(report) + "\n"}
+    whole: dict[str, str | bytes] = {
+        **files,
+        PAGE: run_page(run, report),
+        RESULT: to_json(report) + "\n",
+    }
     return folder.switch(whole, leaving)
 
 

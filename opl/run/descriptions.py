@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from opl.cell.robot import Robot
+from opl.geometry.faces import FaceSummary
 from opl.geometry.frames import Array, roll_pitch_yaw
 from opl.geometry.shapes import Body, Box, Cylinder
 from opl.job.cell import Cell
@@ -141,6 +142,19 @@ def _wheel_figures(robot: Robot, placed: PlacedWheel) -> dict[str, Any]:
             for label, off in zip(fit.labels, fit.residuals, strict=True)
         },
         "spare_equations": None if fit is None else fit.spare,
+    }
+
+
+def face_figures(face: FaceSummary) -> dict[str, object]:
+    """Return a face of a part file in plain numbers, in mm."""
+    return {
+        "id": face.number,
+        "type": face.type,
+        "area_mm2": round(1e6 * face.area, 3),
+        "low_mm": (1e3 * face.low).round(3).tolist(),
+        "high_mm": (1e3 * face.high).round(3).tolist(),
+        "mean_normal": face.normal.round(4).tolist(),
+        "holes": face.holes,
     }
 
 

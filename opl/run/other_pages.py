@@ -1,10 +1,6 @@
-"""Pages of what is no run: cutter points, a cell, a batch."""
+"""Pages of what is no run: cutter points, a cell."""
 
 from __future__ import annotations
-
-import os
-from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -13,12 +9,9 @@ from opl.cell.workcell import PART, wheel_solid
 from opl.geometry.shapes import Body
 from opl.job.cell import Cell
 from opl.report.drawn import drawn_cell, drawn_wheel, views, views_of_part
-from opl.report.html import batch_page as sortable_page
 from opl.report.html import bullets, page, section, text
 from opl.report.packing import Packer
 from opl.report.view_frame import hover, view_frame
-from opl.run.batch import BatchRow
-from opl.run.delivery import PAGE
 from opl.run.descriptions import describe_cell
 from opl.run.page_data import EMPTY, joints_data, passes_data
 from opl.run.values import Surfaced
@@ -33,6 +26,7 @@ def points_page(surfaced: Surfaced, figures: str) -> str:
     """
     job, packer = surfaced.job, Packer()
     points, paints = passes_data(surfaced, packer)
+    missed = surfaced.inspection.uncovered.points
     part = DrawnSolid(Body(PART, job.cell.part, np.eye(4)), BASE, False)
     normal = surfaced.points.Ts_workpiece_cutter[:, :3, 2].mean(axis=0)
     data = {
@@ -49,6 +43,7 @@ def points_page(surfaced: Surfaced, figures: str) -> str:
             f"<p>{text(figures)}</p></header>",
             view_frame("The part", data["views"], paints, ["frames"], False),
             hover(),
+            bullets(["orange dots: no pass comes by here"] if len(missed) else []),
             section("warnings", "Warnings", bullets(map(str, surfaced.warnings))),
         ]
     )
@@ -76,7 +71,7 @@ def cell_page(cell: Cell) -> str:
         **EMPTY,
         "name": name,
         "joints": joints_data(cell.robot),
-        "cell": drawn_cell(chain, solids, packer),
+        "cell": drawn_cell(chain, solids, packer, [one.name for one in cell.wheels]),
         "views": views(wheel),
         "home": (np.zeros(6) if cell.home is None else cell.home).tolist(),
         "wheel": drawn_wheel(wheel),
@@ -90,59 +85,3 @@ def cell_page(cell: Cell) -> str:
         ]
     )
     return page(f"{name}: cell", body, data, packer.block())
-
-
-def batch_page(rows: Sequence[BatchRow], folder: Path) -> str:
-    """Return the page of a batch: its jobs in a table that sorts, with links to their pages.
-
-    Args:
-        rows: What became of each job.
-        folder: Where the page will lie; links are relative to it.
-    """
-    good = sum(row.exit_status == 0 for row in rows)
-    lines = []
-    for row in rows:
-        result = row.result
-        path = None if result is None else result.path
-        job = text(row.job)
-        if row.folder is not None:
-            link = Path(os.path.relpath(row.folder / PAGE, folder)).as_posix()
-            job = f'<a href="{text(link)}">{job}</a>'
-        cycle = None if result is None else result.cycle
-        found = None if result is None else result.verification
-        cells = [
-            text(row.status),
-            "" if result is None else text(result.cutter_points),
-            "" if path is None else f"{path.joint_range_sum_rad:.4f}",
-            "" if path is None or path.gap is None else f"{100.0 * path.gap:.3f}",
-            "" if path is None else _small_bars(path.joint_ranges_rad),
-            "" if cycle is None else f"{cycle.total_s:.1f}",
-            "" if found is None else f"{found.min_clearance_mm:.1f}",
-            text(row.message),
-        ]
-        lines.append((job, cells))
-    heads = (
-        "job",
-        "status",
-        "cutter points",
-        "range sum rad",
-        "gap %",
-        "joint ranges",
-        "cycle s",
-        "clearance mm",
-        "why not",
-    )
-    summary = f"{good} of {len(rows)} jobs have a program"
-    return sortable_page("Batch", summary, heads, lines)
-
-
-def _small_bars(values: Sequence[float]) -> str:
-    """Return a bar for each value, the largest as high as there is room."""
-    most = max(values) or 1.0
-    bars = "".join(
-        f'<rect x="{15 * k + 1}" y="{20 - 20 * value / most:.1f}" width="12" '
-        f'height="{20 * value / most:.1f}"/>'
-        for k, value in enumerate(values)
-    )
-    label = ", ".join(f"{value:.3f}" for value in values)
-    return f'<svg class="small" viewBox="0 0 90 20" role="img" aria-label="{label}">{bars}</svg>'

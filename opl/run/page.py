@@ -15,7 +15,7 @@ from opl.report.drawn import thinned_meshes
 from opl.report.html import bullets, page, section, text
 from opl.report.packing import Packer
 from opl.report.view_frame import BOXES, choice, hover, view_frame
-from opl.run import page_text
+from opl.run import page_tables, page_text
 from opl.run.page_data import (
     blocked_place,
     extremes,
@@ -59,7 +59,9 @@ def run_page(run: Written | Refused, report: Report) -> str:
     body = "\n".join(
         [
             page_text.verdict(report, job, data["marks"]),
+            '<div class="bench">',
             view_frame("The cell", data["views"], data["paints"], BOXES, found is not None),
+            '<div class="rest">',
             bullets(
                 f"{name} is drawn with fewer triangles than it is proven with"
                 for name in thinned_meshes(drawn_solids(job.cell))
@@ -71,12 +73,13 @@ def run_page(run: Written | Refused, report: Report) -> str:
                 "pose the robot there.</p>",
                 _chart(prepared, survey, motion),
                 hover(),
-                page_text.causes(survey),
+                page_tables.causes(survey),
             ),
             "" if found is None else _curves_section(),
-            page_text.tables(report, job, found),
+            page_tables.figures(report, job, found),
             _program_section(run),
-            page_text.files(report),
+            page_text.signature(),
+            "</div></div>",
         ]
     )
     return page(f"{job.name}: report", body, data, packer.block())
@@ -100,7 +103,7 @@ def _chart(prepared: Prepared, survey: NodeSurvey, motion: Motion | None) -> str
         job.cell.wheel.flat_end,
         motion,
         prepared.fixed.q is not None,
-        page_text.legend(survey),
+        page_tables.legend(survey),
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from opl.cell.collision import CollisionScene
 from opl.cell.drawn_cell import drawn_chain, drawn_solids
 from opl.cell.nearest import Nearest, nearest_pairs
 from opl.cell.robot import Robot
@@ -42,7 +43,8 @@ MOST_LOOKS = 600  # at the nearest pair along the motion, evenly in time, beside
 KINDS = tuple(MoveKind)
 NEARLY_FREE = (
     NodeState.FREE,
-    NodeState.COLLISION,
+    NodeState.SCENE,
+    NodeState.ROBOT,
     NodeState.WHEEL,
     NodeState.LIMITS,
     NodeState.REACH,
@@ -91,7 +93,7 @@ def run_data(prepared: Prepared, planned: Planned | None, packer: Packer) -> Dat
     data["field"] = _field(prepared, prepared.survey if planned is None else planned.survey, packer)
     if planned is not None:
         timed, scene = planned.timing.timed, prepared.problem.scene
-        times, nearest = _along(timed, prepared)
+        times, nearest = planned.pictured.value().times, planned.pictured.value().nearest
         data["motion"] = _motion(timed, packer)
         data["clearance"] = {
             "time": packer.floats(times),
@@ -198,7 +200,7 @@ def _motion(timed: TimedMotion, packer: Packer) -> Data:
     }
 
 
-def _along(timed: TimedMotion, prepared: Prepared) -> tuple[Array, Nearest]:
+def nearest_along(timed: TimedMotion, scene: CollisionScene) -> tuple[Array, Nearest]:
     """Return moments in [s] and the nearest pair at each, for the whole motion."""
     moments = curves.moments(timed)
     ground = timed.motion.on_wheel & (timed.motion.cutter_point % 1.0 == 0.0)
@@ -206,7 +208,7 @@ def _along(timed: TimedMotion, prepared: Prepared) -> tuple[Array, Nearest]:
     rows = np.arange(len(moments), dtype=float)
     at = np.interp(times, moments, rows)
     q = np.stack([np.interp(at, rows, joint) for joint in timed.motion.q.T], axis=1)
-    return times, nearest_pairs(prepared.problem.scene.collision, q)
+    return times, nearest_pairs(scene, q)
 
 
 def _paints(planned: Planned, times: Array, nearest: Nearest, packer: Packer) -> Mapping[str, Data]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,20 +35,31 @@ TURNED_FIXTURE_DEG = (10.0, -10.0, 20.0, -20.0, 45.0, -45.0, 90.0, -90.0, 180.0)
 Change = tuple[str, WorkCell]
 
 
+@dataclass(frozen=True)
+class Remedies:
+    """What would open a job, and what was tried for nothing.
+
+    Attributes:
+        found: The smallest change of each kind that opens it, one line each; where the tries ended
+            early, one that says so.
+        in_vain: Kinds of changes of which none that was tried opens it, one line each.
+    """
+
+    found: tuple[str, ...] = ()
+    in_vain: tuple[str, ...] = ()
+
+
 def find_remedies(
     job: Job,
     points: CutterPoints,
     progress: Callable[[float], None] = lambda fraction: None,
-) -> list[str]:
-    """Return the smallest single changes that open a job, one line each, each planned again.
+) -> Remedies:
+    """Return the smallest single changes that open a job, each planned again.
 
     Args:
         job: A job for which no path was found.
         points: Its cutter points.
         progress: Called before each change with the part of the checks that is used up, 0 to 1.
-
-    Returns:
-        A line for each kind of change that helps; where the tries ended early, one that says so.
     """
     columns = np.unique(np.linspace(0, len(points) - 1, PROBED_COLUMNS).astype(int))
     some = CutterPoints(
@@ -56,17 +67,18 @@ def find_remedies(
         np.zeros(len(columns), dtype=np.int64),
         points.arc_length[columns],
     )
-    found = []
+    found, in_vain = list[str](), list[str]()
     left = MOST_IN_ALL
-    for kind in KINDS:
-        for change, cell in kind(job.cell):
+    for what, kind in KINDS.items():
+        changes = list(kind(job.cell))
+        for change, cell in changes:
             progress(1.0 - left / MOST_IN_ALL)
             scene = planning_scene(cell)
             if not _open_at(problem_in(scene, job, some)):
                 continue
             if left <= 0:
                 found.append(f"not all changes were tried: {MOST_IN_ALL} motions were checked")
-                return found
+                return Remedies(tuple(found), tuple(in_vain))
             most_checks = min(MOST_CHECKS, left)
             outcome = try_recursive(problem_in(scene, job, points), Start.BEST, most_checks)
             if isinstance(outcome, Found):
@@ -77,7 +89,9 @@ def find_remedies(
                 )
                 break
             left -= most_checks
-    return found
+        else:
+            in_vain.append(f"{what}: {len(changes)} tried, none opens the job")
+    return Remedies(tuple(found), tuple(in_vain))
 
 
 def _more_roll(cell: WorkCell) -> Iterator[Change]:
@@ -139,14 +153,14 @@ def _turned_fixture(cell: WorkCell) -> Iterator[Change]:
 
 
 # tried in this order, each kind by itself
-KINDS: tuple[Callable[[WorkCell], Iterator[Change]], ...] = (
-    _more_roll,
-    _other_width,
-    _more_penetration,
-    _other_side,
-    _fed_in_reverse,
-    _turned_fixture,
-)
+KINDS: dict[str, Callable[[WorkCell], Iterator[Change]]] = {
+    f"a larger {keys.WHEEL_MAX_ROLL}": _more_roll,
+    f"another {keys.WHEEL_WIDTH}": _other_width,
+    f"a larger {keys.WHEEL_MAX_BELT_PENETRATION}": _more_penetration,
+    "the contact on another side of the wheel": _other_side,
+    "the part fed in the opposite direction across the wheel": _fed_in_reverse,
+    "the fixture turned about z of the flange": _turned_fixture,
+}
 
 
 def _open_at(problem: GrindingProblem) -> bool:

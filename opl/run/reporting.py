@@ -49,6 +49,7 @@ def make_report(run: Written | Refused) -> Report:
         warnings=[str(finding) for finding in surfaced.warnings],
         reasons=() if refused is None else refused.reasons,
         remedies=() if refused is None else refused.remedies,
+        tried_in_vain=() if refused is None else refused.in_vain,
         fixed=_fixed(reached if isinstance(reached, Prepared) else reached.prepared),
         path=None if planned is None else _path(planned),
         compared={} if planned is None else _compared(planned),
@@ -217,14 +218,17 @@ def _place(one: Extreme | None) -> result.PlaceReport | None:
 
 def _program(written: Written) -> result.ProgramReport:
     return result.ProgramReport(
-        files=list(written.files),
-        sha256={name: digest(text.encode()) for name, text in written.files.items()},
+        files=list(written.contents),
+        sha256={name: digest(content) for name, content in written.contents.items()},
         read_back=written.read_back is not None,
         moves=len(written.program.moves),
         duration_s=round(written.proven.motion.timed.seconds, 3),
         passes=[
             result.PassTimeReport(
-                round(time.wanted, 3), round(time.written, 3), round(100.0 * time.error, 4)
+                round(time.wanted, 3),
+                round(time.written, 3),
+                round(100.0 * time.error, 4),
+                round(100.0 * time.single, 4),
             )
             for time in written.program.pass_times
         ],

@@ -9,8 +9,12 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+RESULT, PAGE = "result.json", "report.html"  # files of a run
 
 
 @dataclass(frozen=True)
@@ -187,11 +191,12 @@ class VerificationReport:
 
 @dataclass(frozen=True)
 class PassTimeReport:
-    """How long a pass should take, takes, and by how much that is off."""
+    """How long a pass should take, takes, and by how much that and a single move of it is off."""
 
     wanted_s: float
     written_s: float
     error_percent: float
+    largest_move_error_percent: float
 
 
 @dataclass(frozen=True)
@@ -214,6 +219,7 @@ class Report:
         status: ``ok``, ``no_path`` or ``unsafe``.
         reasons: Why there is no program, one line each.
         remedies: Single changes that would open the job, one line each.
+        tried_in_vain: Kinds of changes that were tried and do not, one line each.
         compared: The figures of the paths that exist: ``fixed``, ``paper_start``, ``recursive``,
             ``optimal``.
         seconds: Time of each stage, and their ``total``.
@@ -230,6 +236,7 @@ class Report:
     warnings: Sequence[str]
     reasons: Sequence[str]
     remedies: Sequence[str]
+    tried_in_vain: Sequence[str]
     fixed: FixedReport
     path: PathReport | None
     compared: Mapping[str, FiguresReport]
@@ -240,6 +247,39 @@ class Report:
     seconds: Mapping[str, float]
     opl: str
     inputs: Mapping[str, str]
+
+
+def read_report(content: bytes) -> Report:
+    """Return what a ``result.json`` of this version of opl says.
+
+    Raises:
+        ValueError: If it is none.
+    """
+    try:
+        found: Report = _made(Report, json.loads(content))
+        return found
+    except (TypeError, KeyError, AttributeError) as error:
+        raise ValueError(f"is no {RESULT} of this version: {error}") from error
+
+
+_types = cache(get_type_hints)
+
+
+def _made(kind: Any, value: Any) -> Any:
+    """Return plain values as what a type says: reports, alone, in sequences and in mappings."""
+    if isinstance(kind, type) and is_dataclass(kind):
+        types = _types(kind)
+        named = ((one.name, value[one.name.rstrip("_")]) for one in fields(kind))
+        return kind(**{name: _made(types[name], inner) for name, inner in named})
+    arguments = get_args(kind)
+    if value is None or not arguments:
+        return value
+    if get_origin(kind) in (Union, UnionType):
+        (meant,) = (one for one in arguments if one is not type(None))
+        return _made(meant, value)
+    if isinstance(value, dict):
+        return {key: _made(arguments[1], inner) for key, inner in value.items()}
+    return [_made(arguments[0], inner) for inner in value]
 
 
 def to_json(value: Any) -> str:

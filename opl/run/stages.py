@@ -3,32 +3,39 @@
 from __future__ import annotations
 
 from opl.errors import NoFreeMoveError, NoPathError
+from opl.files.beside import Beside
 from opl.job.load import Job
 from opl.job.refusals import dwell_refusal, keys_named
 from opl.motion.feed import slow_stretches
 from opl.motion.motion import TimedMotion
-from opl.motion.timing import time_motion
+from opl.motion.timing import Timing, time_motion
 from opl.planning.borders import Nameable
+from opl.planning.plan import Plan
 from opl.planning.positions import with_fewest_positions
 from opl.planning.speed_steps import with_speed_steps
+from opl.planning.survey import survey_nodes
 from opl.program.posts import find_post
+from opl.program.settings import MotionForm
 from opl.proof.read_back import in_file_digits, position_rule, read_back
 from opl.run.exporting import draw_charts, job_date, render_program
+from opl.run.page_data import nearest_along
 from opl.run.preparing import prepare
 from opl.run.remedies import find_remedies
 from opl.run.searches import compare, search_path
 from opl.run.surfacing import cut_surface
-from opl.run.values import Planned, Prepared, Proven, Refused, Run, Surfaced, Written
+from opl.run.values import Pictured, Planned, Prepared, Proven, Refused, Run, Surfaced, Written
 from opl.run.watch import Stage, Watch
 from opl.verification.replay import replay
 
 
-def run_job(job: Job, watch: Watch | None = None) -> Run:
+def run_job(job: Job, watch: Watch | None = None, workers: int = 1) -> Run:
     """Take a job through all stages: cut, plan, verify, write.
 
     Args:
         job: The job.
         watch: Follows the run, and can cancel it; one for each run, here and in each stage.
+        workers: How many processes may work at a time; the same bytes come of any number. With two
+            the pictures are drawn while the motion is verified, unless the process has threads.
 
     Returns:
         `Written` with a proven program, or `Refused` with the reason why there is none.
@@ -44,8 +51,9 @@ def run_job(job: Job, watch: Watch | None = None) -> Run:
     planned = plan_path(cut_surface(job, watch), watch)
     if isinstance(planned, Refused):
         return planned
-    proven = verify_motion(planned, watch)
-    return proven if isinstance(proven, Refused) else write_program(proven, watch)
+    with planned.pictured.begun(workers > 1):
+        proven = verify_motion(planned, watch)
+        return proven if isinstance(proven, Refused) else write_program(proven, watch)
 
 
 def plan_path(surfaced: Surfaced, watch: Watch | None = None) -> Planned | Refused:
@@ -75,19 +83,24 @@ def _plan(surfaced: Surfaced, watch: Watch) -> Planned | Refused:
     with watch.stage(Stage.MOTION):
         exact = with_speed_steps(found.plan.motion, surfaced.points, job.process, job.cell.robot)
         # what is proven is what the digits of the program can say
-        motion = with_fewest_positions(
-            prepared.problem.scene,
-            surfaced.points,
-            in_file_digits(exact, job),
-            job.process,
-            position_rule(job),
-        )
+        motion = in_file_digits(exact, job)
+        if job.program.motion is MotionForm.JOINT:
+            scene, rule = prepared.problem.scene, position_rule(job)
+            motion = with_fewest_positions(scene, surfaced.points, motion, job.process, rule)
         timing = time_motion(motion, surfaced.points, job.process, job.cell.robot)
         slow = slow_stretches(timing, job.process)
     timed = TimedMotion.passing(motion, timing.timed.duration)
-    planned = Planned(prepared, found.plan, compared, exact, timed, timing, slow)
+    pictured = Beside(lambda: _pictured(prepared, found.plan, timing))
+    planned = Planned(prepared, found.plan, compared, exact, timed, timing, slow, pictured)
     refusal = dwell_refusal(slow, job.process)
     return planned if refusal is None else Refused(planned, refusal, (), watch.seconds)
+
+
+def _pictured(prepared: Prepared, plan: Plan, timing: Timing) -> Pictured:
+    path, problem = plan.path, prepared.problem
+    survey = survey_nodes(problem, path.ik_branch, path.q[path.cutter_point % 1.0 == 0.0])
+    times, nearest = nearest_along(timing.timed, problem.scene.collision)
+    return Pictured(survey, times, nearest, draw_charts(prepared, plan, survey))
 
 
 def _nameable(job: Job) -> Nameable | None:
@@ -139,11 +152,12 @@ def write_program(proven: Proven, watch: Watch | None = None) -> Run:
     surfaced, exact = proven.surfaced, proven.planned.exact
     with watch.stage(Stage.EXPORT), keys_named(surfaced.job.source):
         program, files = render_program(proven)
-        files = {**files, **draw_charts(proven.planned)}
     with watch.stage(Stage.READ_BACK):
         found = read_back(surfaced.job, surfaced.points, exact, proven.motion, program, files)
     if found is not None and not found.proven:
         return Refused(proven, found, (), watch.seconds)
+    with watch.stage(Stage.EXPORT):
+        files = {**files, **proven.planned.pictured.value().charts}
     return Written(proven, program, files, found, watch.seconds)
 
 
@@ -154,4 +168,4 @@ def _without_path(prepared: Prepared, error: NoPathError, watch: Watch) -> Refus
     surfaced = prepared.surfaced
     with watch.stage(Stage.REMEDIES) as progress:
         remedies = find_remedies(surfaced.job, surfaced.points, progress)
-    return Refused(prepared, error, tuple(remedies), watch.seconds)
+    return Refused(prepared, error, remedies.found, watch.seconds, remedies.in_vain)

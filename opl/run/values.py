@@ -8,12 +8,15 @@ A run ends as `Written` or, wherever it stops, as `Refused`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
 
+from opl.cell.nearest import Nearest
 from opl.errors import NoPathError, OplError, UnsafeError
+from opl.files.beside import Beside
 from opl.findings import Finding
+from opl.geometry.frames import Array
 from opl.geometry.inspection import Inspection
 from opl.geometry.passes import LaidPasses
 from opl.geometry.toolpath import CutterPoints
@@ -79,6 +82,23 @@ class Prepared:
 
 
 @dataclass(frozen=True, eq=False)
+class Pictured:
+    """What pictures show of a planned motion, and those that are files of their own.
+
+    Attributes:
+        survey: Every node of the path's IK branch.
+        times: Moments of the motion in [s], ascending, shape (n,).
+        nearest: The nearest pair at each.
+        charts: Pictures as SVG texts by file name.
+    """
+
+    survey: NodeSurvey
+    times: Array
+    nearest: Nearest
+    charts: Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
 class Planned:
     """A path and the motion that it became, not verified yet.
 
@@ -92,6 +112,7 @@ class Planned:
             its times.
         timing: What is written of it, move by move, and what sets the times.
         slow: Where the ground point is slower than the feed.
+        pictured: What pictures show of it, worked out when it is first asked for, or beside.
     """
 
     prepared: Prepared
@@ -101,14 +122,12 @@ class Planned:
     timed: TimedMotion
     timing: Timing
     slow: tuple[SlowStretch, ...]
+    pictured: Beside[Pictured]
 
-    @cached_property
+    @property
     def survey(self) -> NodeSurvey:
         """Every node of the path's IK branch, for pictures."""
-        path = self.plan.path
-        return survey_nodes(
-            self.prepared.problem, path.ik_branch, path.q[path.cutter_point % 1.0 == 0.0]
-        )
+        return self.pictured.value().survey
 
     @property
     def surfaced(self) -> Surfaced:
@@ -152,6 +171,7 @@ class Written:
         read_back: What was found when the program was read back from its texts; None for languages
             that opl writes, but does not read.
         seconds: Time of each stage in [s].
+        pictures: More files by name that are no texts, only where somebody asked for them.
     """
 
     proven: Proven
@@ -159,11 +179,17 @@ class Written:
     files: Mapping[str, str]
     read_back: FileProof | None
     seconds: Mapping[Stage, float]
+    pictures: Mapping[str, bytes] = field(default_factory=dict)
 
     @property
     def status(self) -> str:
         """``ok``."""
         return "ok"
+
+    @property
+    def contents(self) -> dict[str, bytes]:
+        """All files by name, as their bytes."""
+        return {name: text.encode() for name, text in self.files.items()} | dict(self.pictures)
 
     @property
     def surfaced(self) -> Surfaced:
@@ -181,12 +207,14 @@ class Refused:
             what was proven.
         remedies: Single changes of the job that would open a path, one line each.
         seconds: Time of each stage in [s].
+        in_vain: Kinds of changes that were tried and open none, one line each.
     """
 
     reached: Prepared | Planned | Proven
     cause: NoPathError | Verification | FileProof
     remedies: tuple[str, ...]
     seconds: Mapping[Stage, float]
+    in_vain: tuple[str, ...] = ()
 
     @property
     def status(self) -> str:

@@ -12,11 +12,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opl.cell.workcell import PART, WorkCell
 from opl.geometry.frames import Array, pose, transform
 from opl.geometry.mesh import TriangleMesh
+from opl.geometry.rotations import quaternion
 from opl.geometry.shapes import Body, Box, Cylinder
 from opl.verification.engine import pybullet, start
 from opl.verification.meshes import is_inside, triangle_body
@@ -274,4 +274,4 @@ class World:
 
 def _position_quaternion(T: Array) -> tuple[list[float], list[float]]:
     """Return a pose as Bullet takes it: position in [m], quaternion x y z w."""
-    return T[:3, 3].tolist(), Rotation.from_matrix(T[:3, :3]).as_quat().tolist()
+    return T[:3, 3].tolist(), quaternion(T[:3, :3]).tolist()

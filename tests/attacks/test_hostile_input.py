@@ -22,6 +22,7 @@ from tests.support.jobs import V_SHAPE, document, write_job
 from tests.support.jobs import opl as in_this_process
 
 SEED = 17
+OUT = "out"  # where `opl run` is told to write
 LANGUAGES = {
     "JBI": "YRC1000/joint/SAMPLE.JBI", "mod": "RAPID/joint/SAMPLE.mod",
     "src": "KRL/joint/SAMPLE.src", "LS": "FANUC/joint/SAMPLE.LS",
@@ -42,31 +43,36 @@ def opl(*arguments):
     return lambda: main([str(argument) for argument in arguments], prog_name="opl")
 
 
-def snapshot(place):
+def snapshot(home, place):
+    """Return all files of a case and beside it, without those that its command may write."""
+    free = (place / OUT, place.with_suffix(".log"))
     return {
-        str(path.relative_to(place)): path.stat().st_size if path.is_file() else None
-        for path in place.rglob("*")
+        str(path.relative_to(home)): path.stat().st_size if path.is_file() else None
+        for path in home.rglob("*")
+        if not any(path.is_relative_to(one) for one in free)
     }
 
 
 def attack(home, cases):
     """Attack with cases (name, command, write), each in a folder of its own; return the faults."""
-    faults, ended = [], {}
+    faults, ended, most, longest = [], {}, 0, 0.0
     for number, (name, command, write) in enumerate(cases):
         place = home / f"{number:04d}"
         place.mkdir()
         for part in ("surface.json", "v_shape.stl"):
             shutil.copy(V_SHAPE / part, place)
         write(place)
-        before = snapshot(place)
+        before = snapshot(home, place)
         found = attacked(command, place)
-        after = snapshot(place)
+        after = snapshot(home, place)
         faults += [f"{name} ({number}): {fault}" for fault in found.faults]
         if after != before:
             faults.append(f"{name} ({number}): wrote {sorted(after.keys() - before.keys())}")
         ended[found.status] = ended.get(found.status, 0) + 1
+        most, longest = max(most, found.memory), max(longest, found.seconds)
         shutil.rmtree(place)
-    print(f"{len(cases)} inputs, exit statuses {ended}")
+    told = f"at most {most / 1e9:.2f} GB and {longest:.1f} s of computing"
+    print(f"{len(cases)} inputs, exit statuses {ended}, {told}")
     return faults
 
 
@@ -152,7 +158,7 @@ def traps(place):
 # jobs
 
 
-def job_cases(rng, count):
+def job_cases(rng, count, *command):
     for number in range(count):
         content = spoiled_value(rng, document())
         text = yaml.safe_dump(content)
@@ -164,11 +170,19 @@ def job_cases(rng, count):
             raw = text if isinstance(text, bytes) else text.encode("utf-8", "replace")
             (place / "job.yaml").write_bytes(raw)
 
-        yield "job", opl("check", "job.yaml"), write
+        yield command[0], opl(*command), write
 
 
 def test_jobs_with_spoiled_values(tmp_path):
-    assert attack(tmp_path, list(job_cases(random.Random(SEED), 130))) == []
+    assert attack(tmp_path, list(job_cases(random.Random(SEED), 130, "check", "job.yaml"))) == []
+
+
+def test_whole_runs_of_jobs_with_spoiled_values(tmp_path):
+    command = ("run", "job.yaml", "--out", OUT)
+    assert attack(tmp_path, list(job_cases(random.Random(SEED + 1), 120, *command))) == []
+
+
+# texts that are small and mean much
 
 
 def bomb(levels, width=10):

@@ -5,6 +5,7 @@ python -m pytest -n 0 tests/browser/check_pages.py
 
 import json
 import os
+import re
 import shutil
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 import opl
 from opl.cell.robot import forward_kinematics
 from opl.files.resources import folder
+from opl.run.batch_page import batch_page
 from tests.support.jobs import POST, document, write_job, write_trough
 
 sync_api = pytest.importorskip("playwright.sync_api")
@@ -160,9 +162,10 @@ def test_scrubbing_moves_chart_and_curves_together(runs, opened):
         cursor = one.page.locator("#chart-cursor")
         assert cursor.is_visible()
         count = one.page.evaluate("() => window.opl.chart.count")
-        left = float(cursor.evaluate("mark => parseFloat(mark.style.left)"))
+        left = float(cursor.evaluate("mark => parseFloat(mark.style.transform.slice(10))"))
         assert left == pytest.approx(100.0 * (motion.cutter_point[move] + 0.5) / count, abs=0.05)
-        x = float(one.page.locator("#curves .cursor").evaluate("one => parseFloat(one.style.left)"))
+        cursor = one.page.locator("#curves .cursor")
+        x = float(cursor.evaluate("one => parseFloat(one.style.transform.slice(11))"))
         assert x == pytest.approx(100.0 * times[move] / times[-1], abs=0.01)
         seen.add((left, x))
     assert len(seen) == 2
@@ -241,6 +244,18 @@ def test_a_line_of_the_program_leads_to_its_configuration_and_back(runs, opened)
         assert "now" in row.get_attribute("class").split()
 
 
+@pytest.mark.parametrize("name", ["good", "post", "trough"])
+def test_a_page_prints_on_two_sheets_whose_words_fit(name, runs, opened, tmp_path):
+    one = opened(runs[name][1] / "report.html")
+    printed = one.page.pdf(prefer_css_page_size=True)
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) == 2
+    one.page.emulate_media(media="print")
+    one.page.set_viewport_size({"width": 718, "height": 1000})  # 190 mm of paper
+    pieces = "() => [...document.querySelectorAll('table, p, ul')]"
+    wide = f"{pieces}.filter((one) => one.getBoundingClientRect().right > 719)"
+    assert one.page.evaluate(f"{wide}.map((one) => one.innerText)") == []
+
+
 def test_a_cell_is_saved_as_gltf(runs, opened, tmp_path):
     one = opened(runs["good"][1] / "report.html", accept_downloads=True)
     with one.page.expect_download() as download:
@@ -296,7 +311,7 @@ def test_a_batch_is_sorted_by_a_click(browser, runs, tmp_path):
         opl.BatchRow(out.parent / "job.yaml", run.status, 0, out, "", opl.make_report(run))
         for run, out in runs.values()
     ]
-    (tmp_path / "report.html").write_text(opl.batch_page(rows, tmp_path))
+    (tmp_path / "report.html").write_text(batch_page(rows, tmp_path))
     context = browser.new_context()
     page = context.new_page()
     page.goto((tmp_path / "report.html").as_uri())

@@ -223,7 +223,7 @@ def planned(tmp_path_factory):
     home = tmp_path_factory.mktemp("arc")
     job = write_job(home, JOB)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
+        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
         ended = opl("run", job, "--out", home / "out")
     assert ended.status == 0, ended.err
     return home

@@ -96,7 +96,7 @@ def written(request, tmp_path_factory):
     content["process"].update(approach_mm=20, home_deg=own["home_deg"])
     (home / "job.yaml").write_text(yaml.safe_dump(content))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
+        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
         ended = opl("run", home / "job.yaml", "--out", home / "out")
     assert ended.status == 0, ended.err
     job = load_job(home / "job.yaml")

@@ -25,7 +25,7 @@ def home(tmp_path_factory):
     """Return a folder with job.yaml and out/."""
     folder = tmp_path_factory.mktemp("inputs")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
+        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
         ended = opl("run", write_job(folder, SHORT), "--out", folder / "out")
     assert ended.status == 0, ended.err
     return folder

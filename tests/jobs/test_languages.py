@@ -183,13 +183,14 @@ def written(request, tmp_path_factory):
         "robot": language.robot,
         "process.home_deg": list(language.home),
         "program.controller": request.param,
+        "program.motion": "joint",
     }
     if request.param == "KRL":  # whole percents are too coarse for moves as slow as the others'
         changes["process.feed_mm_s"] = 60.0
     path = write_job(home, changes)
     job = load_job(path)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
+        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
         ended = opl("run", path, "--out", home / "out")
     assert ended.status == 0, ended.err
     file = home / "out" / (job.name + find_post(request.param).reader.suffix)
@@ -345,7 +346,7 @@ def test_a_program_without_a_reader_is_written_and_not_read_back(tmp_path, monke
     install_example_post(tmp_path, monkeypatch)
     changes = {**SHORT, "program.controller": "OUR_CELL", "robot": "gp25"}
     job = write_job(tmp_path / "job", changes)
-    monkeypatch.setattr("opl.run.stages.draw_charts", lambda planned: {})
+    monkeypatch.setattr("opl.run.stages.draw_charts", lambda *_: {})
     ended = opl("run", job, "--out", tmp_path / "out")
     assert ended.status == 0, ended.err
     assert "written, not read back" in " ".join(ended.out.split())

@@ -1,5 +1,6 @@
 """The pages of runs, cutter points, cells and batches, as texts."""
 
+import hashlib
 import json
 import re
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 import opl
+from opl.run.batch_page import batch_page
 from opl.run.delivery import deliver
 from tests.support.jobs import POST, document, write_job, write_trough
 from tests.support.jobs import opl as run_opl
@@ -16,7 +18,9 @@ from tests.support.jobs import opl as run_opl
 @pytest.fixture(scope="module")
 def good(tmp_path_factory):
     home = tmp_path_factory.mktemp("good")
-    run = opl.run_job(opl.load_job(write_job(home)))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+        run = opl.run_job(opl.load_job(write_job(home)))
     deliver(run, home / "out" / "V_SHAPE")
     return run, home
 
@@ -46,6 +50,14 @@ def test_a_page_asks_for_nothing_and_its_policy_forbids_it(good):
     assert "@import" not in page and "url(" not in page[: page.index("</style>")]
 
 
+def test_pictures_drawn_beside_the_verification_are_the_same_to_the_byte(good, monkeypatch):
+    run, home = good
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    other = opl.run_job(opl.load_job(home / "job.yaml"), workers=2)
+    assert other.files == run.files and list(other.files) == list(run.files)
+    assert opl.run_page(other, opl.make_report(other)) == page_of(good)
+
+
 def test_the_page_says_what_the_result_says(good):
     run, page = good[0], page_of(good)
     report = opl.make_report(run)
@@ -55,6 +67,9 @@ def test_the_page_says_what_the_result_says(good):
         f"{report.path.lower_bound_rad:.6f} rad",
         f"{report.cycle.total_s:.3f}",
         *report.program.sha256.values(),
+        *report.inputs.values(),
+        f"made by opl {report.opl}, replayed in {report.verification.engine}",
+        *(f"<td>{part.seconds:.3f}</td>" for part in report.cycle.parts),
     ):
         assert figure in page
     assert "pulse ratios of R, B, T" in page and "wherever the robot stands" in page
@@ -77,6 +92,18 @@ def test_the_trace_is_the_proven_motion(good):
     assert trace["t"][0] is None and trace["pass"][-1] is None
 
 
+def test_charts_are_delivered_as_png_where_asked_for_and_go_with_the_next_run(good, tmp_path):
+    deliver(opl.with_png(good[0]), tmp_path / "out")
+    names = {"V_SHAPE_contact.png", "V_SHAPE_joints.png"}
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    for name in names:
+        content = (tmp_path / "out" / name).read_bytes()
+        assert content[:4] == b"\x89PNG"
+        assert hashlib.sha256(content).hexdigest() == result["program"]["sha256"][name]
+    deliver(good[0], tmp_path / "out")
+    assert names.isdisjoint(path.name for path in (tmp_path / "out").iterdir())
+
+
 def test_what_the_replay_found_least_or_largest_leads_to_its_configuration(good):
     run, page = good[0], page_of(good)
     found, marks = opl.make_report(run).verification, data_of(page)["marks"]
@@ -95,9 +122,9 @@ def test_a_refused_job_begins_where_it_is_blocked(blocked):
     named = re.search(r"cutter points? (\d+)(?: to (\d+))?", blocked.reasons[1])
     assert int(named[1]) <= start["point"] <= int(named[2] or named[1])
     assert "No path: no program was written" in page
-    for line in (*blocked.reasons, *blocked.remedies):
+    for line in (*blocked.reasons, *blocked.remedies, *blocked.in_vain):
         assert line.split(":")[0] in page
-    assert "of these: part and post" in page
+    assert "of these: part and post" in page and "collides with what stands around" in page
 
 
 def test_a_motion_that_the_replay_refuses_begins_at_its_first_finding(tmp_path, monkeypatch):
@@ -172,6 +199,6 @@ def test_the_page_of_a_batch_names_every_job_and_leads_to_their_pages(good, tmp_
         opl.BatchRow(home / "job.yaml", "ok", 0, home / "out/V_SHAPE", "", opl.make_report(run)),
         opl.BatchRow(Path("bad & <b>.yaml"), "bad input", 2, None, "why <not>", None),
     ]
-    page = opl.batch_page(rows, home / "out")
+    page = batch_page(rows, home / "out")
     assert 'href="V_SHAPE/report.html"' in page and "1 of 2 jobs have a program" in page
     assert "bad &amp; &lt;b&gt;.yaml" in page and "why &lt;not&gt;" in page

@@ -29,7 +29,10 @@ def test_a_narrower_wheel_opens_a_trough_and_is_told(tmp_path):
 def test_a_post_before_the_wheel_is_avoided_on_another_side_of_it(tmp_path):
     path = write_job(tmp_path, {"obstacles": [POST]})
     job = load_job(path)
-    told = find_remedies(job, cut_surface(job).points)
+    remedies = find_remedies(job, cut_surface(job).points)
+    told = remedies.found
+    assert "a larger wheel.max_roll_deg: 5 tried, none opens the job" in remedies.in_vain
+    assert not any("another side" in line for line in remedies.in_vain)
     (remedy,) = [line for line in told if "on another side of the wheel" in line]
     # tried from outside: the frame that the remedy names, written into the job
     degrees = float(remedy.split(" degrees round")[0].rsplit(" ", 1)[1])

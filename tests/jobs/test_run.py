@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import opl
+from opl.run.remedies import Remedies
 from opl.run.result import to_json
 from opl.verification.replay import Verification
 from tests.support.jobs import POST, write_job
@@ -18,7 +19,7 @@ QUICK = {"search.method": "recursive"}
 @pytest.fixture(scope="module", autouse=True)
 def _no_pictures():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
+        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
         yield
 
 
@@ -43,7 +44,7 @@ def test_every_stage_reports_from_its_begin_to_its_end(watched):
     stages = [(stage, [f for _, f in part]) for stage, part in groupby(seen, lambda one: one[0])]
     assert [stage.value for stage, _ in stages] == [
         "cutter_points", "nodes", "clearance", "comparison", "search", "comparison", "motion",
-        "verification", "export", "read_back",
+        "verification", "export", "read_back", "export",
     ]  # fmt: skip
     for _, fractions in stages:
         assert fractions[0] == 0.0 and fractions[-1] == 1.0 and fractions == sorted(fractions)
@@ -151,12 +152,14 @@ def refused(run, status, reached, cause):
 
 
 def test_without_a_path_the_comparison_is_reached(tmp_path, monkeypatch):
-    monkeypatch.setattr("opl.run.stages.find_remedies", lambda *arguments: ["a larger wheel"])
+    told = Remedies(("a larger wheel",), ("another width: 6 tried, none opens the job",))
+    monkeypatch.setattr("opl.run.stages.find_remedies", lambda *arguments: told)
     job = opl.load_job(write_job(tmp_path, {**QUICK, "obstacles": [POST]}))
     run = opl.run_job(job)
     report = refused(run, "no_path", opl.Prepared, opl.NoPathError)
     assert report.path is None and report.verification is None and report.fixed is not None
-    assert report.remedies == ("a larger wheel",) and "a larger wheel" in str(run.error)
+    assert report.remedies == told.found and "a larger wheel" in str(run.error)
+    assert report.tried_in_vain == told.in_vain
     assert run.error.exit_status == 3
 
 

@@ -6,6 +6,7 @@ from tempfile import mkdtemp
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial.transform import Rotation
 
 from opl.job.load import load_job
@@ -21,7 +22,7 @@ SHIFT = Rotation.from_rotvec([0.2, -0.3, 0.25], degrees=True)
 @pytest.fixture(scope="module", autouse=True)
 def _no_pictures():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
+        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
         yield
 
 
@@ -106,3 +107,54 @@ def test_file_that_is_no_condition_file_is_refused(tmp_path):
     (tmp_path / "UFRAME.CND").write_text("nothing")
     ended = opl("verify", job, ran() / "out" / "V_SHAPE.JBI", tmp_path / "UFRAME.CND")
     assert ended.status == 2 and "holds no user frame and no tool" in ended.err
+
+
+def test_one_job_per_pass_is_proven_in_order_and_the_load_stands_in_the_tool_data(tmp_path):
+    changes = {
+        **USER,
+        "passes.rows": 2,
+        "program.one_job_per_pass": True,
+        "program.tool": 4,
+        "program.T_flange_tool_mm": np.eye(4).tolist(),
+        "program.at_start": [{"output": 5, "state": True}],
+        "workpiece.density_kg_m3": 7850.0,
+    }
+    job = write_job(tmp_path, changes)
+    ended = opl("run", job, "--out", tmp_path / "out")
+    assert ended.status == 0, ended.err
+    assert "switches the belt" not in ended.out
+    assert "each pass is a job from home to home" in ended.out
+    files = [tmp_path / "out" / f"V_SHAPE{end}.JBI" for end in ("", "00", "01", "02", "03")]
+    master = parse(files[0].read_bytes().decode())
+    assert master.calls == tuple(f"V_SHAPE0{k}" for k in range(4)) and not master.moves
+    assert "'PASS 2 OF 2" in files[3].read_text()
+    assert opl("verify", job, *files).status == 0
+    # passes in another order are not the program
+    swapped = tmp_path / "swapped"
+    swapped.mkdir()
+    for file in files[1:]:
+        (swapped / file.name).write_bytes(file.read_bytes())
+    text = files[0].read_bytes().replace(b"JOB:V_SHAPE01", b"JOB:X")
+    text = text.replace(b"JOB:V_SHAPE02", b"JOB:V_SHAPE01").replace(b"JOB:X", b"JOB:V_SHAPE02")
+    (swapped / "V_SHAPE.JBI").write_bytes(text)
+    assert opl("verify", job, *(swapped / file.name for file in files)).status == 4
+
+    cell = load_job(job).cell
+    solid = trimesh.load(tmp_path / "v_shape.stl")
+    mass = 7850.0 * solid.volume * 1e-9
+    x, y, z = (cell.T_flange_workpiece @ [*solid.center_mass * 1e-3, 1.0])[:3] * 1e3
+    rows = (tmp_path / "out" / "TOOL.CND").read_text().split()
+    assert rows[:3] == ["//TOOL", "4", "///NAME"]
+    np.testing.assert_allclose([float(v) for v in rows[4].split(",")], [x, y, z], atol=2e-3)
+    assert float(rows[5]) == pytest.approx(mass, abs=1e-3)
+    assert f"'PART {mass:.3f} KG" in files[2].read_text()
+
+
+def test_program_that_switches_no_belt_is_cautioned_unless_the_job_says_who_does(tmp_path):
+    switched = write_job(tmp_path, {**USER, "program.belt_switched_by": "the operator"})
+    assert (
+        "caution: nothing in the program switches the belt"
+        in opl("run", write_job(tmp_path / "plain"), "--out", tmp_path / "out").out
+    )
+    ended = opl("run", switched, "--out", tmp_path / "other")
+    assert "the belt is switched by the operator, says the job" in ended.out

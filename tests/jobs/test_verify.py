@@ -47,7 +47,7 @@ HOMES = []
 def _no_pictures():
     """Leave the pictures out: they take longer than the proof."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda planned: {})
+        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
         yield
 
 
@@ -313,6 +313,10 @@ def test_a_shifted_wheel_is_found(tmp_path):
     rows[0][3] += 2.0
     ended = verify(tmp_path, Text(), {"wheel.T_base_contact0_mm": rows})
     assert refuses(ended, "order at cutter point 0")
+    assert "seems" not in ended.out + ended.err  # too far for a shift to be told
+    rows[0][3] -= 1.8
+    ended = verify(tmp_path, Text(), {"wheel.T_base_contact0_mm": rows})
+    assert refuses(ended, "the wheel seems 0.20 mm", "than planned")
 
 
 def test_a_part_two_millimetres_too_big_is_found(tmp_path):

@@ -154,7 +154,7 @@ def test_the_pendant_of_a_ur_is_its_makers_kinematics(tmp_path):
 
 
 def test_the_table_has_the_flange_where_the_pendant_of_a_ur_shows_it(tmp_path, monkeypatch):
-    monkeypatch.setattr("opl.run.stages.draw_charts", lambda planned: {})
+    monkeypatch.setattr("opl.run.stages.draw_charts", lambda *_: {})
     changes = {
         "robot": "ur10e",
         "search.method": "recursive",

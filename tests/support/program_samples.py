@@ -23,10 +23,11 @@ SCALE = PulseScale.of(ROBOT)
 HOME = np.deg2rad([0.0, -20.0, 10.0, 0.0, -60.0, 0.0])
 
 
-def verified_motion(n_passes=2, n_points=4):
+def verified_motion(n_passes=2, n_points=4, home_between=False):
     """Passes of n_points cutter points with one node between the first two of them.
 
-    The approach ends where the grinding begins, so that configuration is given twice.
+    The approach ends where the grinding begins, so that configuration is given twice. On request
+    the robot comes home between passes.
     """
     q, rows = [HOME], [(0.0, MoveKind.HOME, np.nan, np.nan, -1, 0.5)]
 
@@ -38,6 +39,8 @@ def verified_motion(n_passes=2, n_points=4):
         start = np.deg2rad([30.0, 10.0 + k % 7, 0.0, 20.0, -80.0, 40.0])
         before = start + np.deg2rad([0.0, -3.0, 0.0, 0.0, 1.0, 0.0])
         free = MoveKind.LINK if k else MoveKind.HOME
+        if k and home_between:
+            go(HOME, 1.5, free, np.nan, np.nan, k, 0.5)
         go(before, 1.0, free, np.nan, np.nan, k, 0.08)
         go((before + start) / 2, 0.1, MoveKind.APPROACH, np.nan, np.nan, k, 0.03)
         go(start, 0.1, MoveKind.APPROACH, np.nan, np.nan, k, 0.001)

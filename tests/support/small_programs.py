@@ -5,6 +5,7 @@ the S part; and of a bar with an arched top, which is no part that comes with op
 """
 
 import copy
+import json
 import runpy
 import shutil
 import tempfile
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import trimesh
 import yaml
 
 from opl.files.digests import digest
@@ -59,6 +61,7 @@ S_PART = {
 # what attacks take: a controller, and a part
 PROGRAMS = {
     **{name: {"controller": name} for name in ARMS},
+    "KRL straight": {"controller": "KRL", "motion": "straight"},
     "S part": {"controller": "DX200", "part": "s_shape"},
     "arch": {"controller": "DX200", "part": "arch"},
 }
@@ -99,18 +102,21 @@ class SmallProgram:
         return reader_of(self.job).read(files, self.job.cell.robot, self.job.program)
 
 
-def small_program(controller, part="v_shape"):
-    """Return the small program of a controller: of a part that comes with opl, or ``arch``."""
-    return _made(controller, part)
+def small_program(controller, part="v_shape", motion="joint"):
+    """Return the small program of a controller: of a part that comes with opl, or ``arch``.
+
+    Of joint moves, or with straight ones on the wheel.
+    """
+    return _made(controller, part, motion)
 
 
 @cache
-def _made(controller, part):
+def _made(controller, part, motion):
     drawn = stages.draw_charts
-    stages.draw_charts = lambda planned: {}  # pictures take longer than all the rest
+    stages.draw_charts = lambda *_: {}  # pictures take longer than all the rest
     try:
         with tempfile.TemporaryDirectory() as folder:
-            job = _arch() if part == "arch" else _shipped(controller, part, Path(folder))
+            job = _arch() if part == "arch" else _shipped(controller, part, motion, Path(folder))
             run = run_job(job)
     finally:
         stages.draw_charts = drawn
@@ -120,7 +126,7 @@ def _made(controller, part):
     return SmallProgram(job, cut_surface(job).points, run, name, text)
 
 
-def _shipped(controller, part, home):
+def _shipped(controller, part, motion, home):
     robot, home_deg = ARMS[controller]
     keys = {
         "robot": robot,
@@ -135,6 +141,7 @@ def _shipped(controller, part, home):
         # rows this short end where the arms pivot; what is attacked is the file
         "process.max_dwell_s": 10,
         "program.controller": controller,
+        "program.motion": motion,
         **ACTIONS,
     }
     if controller != "DX200":
@@ -152,11 +159,34 @@ def _shipped(controller, part, home):
 
 def _arch():
     """Return the job of the example with a surface from Python, with the actions of the others."""
-    example = runpy.run_path(str(EXAMPLE))
-    content = copy.deepcopy(example["JOB"])
+    content, surface, part = _arched_bar()
     content["passes"].update(end_margin_mm=25, max_chord_error_mm=0.05)
-    content["search"]["max_contact_error_mm"] = 0.1
-    content["search"]["method"] = "recursive"
+    content["search"].update(max_contact_error_mm=0.1, method="recursive")
     for path, value in ACTIONS.items():
         content["program"][path.split(".")[1]] = value
-    return load_job(content, surface=example["arched_top"](), part=example["bar"]())
+    return load_job(content, surface=surface, part=part)
+
+
+def _arched_bar():
+    example = runpy.run_path(str(EXAMPLE))
+    return copy.deepcopy(example["JOB"]), example["arched_top"](), example["bar"]()
+
+
+def write_arch(home):
+    """Write the example with a surface from Python as files, the job searched as by default."""
+    content, surface, part = _arched_bar()
+    home.mkdir(parents=True)
+    net = {
+        "degree_u": surface.degree_u,
+        "degree_v": surface.degree_v,
+        "knots_u": surface.knots_u.tolist(),
+        "knots_v": surface.knots_v.tolist(),
+        "control_points_mm": (1e3 * surface.control_points).tolist(),
+        "weights": surface.weights.tolist(),
+    }
+    (home / "arch.json").write_text(json.dumps(net), encoding="utf-8")
+    trimesh.Trimesh(1e3 * part.vertices, part.faces).export(home / "arch.stl")
+    content["workpiece"] = {"surface": "arch.json", "mesh": "arch.stl", "mesh_unit": "mm"}
+    path = home / "job.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return path

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from opl.errors import InputError
 from opl.files.resources import folder
@@ -108,3 +109,15 @@ def test_the_corners_of_the_v_solid_lie_on_its_surface_but_for_single_precision(
     mesh = load_mesh(folder("workpieces") / "v_shape" / "v_shape.stl", "mm")
     assert np.abs(profile_distance(1e3 * mesh.vertices[:, 1:])).max() < 1e-5
     np.testing.assert_allclose(np.abs(mesh.vertices[:, 0]), 12.5e-3)
+
+
+def test_centre_of_volume_is_that_of_a_pyramid_wherever_it_stands():
+    """A quarter of the height above the base, in the closed form; turned and moved with it."""
+    corners = np.array([[0, 0, 0], [0.3, 0, 0], [0, 0.2, 0], [0, 0, 0.4]], dtype=float)
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    turn = Rotation.from_rotvec([0.3, -0.5, 0.8])
+    for move in (np.zeros(3), np.array([5.0, -3.0, 2.0])):
+        mesh = TriangleMesh(turn.apply(corners) + move, faces)
+        assert mesh.volume == pytest.approx(0.3 * 0.2 * 0.4 / 6.0)
+        wanted = turn.apply([0.075, 0.05, 0.1]) + move
+        np.testing.assert_allclose(mesh.centre_of_volume, wanted, atol=1e-9)

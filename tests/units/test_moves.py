@@ -5,6 +5,7 @@ import pytest
 
 from opl.errors import OplError, UnsafeError
 from opl.motion.motion import MoveKind, TimedMotion, VerifiedMotion
+from opl.program.actions import Actions, Remark
 from opl.program.moves import START_SPEED, Move, Program, plan_moves
 from opl.program.split import split
 from tests.support.program_samples import HOME, JOINT_NAMES, MAX_SPEED, verified_motion, with_times
@@ -184,3 +185,42 @@ def test_pass_too_long_for_a_job_is_refused_with_its_size():
 
 def test_program_without_moves_is_left_alone():
     assert split(Program("EMPTY"), 1) == (Program("EMPTY"),)
+
+
+def by_pass(n_passes, **changes):
+    """Return the parts of a motion that comes home between its passes."""
+    return split(plan(verified_motion(n_passes, home_between=True), **changes), 2000, by_pass=True)
+
+
+@pytest.mark.parametrize("n_passes", [1, 3])
+def test_each_pass_is_a_part_from_home_to_home_on_request(n_passes):
+    program = plan(verified_motion(n_passes, home_between=True))
+    master, *parts = by_pass(n_passes)
+    start, *passes, end = parts
+    assert master.calls == tuple(f"SAMPLE{k:02d}" for k in range(n_passes + 2))
+    assert master.moves == ()
+    assert passes[-1].comments[-1] == f"PASS {n_passes} OF {n_passes}"
+    for part in parts:
+        for move in (part.moves[0], part.moves[-1]):
+            np.testing.assert_array_equal(move.q, HOME)
+            assert move.exact_stop and not move.on_wheel
+        assert part.moves[0].duration is None and part.moves[0].speed == START_SPEED
+    for index, part in enumerate(passes):
+        assert {m.ground_pass for m in part.moves if m.ground_pass is not None} == {index}
+        assert [m.comment for m in part.moves if m.comment] == ["HOME", f"PASS {index + 1}", "HOME"]
+    assert len(start.moves) == len(end.moves) == 1
+    # in order they are the program
+    rest = [*start.moves, *(move for part in passes for move in part.moves[1:])]
+    assert [m.motion_index for m in rest] == [m.motion_index for m in program.moves]
+
+
+def test_what_is_done_at_both_ends_is_in_no_pass_that_could_be_left_out():
+    actions = Actions(*((Remark(word),) for word in ("START", "BEFORE", "AFTER", "END")))
+    _, *parts = by_pass(2, actions=actions)
+    done = [[a.text for m in part.moves for a in m.actions] for part in parts]
+    assert done == [["START"], ["BEFORE", "AFTER"], ["BEFORE", "AFTER"], ["END"]]
+
+
+def test_a_pass_too_long_for_a_job_of_its_own_is_refused():
+    with pytest.raises(OplError, match=r"pass 1 takes \d+ moves, a job holds 5"):
+        split(plan(verified_motion(2, home_between=True)), 5, by_pass=True)

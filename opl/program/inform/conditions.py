@@ -16,7 +16,9 @@ from opl.errors import InputError
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array
 from opl.program.controller import ControllerProfile
+from opl.program.digits import fixed
 from opl.program.inform.cartesian import rectan
+from opl.program.loads import carried
 from opl.program.settings import PositionForm, ProgramSettings
 
 USER_FRAMES, TOOLS = "UFRAME.CND", "TOOL.CND"
@@ -43,12 +45,17 @@ def condition_files(settings: ProgramSettings, profile: ControllerProfile) -> di
             f"////BUSER {_shown(frame.T_base_user, profile)}",
         ]
         files[USER_FRAMES] = "\r\n".join([*lines, ""])
-    if settings.tool:
+    load = carried(settings) or settings.load
+    if settings.tool or load is not None:
+        mass = 0.0 if load is None else load.mass
+        centre = np.zeros(3) if load is None else load.p_flange * 1e3
         lines = [
             f"//TOOL {settings.tool}",
             "///NAME",
             _shown(settings.T_flange_tool, profile),
-            *("0.000,0.000,0.000", "0.000", "0.000,0.000,0.000", "0.000,0,1"),
+            ",".join(fixed(float(value), 3) for value in centre),
+            fixed(mass, 3),
+            *("0.000,0.000,0.000", "0.000,0,1"),
         ]
         files[TOOLS] = "\r\n".join([*lines, ""])
     return files

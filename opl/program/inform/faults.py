@@ -35,6 +35,11 @@ def job_faults(text: str, profile: ControllerProfile) -> tuple[str, ...]:
         job = parse(text)
     except InputError as error:
         return (str(error),)
+    return faults_of(job, text, profile)
+
+
+def faults_of(job: InformJob, text: str, profile: ControllerProfile) -> tuple[str, ...]:
+    """Return what a controller would refuse or misread in the job that a whole file holds."""
     return (
         *_text_faults(text, job),
         *_header_faults(job, profile),

@@ -19,7 +19,7 @@ from opl.program.inform.conditions import (
     condition_files,
     condition_findings,
 )
-from opl.program.inform.faults import job_faults
+from opl.program.inform.faults import faults_of, job_faults
 from opl.program.inform.job import InformJob
 from opl.program.inform.job_layout import VARIABLES
 from opl.program.inform.parse import decode, parse, read_jobs, unparse
@@ -56,7 +56,7 @@ def write_jobs(
     if settings.positions is PositionForm.PULSES:
         require_known(robot)
         require_accepted(robot.unverified_pulses, settings.accepted_pulses)
-    parts = split_for(program, profile)
+    parts = split_for(program, profile, settings.one_job_per_pass)
     clash = settings.actions.calls & {part.name for part in parts}
     if clash:
         raise InputError("program: call", f"{sorted(clash)[0]} is the name of the program itself")
@@ -123,13 +123,13 @@ def describe_file(name: str, content: bytes, robot: Robot) -> list[str]:
     if encoding in _CODE_PAGES:
         lines.append(f"text in {_CODE_PAGES[encoding]}, found by trial; controllers need ASCII")
     for job in jobs:
-        lines += describe(job, robot, _cautions(text if len(jobs) == 1 else unparse(job)))
+        lines += describe(job, robot, _cautions(job, text if len(jobs) == 1 else unparse(job)))
     return lines
 
 
-def _cautions(text: str) -> list[str]:
+def _cautions(job: InformJob, text: str) -> list[str]:
     """Say what is wrong with a job on the controller that finds least wrong with it."""
-    by_name = {profile.name: job_faults(text, profile) for profile in PROFILES.values()}
+    by_name = {profile.name: faults_of(job, text, profile) for profile in PROFILES.values()}
     name, faults = min(reversed(by_name.items()), key=lambda item: len(item[1]))
     shown = [f"caution, on {name}: {fault}" for fault in faults[:_MOST_FAULTS]]
     more = len(faults) - len(shown)

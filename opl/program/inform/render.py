@@ -35,7 +35,9 @@ _STOP_LEVEL = 0
 _FAULTS_SHOWN = 10
 
 
-def split_for(program: Program, profile: ControllerProfile) -> tuple[Program, ...]:
+def split_for(
+    program: Program, profile: ControllerProfile, by_pass: bool = False
+) -> tuple[Program, ...]:
     """Return the jobs of a program, their names legal: one, or a master and the parts it calls.
 
     Raises:
@@ -43,7 +45,7 @@ def split_for(program: Program, profile: ControllerProfile) -> tuple[Program, ..
         OplError: If a pass has more moves than a job can hold.
     """
     program = replace(program, name=short_name(program.name, profile.name_length))
-    return split(program, profile.step_limit, profile.name_length)
+    return split(program, profile.step_limit, profile.name_length, by_pass)
 
 
 def render(

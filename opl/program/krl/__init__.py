@@ -1,8 +1,9 @@
 """KUKA KRL programs (KRC2 and later): written, read back.
 
 Positions stand in the moves, so that no .dat file is needed. What is proven goes through the
-written points; the corners that C_PTP and C_DIS cut off are not. A single joint move may be one
-percent of top speed faster than planned; passes keep their time.
+written points; the corners that C_PTP and C_VEL cut off are not. Moves on the wheel are straight by
+default; a single joint move may be one percent of top speed faster than planned, and passes keep
+their time.
 """
 
 from opl.program.digits import rounded_degrees
@@ -10,12 +11,14 @@ from opl.program.krl.read import CORNERS, DECIMALS, START, parse
 from opl.program.krl.write import DIALECT, VARIABLES, tool_name, write
 from opl.program.listing import listing_reader
 from opl.program.posts import Post
+from opl.program.settings import MotionForm
 
 POST = Post(
     "KUKA KRL",
     write,
     DIALECT.template,
     VARIABLES,
+    motion=MotionForm.STRAIGHT,
     reader=listing_reader(
         DIALECT.suffix, parse, tool_name, rounded_degrees(DECIMALS), lambda robot: START, CORNERS
     ),

@@ -9,9 +9,10 @@ for (const table of document.querySelectorAll("table.sortable")) {
       const down = head.getAttribute("aria-sort") === "ascending";
       for (const other of table.querySelectorAll("[aria-sort]")) other.removeAttribute("aria-sort");
       head.setAttribute("aria-sort", down ? "descending" : "ascending");
-      const value = (row: Element) => row.children[column].getAttribute("data-value") ?? row.children[column].textContent ?? "";
-      const order = (a: Element, b: Element) => value(a).localeCompare(value(b), "en", { numeric: true }) * (down ? -1 : 1);
-      body?.append(...[...body.children].sort(order));
+      const text = (row: Element) => row.children[column].textContent ?? "";
+      const number = (row: Element) => (text(row) === "" || Number.isNaN(Number(text(row))) ? Number.POSITIVE_INFINITY : Number(text(row)));
+      const order = (a: Element, b: Element) => number(a) - number(b) || text(a).localeCompare(text(b), "en", { numeric: true });
+      body?.append(...[...body.children].sort((a, b) => order(a, b) * (down ? -1 : 1)));
     });
   });
 }

@@ -1,7 +1,7 @@
 // The cell in three dimensions: posed, looked at from somewhere, cut open, coloured.
 
 import {
-  AmbientLight, BoxGeometry, BufferAttribute, BufferGeometry, Color, CylinderGeometry, DirectionalLight, DoubleSide, EdgesGeometry, Group, Light, Line,
+  AmbientLight, BufferAttribute, BufferGeometry, Color, DirectionalLight, DoubleSide, EdgesGeometry, Group, Light, Line,
   LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, MeshStandardMaterial, Object3D, PerspectiveCamera, Plane, Points, PointsMaterial, Scene,
   SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
@@ -10,6 +10,7 @@ import { GLTFExporter } from "three/examples/jsm/exporters/GLTFExporter.js";
 import { type Block, colour, type Packed, type Page, type Solid } from "./data";
 
 const RED = 0xd03030;
+const [COARSE, FAST, SLOW, ENOUGH] = [0.5, 20, 40, 6]; // pixels for one of the page, ms of a picture, and how many of them tell
 type Wheel = NonNullable<Page["wheel"]>;
 type Drawn = Mesh<BufferGeometry, MeshLambertMaterial>;
 
@@ -36,19 +37,19 @@ export class CellView {
   private readonly nearest = new Line(new BufferGeometry(), new LineBasicMaterial({ color: RED, depthTest: false }));
   private ghost = new Group();
   private ribbon: Mesh | null = null;
-  private trace: Line | null = null;
+  private trace: LineSegments | null = null;
+  private ends: number[] = []; // of the trace up to each cutter point
   private frames: LineSegments | null = null;
   private red: string[] = [];
   private waiting = false;
   private settling = 0;
-  private readonly moving: number;
+  private moving = COARSE;
+  private pace = 0; // fast pictures less slow ones
+  private before = 0; // when the last one was asked for
   drawn = 0; // pictures made up to now
 
   constructor(private readonly canvas: HTMLCanvasElement, private readonly page: Page, private readonly block: Block) {
     this.renderer = new WebGLRenderer({ canvas, preserveDrawingBuffer: true }); // kept for printing
-    const gl = this.renderer.getContext();
-    const named = gl.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER;
-    this.moving = /swiftshader|llvmpipe|software/i.test(String(gl.getParameter(named))) ? 0.5 : devicePixelRatio;
     this.camera.up.set(0, 0, 1);
     this.scene.add(new AmbientLight(0xffffff, 1.6));
     for (const [x, y, z, much] of [[2, -3, 4, 2.2], [-3, 2, 1, 0.8]]) {
@@ -120,7 +121,7 @@ export class CellView {
   }
 
   ground(upTo: number): void {
-    this.trace?.geometry.setDrawRange(0, Math.max(0, Math.floor(upTo) + 1));
+    this.trace?.geometry.setDrawRange(0, this.ends[Math.floor(upTo)] ?? 0);
   }
 
   // Colours along the passes, three numbers a cutter point; null hides them.
@@ -169,14 +170,20 @@ export class CellView {
     this.draw();
   }
 
-  // In motion fast, where a processor paints even coarse; at rest twice as sharp as the screen.
-  private draw(ratio = this.moving): void {
+  // In motion coarse until pictures prove fast, as with a graphics card; at rest twice as sharp as the screen.
+  private draw(atRest = false): void {
     clearTimeout(this.settling);
-    if (ratio === this.moving) this.settling = setTimeout(() => this.draw(2 * devicePixelRatio), 250);
+    if (!atRest) this.settling = setTimeout(() => this.draw(true), 250);
     if (this.waiting) return;
     this.waiting = true;
-    requestAnimationFrame(() => {
+    requestAnimationFrame((now) => {
       this.waiting = false;
+      const took = now - this.before;
+      this.before = now;
+      if (!atRest && took < 5 * SLOW) this.pace += took < FAST ? 1 : took > SLOW ? -1 : 0;
+      if (this.pace > ENOUGH && this.moving === COARSE) [this.moving, this.pace] = [Math.min(1, devicePixelRatio), 0];
+      if (this.pace < -ENOUGH && this.moving > COARSE) [this.moving, this.pace] = [COARSE, Number.NEGATIVE_INFINITY]; // once and for all
+      const ratio = atRest ? 2 * devicePixelRatio : this.moving;
       if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
       this.renderer.render(this.scene, this.camera);
       this.drawn++;
@@ -198,37 +205,33 @@ export class CellView {
   }
 
   private add(solid: Solid): void {
-    const [geometry, opacity] = [this.geometry(solid), solid.around ? 0.35 : 1];
-    const material = new MeshLambertMaterial({ color: solid.colour, side: DoubleSide, transparent: solid.around, opacity, depthWrite: !solid.around });
-    const mesh = placed(new Mesh(geometry, material), matrix(solid.T));
+    const indexed = new BufferGeometry().setAttribute("position", new BufferAttribute(this.block.array(solid.vertices), 3));
+    const geometry = indexed.setIndex([...this.block.array(solid.faces)]).toNonIndexed(); // so that faces are flat
+    geometry.computeVertexNormals();
+    const opacity = solid.around ? 0.35 : 1;
+    const material = new MeshLambertMaterial({ color: solid.colour, side: DoubleSide, transparent: solid.around, opacity, depthWrite: !solid.around, forceSinglePass: true });
+    const mesh = placed(new Mesh(geometry, material), new Matrix4());
     mesh.userData = { colour: solid.colour, opacity };
     mesh.name = solid.name;
     mesh.add(new LineSegments(new EdgesGeometry(geometry, 25), new LineBasicMaterial({ color: 0x22303c, transparent: true, opacity: 0.4 })));
-    if (solid.kind === "cylinder") mesh.matrix.multiply(new Matrix4().makeRotationX(Math.PI / 2)); // three's stand along y
     (this.joints[solid.joint - 1] ?? this.scene).add(mesh);
     this.bodies.set(solid.name, [...(this.bodies.get(solid.name) ?? []), mesh]);
-  }
-
-  private geometry(solid: Solid): BufferGeometry {
-    const [a, b, c] = solid.size ?? [];
-    if (solid.kind === "box") return new BoxGeometry(a, b, c);
-    if (solid.vertices === undefined || solid.faces === undefined) return new CylinderGeometry(a, a, b, a > 0.08 ? 96 : 32);
-    const mesh = new BufferGeometry().setAttribute("position", new BufferAttribute(this.block.array(solid.vertices), 3));
-    const flat = mesh.setIndex([...this.block.array(solid.faces)]).toNonIndexed();
-    flat.computeVertexNormals();
-    return flat;
   }
 
   private addPasses(points: NonNullable<Page["points"]>): void {
     const places = (packed: Packed) => new BufferAttribute(this.block.array(packed).slice(), 3);
     const pass = this.block.array(points.pass);
-    const faces: number[] = [];
-    for (let k = 0; k + 1 < pass.length; k++) {
-      if (pass[k] === pass[k + 1]) faces.push(2 * k, 2 * k + 1, 2 * k + 2, 2 * k + 1, 2 * k + 3, 2 * k + 2);
+    const [faces, strokes]: number[][] = [[], []];
+    for (let k = 0; k < pass.length; k++) {
+      this.ends.push(strokes.length);
+      if (pass[k] !== pass[k + 1]) continue;
+      faces.push(2 * k, 2 * k + 1, 2 * k + 2, 2 * k + 1, 2 * k + 3, 2 * k + 2);
+      strokes.push(k, k + 1);
     }
     const band = new BufferGeometry().setAttribute("position", places(points.edges)).setIndex(faces);
     this.ribbon = new Mesh(band, new MeshBasicMaterial({ vertexColors: true, side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -2 }));
-    this.trace = new Line(new BufferGeometry().setAttribute("position", places(points.line)), new LineBasicMaterial({ color: RED }));
+    const line = new BufferGeometry().setAttribute("position", places(points.line)).setIndex(strokes);
+    this.trace = new LineSegments(line, new LineBasicMaterial({ color: RED }));
     const triads = new BufferGeometry().setAttribute("position", places(points.triads));
     const hues = [[0.78, 0.06, 0.18], [0.18, 0.49, 0.2], [0.04, 0.31, 0.54]]; // all x axes, then y, then z
     const count = triads.getAttribute("position").count;

@@ -16,7 +16,7 @@ export class ContactChart {
   private readonly field: NonNullable<Page["field"]>;
   private at = { point: 0, position: 0 };
 
-  constructor(private readonly page: Page, block: Block, private readonly chosen: (cell: Cell) => void, told: (text: string) => void) {
+  constructor(private readonly page: Page, block: Block, private readonly chosen: (cell: Cell) => void, describe: (text: string) => void) {
     const field = page.field;
     if (field === null) throw new Error("a chart needs nodes");
     this.field = field;
@@ -24,7 +24,7 @@ export class ContactChart {
     this.arrays = block.all(field);
     this.t = this.arrays.t;
     this.at.position = Math.floor(this.t.length / 2);
-    this.frame.addEventListener("pointermove", (event) => told(this.cell(this.under(event)).text));
+    this.frame.addEventListener("pointermove", (event) => describe(this.cell(this.under(event)).text));
     this.frame.addEventListener("click", (event) => this.choose(this.under(event)));
     this.frame.addEventListener("keydown", (event) => this.move(event));
   }
@@ -65,8 +65,8 @@ export class ContactChart {
     if (point === null || t === null) return;
     const rows = this.t.length;
     const step = rows > 1 ? (this.t[rows - 1] - this.t[0]) / (rows - 1) : 1;
-    mark.style.left = `${(100 * (point + 0.5)) / this.count}%`; // the middle of a cell is half a cell in
-    mark.style.top = `${(100 * (rows - 0.5 - (t - this.t[0]) / step)) / rows}%`;
+    const [across, down] = [(point + 0.5) / this.count, (rows - 0.5 - (t - this.t[0]) / step) / rows]; // half a cell in is its middle
+    mark.style.transform = `translate(${100 * across}%, ${100 * down}%)`;
   }
 
   private under(event: MouseEvent): { point: number; position: number } {

@@ -7,22 +7,17 @@ type Line = { name: string; kind: string; xs: Unpacked; ys: Unpacked };
 const [WIDTH, HEIGHT] = [1000, 120];
 
 export class Curves {
-  private readonly line = Object.assign(document.createElement("div"), { className: "cursor" }); // over all panels
+  private readonly line = Object.assign(document.createElement("div"), { className: "cursor" }); // as wide as the panels, over all of them
 
-  constructor(
-    home: HTMLElement,
-    panels: Panel[],
-    private readonly end: number, // time in s
-    private readonly block: Block,
-    private readonly chosen: (time: number) => void,
-    private readonly told: (text: string) => void,
-  ) {
-    home.replaceChildren(...panels.map((panel) => this.figure(panel)), this.line);
+  constructor(home: HTMLElement, panels: Panel[], private readonly end: number, private readonly block: Block, // end in s
+    private readonly chosen: (time: number) => void, private readonly describe: (text: string) => void) {
+    const ticks = [0, 0.25, 0.5, 0.75, 1].map((part) => `${(part * end).toFixed(1)} s`);
+    home.replaceChildren(...panels.map((panel) => this.figure(panel)), this.line, labels("ends", ticks));
   }
 
   cursor(time: number | null): void {
     this.line.hidden = time === null;
-    this.line.style.left = `${(100 * (time ?? 0)) / (this.end || 1)}%`;
+    this.line.style.transform = `translateX(${(100 * (time ?? 0)) / (this.end || 1)}%)`;
   }
 
   private across(time: number): number {
@@ -31,19 +26,9 @@ export class Curves {
 
   private figure(panel: Panel): HTMLElement {
     const lines = panel.lines.map((line) => ({ name: line.name, kind: line.kind, xs: this.block.array(line.x), ys: this.block.array(line.y) }));
-    let [low, high] = [Number.POSITIVE_INFINITY, Number.NEGATIVE_INFINITY];
-    for (const line of lines.filter(({ kind }) => kind !== "limit")) {
-      for (const y of line.ys) if (!Number.isNaN(y)) [low, high] = [Math.min(low, y), Math.max(high, y)];
-    }
-    if (low > high) [low, high] = [0, 1];
-    const title = `${panel.title}: ${low.toFixed(2)} to ${high.toFixed(2)} ${panel.unit}`;
-    const room = Math.max(high - low, 1e-3);
-    for (const { kind, ys } of lines) { // a limit is shown only where a curve comes near to it
-      if (kind === "limit" && Math.abs(ys[0] - (low + high) / 2) < 1.2 * room) [low, high] = [Math.min(low, ys[0]), Math.max(high, ys[0])];
-    }
-    const margin = 0.06 * Math.max(high - low, 1e-3);
-    const up = (y: number) => HEIGHT - (HEIGHT * (y - low + margin)) / (high - low + 2 * margin);
-    const svg = shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", role: "img", "aria-label": title });
+    const { low, high, caption } = panel;
+    const up = (y: number) => HEIGHT - (HEIGHT * (y - low)) / (high - low);
+    const svg = shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, preserveAspectRatio: "none", role: "img", "aria-label": caption });
     for (const line of lines) {
       const { kind, ys, name } = line;
       const drawn = kind === "range"
@@ -54,14 +39,14 @@ export class Curves {
       drawn.append(tip);
       svg.append(drawn);
     }
-    const caption = Object.assign(document.createElement("figcaption"), { textContent: title });
     const figure = document.createElement("figure");
-    figure.append(caption, svg);
+    const ends = [high, low].map((y) => y.toPrecision(3));
+    figure.append(Object.assign(document.createElement("figcaption"), { textContent: caption }), labels("axis", ends), svg);
     const time = (event: MouseEvent) => {
       const box = svg.getBoundingClientRect();
       return (this.end * Math.max(0, Math.min(box.width, event.clientX - box.left))) / box.width;
     };
-    svg.addEventListener("pointermove", (event) => this.told(this.tell(panel, lines, time(event as MouseEvent))));
+    svg.addEventListener("pointermove", (event) => this.describe(this.text(panel, lines, time(event as MouseEvent))));
     svg.addEventListener("click", (event) => this.chosen(time(event as MouseEvent)));
     return figure;
   }
@@ -78,7 +63,7 @@ export class Curves {
     return d;
   }
 
-  private tell(panel: Panel, lines: Line[], time: number): string {
+  private text(panel: Panel, lines: Line[], time: number): string {
     const parts = lines.filter(({ kind }) => !/limit|range|blame/.test(kind)).map(({ name, kind, xs, ys }) => {
       const k = after(xs, time);
       const part = k > 0 && xs[k] > xs[k - 1] ? (time - xs[k - 1]) / (xs[k] - xs[k - 1]) : 1;
@@ -99,6 +84,12 @@ export function after(times: ArrayLike<number>, time: number): number {
     else high = middle;
   }
   return low;
+}
+
+function labels(className: string, texts: string[]): HTMLElement {
+  const home = Object.assign(document.createElement("div"), { className });
+  home.append(...texts.map((textContent) => Object.assign(document.createElement("span"), { textContent })));
+  return home;
 }
 
 function shape(tag: string, attributes: Record<string, string>): SVGElement {

@@ -8,17 +8,15 @@ export type Unpacked = ReturnType<Block["array"]>;
 export type Unpacking<R> = { [Name in keyof R as R[Name] extends Packed ? Name : never]: Unpacked };
 
 export type Solid = {
-  name: string; robot: boolean; around: boolean; colour: number; T: number[]; kind: "box" | "cylinder" | "mesh";
+  name: string; robot: boolean; around: boolean; colour: number; vertices: Packed; faces: Packed;
   joint: number; // how many joints move it
-  size?: number[]; vertices?: Packed; faces?: Packed;
 };
 
-export interface Panel {
-  title: string;
-  unit: string;
-  lines: { name: string; kind: string; x: Packed; y: Packed }[]; // a "step" line holds from the place before
-  labels?: { codes: Packed; names: string[] };
-}
+// from low to high is shown; a "step" line holds from the place before
+export type Panel = {
+  title: string; unit: string; caption: string; low: number; high: number;
+  lines: { name: string; kind: string; x: Packed; y: Packed }[]; labels?: { codes: Packed; names: string[] };
+};
 
 export interface Page {
   name: string;
@@ -78,10 +76,6 @@ export class Block {
 
 export const degrees = (angle: number): number => (angle * 180) / Math.PI;
 
-export function element<T extends HTMLElement>(id: string): T {
-  const found = document.getElementById(id);
-  if (found === null) throw new Error(`the page lacks #${id}`);
-  return found as T;
-}
+export const element = <T extends HTMLElement>(id: string): T => document.getElementById(id) as T;
 
 export const colour = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

@@ -8,6 +8,7 @@ import { Block, degrees, element, type Mark, type Page, type Unpacking } from ".
 // without q where the arm does not reach
 type Shown = { q: ArrayLike<number> | null; time: number | null; point: number | null; t: number | null; hit: string[]; text: string };
 
+const ROW = 18; // px of a line of a program, as its style has it
 const SPEEDS = [0.25, 0.5, 1, 2, 5, 10, 20];
 
 class Viewer {
@@ -17,8 +18,8 @@ class Viewer {
   private curves: Curves | null = null;
   private readonly motion: Unpacking<NonNullable<Page["motion"]>> | null;
   private readonly near: Unpacking<NonNullable<Page["clearance"]>> | null;
-  private readonly lines = new Map<number, HTMLElement>(); // of the program, by the move they end
-  private now: HTMLElement | undefined;
+  private readonly lines = new Map<number, { row: HTMLElement; at: number }>(); // of the program, by the move they end
+  private now: { row: HTMLElement; at: number } | undefined;
   private readonly end: number;
   private time = 0;
   private playing = 0; // when the last picture was made; 0 at rest
@@ -29,12 +30,12 @@ class Viewer {
     this.near = near && block.all(near);
     this.end = this.motion?.time.at(-1) ?? 0;
     this.view = this.open();
-    this.chart = page.field === null ? null : new ContactChart(page, block, (cell) => this.showCell(cell), tell);
+    this.chart = page.field === null ? null : new ContactChart(page, block, (cell) => this.showCell(cell), hover);
     if (this.motion !== null) this.connectPlayer();
     this.connectControls();
     this.listProgram();
     for (const [id, mark] of Object.entries(page.marks)) {
-      for (const row of document.querySelectorAll(`[data-mark="${id}"]`)) row.addEventListener("click", () => this.showMark(mark));
+      for (const row of document.querySelectorAll(`[data-mark="${id}"]`)) row.addEventListener("click", () => this.showAndScroll(() => this.showMark(mark)));
     }
     if (page.marks.start !== undefined) this.showMark(page.marks.start);
     else if (this.motion !== null) this.showTime(0);
@@ -87,20 +88,28 @@ class Viewer {
   }
 
   private listProgram(): void {
-    const { page: { program }, block } = this;
-    if (program === null) return;
+    const { page, block, motion, page: { program } } = this;
+    if (program === null || motion === null) return;
     const lines = block.array(program.lines);
     program.texts.forEach((packed, file) => {
       const rows = block.text(packed).split(/\r?\n/).map((text) => Object.assign(document.createElement("span"), { textContent: `${text}\n` }));
       for (let k = 0; k < lines.length; k += 3) {
-        const [row, move] = [rows[lines[k + 1] - 1], lines[k + 2]];
+        const [at, move] = [lines[k + 1] - 1, lines[k + 2]];
+        const row = rows[at];
         if (lines[k] !== file || row === undefined) continue;
         row.className = "move";
-        row.addEventListener("click", () => this.motion !== null && this.showTime(this.motion.time[move]));
-        this.lines.set(move, row);
+        row.dataset.at = Number.isNaN(motion.point[move]) ? page.motion?.kinds[motion.kind[move]] : `${motion.pass[move] + 1}: ${motion.point[move].toFixed(2)}`;
+        row.addEventListener("click", () => this.showAndScroll(() => this.showTime(motion.time[move])));
+        this.lines.set(move, { row, at });
       }
       element(`program-${file}`).replaceChildren(...rows);
     });
+  }
+
+  // Show what was chosen elsewhere on the page, with the view in sight.
+  private showAndScroll(show: () => void): void {
+    show();
+    element("cell").scrollIntoView({ block: "nearest" });
   }
 
   // The line of the program that is being played, marked and in sight.
@@ -108,10 +117,10 @@ class Viewer {
     while (move > 0 && !this.lines.has(move)) move--;
     const line = this.lines.get(move);
     if (line === this.now) return;
-    this.now?.classList.remove("now");
+    this.now?.row.classList.remove("now");
     this.now = line;
-    line?.classList.add("now");
-    if (line?.parentElement) line.parentElement.scrollTop = line.offsetTop - line.parentElement.offsetTop - 100;
+    line?.row.classList.add("now");
+    line?.row.parentElement?.scrollTo(0, ROW * (line.at - 5));
   }
 
   // The clearance at the moment of its measure nearest to this one, and its line in the view.
@@ -163,7 +172,7 @@ class Viewer {
     const choice = element<HTMLSelectElement>("curves-of");
     const draw = () => {
       const panels = this.page.curves[choice.value];
-      this.curves = new Curves(element("curves"), panels, this.end, this.block, (time) => this.showTime(time), tell);
+      this.curves = new Curves(element("curves"), panels, this.end, this.block, (time) => this.showTime(time), hover);
       this.curves.cursor(this.shown?.time ?? null);
     };
     choice.addEventListener("change", draw);
@@ -191,6 +200,7 @@ class Viewer {
   }
 
   private connectControls(): void {
+    const download = (href: string, kind: string) => Object.assign(document.createElement("a"), { href, download: `${this.page.name}.${kind}` }).click();
     const speed = element<HTMLInputElement>("speed");
     speed.addEventListener("input", () => write("speed-text", `${SPEEDS[Number(speed.value)]} x`));
     const look = element<HTMLSelectElement>("look");
@@ -201,10 +211,9 @@ class Viewer {
     }
     element<HTMLInputElement>("line").addEventListener("change", () => this.shown?.time != null && this.showTime(this.time));
     element("save").addEventListener("click", async () => {
-      const saved = await this.view?.save();
-      const link = { href: URL.createObjectURL(saved ?? new Blob()), download: `${this.page.name}.glb` };
-      Object.assign(document.createElement("a"), link).click();
+      download(URL.createObjectURL((await this.view?.save()) ?? new Blob()), "glb");
     });
+    element("picture").addEventListener("click", () => download(element<HTMLCanvasElement>("view").toDataURL(), "png"));
     const paint = element<HTMLSelectElement>("paint");
     paint.addEventListener("change", () => this.paintPasses(paint.value));
     this.paintPasses(paint.value);
@@ -221,7 +230,7 @@ class Viewer {
 }
 
 const write = (id: string, text: string) => Object.assign(element(id), { textContent: text });
-const tell = (text: string) => write("hover", text);
+const hover = (text: string) => write("hover", text);
 
 async function start(): Promise<void> {
   const page: Page = JSON.parse(element("page-data").textContent ?? "");

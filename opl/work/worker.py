@@ -1,0 +1,191 @@
+"""A worker: one process that does one task after the other, within limits, and may die.
+
+It is spawned, never forked: the children of a process with threads would inherit their locks. What
+computes is loaded in it only, so that whoever hands out tasks stays small.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from opl.files.apart import end_with_parent
+from opl.files.claiming import release_folders
+from opl.store.values import Outcome, Task
+
+BEAT = 0.1  # [s] between two looks at a task
+GRACE = 0.7  # [s] to leave folders in order
+LISTENS = 5.0  # [s] for a task to hear that it is cancelled
+BUG = 1  # exit status of what ended with an error that is not opl's own
+
+# told how far a task is; returns whether to go on
+Beat = Callable[[str, float], bool]
+
+
+class WorkerDied(Exception):
+    """The process of a worker ended in the middle of a task."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a task may take; None is no limit.
+
+    Attributes:
+        seconds: Time from its beginning.
+        memory: Bytes of data of its process.
+    """
+
+    seconds: float | None = None
+    memory: int | None = None
+
+
+class Worker:
+    """A process for tasks, started when the first comes, and anew after one that it died of.
+
+    Args:
+        limits: What each task may take.
+        warm: Whether it computes something once before its first task, so that all is loaded.
+    """
+
+    def __init__(self, limits: Limits, warm: bool = False) -> None:
+        self._limits = limits
+        self._warm = warm
+        self._process: multiprocessing.process.BaseProcess | None = None
+        self._pipe: Connection | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """The number of its process, None while there is none."""
+        process = self._process
+        return None if process is None or not process.is_alive() else process.pid
+
+    def start(self) -> None:
+        """Start the process and wait until it is ready.
+
+        Raises:
+            WorkerDied: If it does not come up.
+        """
+        if self.pid is not None:
+            return
+        self._drop()
+        context = multiprocessing.get_context("spawn")
+        self._pipe, other = context.Pipe()
+        self._process = context.Process(
+            target=_work, args=(other, self._limits.memory, self._warm), daemon=True
+        )
+        # SIGINT stays blocked in the child until it leaves Ctrl-C to the process that began it
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+        try:
+            self._process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        other.close()
+        self._receive(self._pipe)
+
+    def do(self, task: Task, beat: Beat) -> Outcome | None:
+        """Do a task; return what became of it, None if it was cancelled.
+
+        Args:
+            task: The task.
+            beat: Called again and again meanwhile.
+
+        Raises:
+            WorkerDied: If the process died of it.
+        """
+        self.start()
+        pipe = self._pipe
+        assert pipe is not None
+        began, stage, fraction = time.monotonic(), "", 0.0
+        cancelled_at: float | None = None
+        try:
+            pipe.send(task)
+            while True:
+                if pipe.poll(BEAT):
+                    found = self._receive(pipe)
+                    if not isinstance(found, tuple):
+                        return found
+                    stage, fraction = found
+                now = time.monotonic()
+                most = self._limits.seconds
+                if most is not None and now - began > most:
+                    self.end()
+                    message = f"{task.job}: takes more than the {most:g} s that it may take"
+                    return Outcome("error", BUG, message, final=False)
+                if cancelled_at is None:
+                    if not beat(stage, fraction):
+                        cancelled_at = now
+                        pipe.send(None)
+                elif now - cancelled_at > LISTENS:
+                    self.end()
+                    return None
+        except OSError as error:
+            raise WorkerDied from error
+
+    def end(self) -> None:
+        """End the process, with time to leave its folders in order."""
+        process = self._process
+        if process is not None and process.pid is not None:
+            process.terminate()
+            process.join(GRACE)
+            process.kill()
+            process.join()
+        self._drop()
+
+    def _receive(self, pipe: Connection) -> Outcome | tuple[str, float] | None:
+        try:
+            found: Outcome | tuple[str, float] | None = pipe.recv()
+            return found
+        except (EOFError, OSError) as error:
+            self._drop()
+            raise WorkerDied from error
+
+    def _drop(self) -> None:
+        if self._pipe is not None:
+            self._pipe.close()
+        self._pipe = self._process = None
+
+
+def _work(pipe: Connection, memory: int | None, warm: bool) -> None:
+    """Do what comes through a pipe until it closes: the process of a worker."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _stop)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
+    parent = multiprocessing.parent_process()
+    assert parent is not None and parent.pid is not None, "a worker is started by another process"
+    end_with_parent(parent.pid)
+    from opl.work import doing
+
+    doing.prepare(memory, warm)
+    pipe.send(None)
+    home = Path.cwd()
+    while True:
+        try:
+            task = pipe.recv()
+        except EOFError:
+            os._exit(0)
+        if task is None:  # the task that was cancelled had ended before
+            continue
+        os.chdir(home / task.home)
+        found = doing.do(task, lambda stage, fraction: _told(pipe, stage, fraction))
+        os.chdir(home)
+        pipe.send(found)
+
+
+def _told(pipe: Connection, stage: str, fraction: float) -> bool:
+    """Pass on how far a task is; return whether to go on."""
+    pipe.send((stage, fraction))
+    if pipe.poll():
+        pipe.recv()
+        return False
+    return True
+
+
+def _stop(number: int, frame: object) -> None:
+    release_folders()
+    os._exit(1)  # nothing is raised: libraries of C++ are on the way

@@ -1,0 +1,123 @@
+"""The workbench in FreeCAD itself, against a real service: a command of its own, see .ci/run.
+
+python -m pytest -n 0 tests/freecad/check_workbench.py
+"""
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import opl
+from tests.support.jobs import document
+from tests.support.jobs import opl as command
+from tests.support.serving import serving
+from tests.support.step_parts import write_v_step
+
+WALK = Path(__file__).with_name("walk.py")
+LIMIT = 300.0  # [s] for a walk
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("freecadcmd") is None, reason="freecadcmd is not installed"
+)
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory):
+    """Return a folder with the user data of FreeCAD, the workbench, and the V part as STEP."""
+    home = tmp_path_factory.mktemp("desk")
+    mod = home / ".local" / "share" / "FreeCAD" / "Mod"
+    mod.mkdir(parents=True)
+    assert command("plugin", mod).status == 0
+    write_v_step(home / "v_shape.step")
+    return home
+
+
+@pytest.fixture(scope="module")
+def service(desk):
+    with serving(desk / "store", "--workers", "1") as client:
+        yield client
+
+
+def walked(desk, service, script, program="freecadcmd", **given):
+    """Run a script in FreeCAD; return what it told."""
+    told = desk / "told.json"
+    told.unlink(missing_ok=True)
+    document_path, programs = desk / "walk.FCStd", desk / "programs"
+    document_path.unlink(missing_ok=True)
+    shutil.rmtree(programs, ignore_errors=True)
+    of_v = document()
+    whole = {
+        "address": service._address,
+        "step": str(desk / "v_shape.step"),
+        "document": str(document_path),
+        "programs": str(programs),
+        "told": str(told),
+        "placements": {
+            "ContactFrame": of_v["wheel"]["T_base_contact0_mm"],
+            "Flange": of_v["fixture"]["T_flange_workpiece_mm"],
+        },
+        **given,
+    }
+    quick = {
+        "Rows": 1, "MaxChordError": 0.3, "MaxStep": 20.0, "ContactPositions": 40,
+        "MaxContactStep": 5.0, "MaxContactError": 0.5, "MaxBeltPenetration": 1.0,
+        "Approach": 20.0, "Margin": 2.5, "Home": of_v["process"]["home_deg"],
+        "AcceptUnverifiedPulses": ["R", "B", "T"],
+    }  # fmt: skip
+    whole["properties"] = {**quick, **given.get("properties", {})}
+    ended = subprocess.run(
+        [program, str(script)],
+        env={**os.environ, "HOME": str(desk), "OPL_WALK": json.dumps(whole)},
+        capture_output=True,
+        text=True,
+        timeout=LIMIT,
+    )
+    assert told.is_file(), ended.stdout + ended.stderr
+    seen = json.loads(told.read_text(encoding="utf-8"))
+    assert "failed" not in seen, seen.get("failed")
+    return seen
+
+
+@pytest.fixture(scope="module")
+def walk(desk, service):
+    return walked(desk, service, WALK)
+
+
+def test_a_step_part_becomes_a_program(walk, desk):
+    assert walk["status"] == "ok" and len(walk["faces"]) == 3, walk["message"]
+    assert (desk / "programs" / "V_STEP.JBI").read_bytes().startswith(b"/JOB\r\n//NAME V_STEP\r\n")
+    assert sorted(walk["saved"]) == sorted(map(str, (desk / "programs").iterdir()))
+
+
+def test_its_progress_was_seen(walk):
+    stages = {stage for task, state, stage in walk["states"] if task == "run"}
+    assert {"search", "verification", "export"} <= stages
+    assert {task for task, _, _ in walk["states"]} == {"points", "run"}
+
+
+def test_opl_proves_the_program_for_the_job_that_the_document_keeps(walk, desk, tmp_path):
+    # the files that were sent, taken out of the document's archive
+    import io
+    import zipfile
+
+    with zipfile.ZipFile(desk / "walk.FCStd") as document_file:
+        (inner,) = [name for name in document_file.namelist() if "RunKept" in name]
+        with zipfile.ZipFile(io.BytesIO(document_file.read(inner))) as kept:
+            kept.extractall(tmp_path)
+    job = opl.load_job(tmp_path / "job" / "job.yaml")
+    assert opl.prove_program(job, [desk / "programs" / "V_STEP.JBI"]).proven
+    assert (tmp_path / "V_STEP.JBI").read_bytes() == (desk / "programs" / "V_STEP.JBI").read_bytes()
+
+
+def test_the_document_shows_it_again_when_it_is_opened(walk):
+    status, figures, kept = walk["reopened"]
+    assert status == "ok" and figures == walk["figures"] and "rad" in figures
+    assert {"V_STEP.JBI", "V_STEP_motion.json", "job/part.step", "result.json"} <= set(kept)
+
+
+def test_a_result_older_than_its_job_is_told(walk):
+    assert walk["changed"] == "changed"

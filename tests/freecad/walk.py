@@ -1,0 +1,79 @@
+"""Walks through the workbench in FreeCAD without its window, as a user would; started by a test.
+
+Takes what it needs from the variable OPL_WALK, a JSON object, and writes what it saw to `told`.
+"""
+
+import json
+import os
+import sys
+import traceback
+
+import FreeCAD
+import Part
+from opl_workbench import job_object, running
+from opl_workbench.client import Client
+
+given = json.loads(os.environ["OPL_WALK"])
+told = {}
+
+
+def faces_outside(part):
+    """Return the names of the faces that a user clicks on: flanks and tip."""
+    names = []
+    for number, face in enumerate(part.Shape.Faces, start=1):
+        u, v = (sum(face.ParameterRange[k : k + 2]) / 2.0 for k in (0, 2))
+        normal = face.normalAt(u, v)
+        if abs(normal.x) < 0.5 and normal.z > -0.5:
+            names.append(f"Face{number}")
+    return names
+
+
+def walk():
+    document = FreeCAD.newDocument("Walk")
+    Part.insert(given["step"], document.Name)
+    part = document.Objects[-1]
+    job = job_object.make_job(document, part, faces_outside(part))
+    job.JobName = "V_STEP"
+    for name, rows in given["placements"].items():
+        setattr(job, name, job_object.placement(rows))
+    job.Flange = job.Flange.inverse()  # given as the part in the flange's frame
+    job.Gripper = [stem(document, job)]
+    for name, value in given["properties"].items():
+        setattr(job, name, value)
+    document.recompute()
+
+    states = []
+    client = Client(given["address"])
+    running.plan(job, lambda at: states.append([at.task, at.state, at.stage]), client)
+    told.update(states=states, faces=list(job.Faces[1]), status=job.Status, message=job.Message)
+    told["figures"] = job.Figures
+    if job.Status == "ok":
+        told["saved"] = running.save_programs(job, given["programs"])
+    document.saveAs(given["document"])
+    FreeCAD.closeDocument(document.Name)
+
+    again = FreeCAD.openDocument(given["document"])
+    (job,) = job_object.jobs_of(again)
+    told["reopened"] = [job.Status, job.Figures, sorted(running.kept(job, "RunKept"))]
+    job.Pitch = 4.0
+    again.recompute()
+    told["changed"] = job.Status
+
+
+def stem(document, job):
+    """Return the stem between flange and part, drawn where it holds the part."""
+    stem = document.addObject("Part::Cylinder", "Stem")
+    stem.Radius, stem.Height = 22.0, 100.0
+    stem.Placement = job.Flange
+    document.recompute()
+    return stem
+
+
+try:
+    walk()
+except Exception:
+    told["failed"] = traceback.format_exc()
+with open(given["told"], "w", encoding="utf-8") as file:
+    json.dump(told, file)
+sys.stdout.flush()
+os._exit(0)  # FreeCAD would wait for commands

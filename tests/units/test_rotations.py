@@ -1,0 +1,21 @@
+"""Straight ways between two poses."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from opl.geometry.frames import from_roll_pitch_yaw, rotation_angle
+from opl.geometry.rotations import straight_between
+
+NUMBERS = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6).map(np.array)
+
+
+@settings(deadline=None)
+@given(NUMBERS, NUMBERS, st.floats(0.0, 1.0))
+def test_a_straight_way_shares_line_and_angle_out_in_proportion(one, other, s):
+    start, end = (from_roll_pitch_yaw(values[:3], values[3:]) for values in (one, other))
+    (found,) = straight_between(start, end, np.array([s]))
+    np.testing.assert_allclose(found[:3, 3], (1 - s) * one[3:] + s * other[3:], atol=1e-12)
+    whole = rotation_angle(start, end)
+    np.testing.assert_allclose(rotation_angle(start, found), s * whole, atol=1e-7)
+    np.testing.assert_allclose(rotation_angle(found, end), (1 - s) * whole, atol=1e-7)
