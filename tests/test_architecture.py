@@ -53,14 +53,20 @@ HOMES = {
     "contourpy": {"geometry/section_curves"},
     "OCP": {"geometry/cad"},
     "xacro": {"cell/xacro_file"},
-    "toppra": {"motion/time_law"},
+    "toppra": {"motion/engine"},
     "ompl": {"motion/sampling"},
     "fastapi": {"service"},
     "starlette": {"service"},
     "uvicorn": {"service"},
     "distributed": {"work/cluster"},
     "sqlite3": {"store"},
-    "numba": {"cell/wheel_distance", "search", "motion/fewest", "motion/line_error"},
+    "numba": {
+        "cell/wheel_distance",
+        "cell/separating",
+        "search",
+        "motion/fewest",
+        "motion/line_error",
+    },
 }
 
 # rooms that run inside of other programs, with Python's own library and what the host has

@@ -730,6 +730,8 @@ for _name, _changes in HEADS.items():
         if case.controller not in changes:
             return None
         old, new = changes[case.controller]
+        if "APO.CPTP" in old and "C_PTP" not in case.text:
+            return None  # no corner of the program is of that kind
         return case.text.replace(old, new, 1) if old in case.text else None
 
 

@@ -14,6 +14,7 @@ import pytest
 import opl
 from opl.cell.robot import forward_kinematics
 from opl.files.resources import folder
+from opl.report.drawn import LIFT
 from opl.run.batch_page import batch_page
 from tests.support.jobs import POST, document, write_job, write_trough
 
@@ -142,10 +143,27 @@ def test_the_drawn_robot_is_where_the_motion_is_and_its_point_on_the_wheel(runs,
     times = np.cumsum(run.proven.motion.timed.duration)
     joint = run.surfaced.job.cell.robot
     T_joint_flange = np.array(one.page.evaluate("() => window.opl.page.cell.flange")).reshape(4, 4)
-    for move in np.linspace(1, len(motion) - 1, 6).astype(int):
+    whole = np.flatnonzero(motion.on_wheel & (motion.cutter_point % 1.0 == 0.0))
+    met = 0
+    for move in [*np.linspace(1, len(motion) - 1, 4).astype(int), *whole[[0, len(whole) // 2]]]:
         one.scrub(float(times[move]))
         drawn = one.flange() @ T_joint_flange
         assert np.allclose(drawn, forward_kinematics(joint, motion.q[move]), atol=2e-5)
+        if motion.on_wheel[move] and motion.cutter_point[move] % 1.0 == 0.0:
+            on_part, on_wheel = one.page.evaluate(
+                """(point) => {
+                  const { scene, trace, dot } = window.opl.view;
+                  scene.updateMatrixWorld();
+                  const place = dot.position.clone();
+                  place.fromBufferAttribute(trace.geometry.getAttribute("position"), point);
+                  place.applyMatrix4(trace.matrixWorld);
+                  return [place.toArray(), dot.position.toArray()];
+                }""",
+                int(motion.cutter_point[move]),
+            )
+            assert np.linalg.norm(np.subtract(on_part, on_wheel)) < LIFT + 1e-4
+            met += 1
+    assert met > 0
 
 
 def test_scrubbing_moves_chart_and_curves_together(runs, opened):

@@ -316,7 +316,9 @@ def test_a_shifted_wheel_is_found(tmp_path):
     assert "seems" not in ended.out + ended.err  # too far for a shift to be told
     rows[0][3] -= 1.8
     ended = verify(tmp_path, Text(), {"wheel.T_base_contact0_mm": rows})
-    assert refuses(ended, "the wheel seems 0.20 mm", "than planned")
+    # between written positions the contact is off by up to the allowed 0.1 mm, and so a little here
+    told = re.search(r"the wheel seems (0\.\d\d) mm farther away than planned", ended.err)
+    assert ended.status == 4 and abs(float(told[1]) - 0.2) <= 0.02
 
 
 def test_a_part_two_millimetres_too_big_is_found(tmp_path):

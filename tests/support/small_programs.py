@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import trimesh
 import yaml
 
@@ -95,6 +96,13 @@ class SmallProgram:
         """The proven configurations that are written, one for each move."""
         rows = [move.motion_index for move in self.run.program.moves]
         return self.run.proven.motion.motion.take(rows)
+
+    @property
+    def asked_times(self) -> np.ndarray:
+        """The time in [s] that the feed asks of each of these moves."""
+        rows = [move.motion_index for move in self.run.program.moves]
+        ends = np.cumsum(self.run.proven.motion.timed.duration)[rows]
+        return np.diff(ends, prepend=0.0)
 
     def read(self, text):
         """Read a text as this program is read."""

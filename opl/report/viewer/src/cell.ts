@@ -209,8 +209,8 @@ export class CellView {
     const geometry = indexed.setIndex([...this.block.array(solid.faces)]).toNonIndexed(); // so that faces are flat
     geometry.computeVertexNormals();
     const opacity = solid.around ? 0.35 : 1;
-    const material = new MeshLambertMaterial({ color: solid.colour, side: DoubleSide, transparent: solid.around, opacity, depthWrite: !solid.around, forceSinglePass: true });
-    const mesh = placed(new Mesh(geometry, material), new Matrix4());
+    const material = new MeshLambertMaterial({ color: solid.colour, side: DoubleSide, transparent: solid.around, opacity, depthWrite: !solid.around, forceSinglePass: true, polygonOffset: solid.around, polygonOffsetFactor: 4 });
+    const mesh = placed(new Mesh(geometry, material), matrix(solid.T));
     mesh.userData = { colour: solid.colour, opacity };
     mesh.name = solid.name;
     mesh.add(new LineSegments(new EdgesGeometry(geometry, 25), new LineBasicMaterial({ color: 0x22303c, transparent: true, opacity: 0.4 })));
