@@ -135,13 +135,13 @@ if TYPE_CHECKING:
     from opl.report.arm_view import arm_view as arm_view
     from opl.run.batch import BatchRow as BatchRow
     from opl.run.batch import find_jobs as find_jobs
-    from opl.run.delivery import claim_folder as claim_folder
     from opl.run.delivery import deliver as deliver
     from opl.run.descriptions import cell_figures as cell_figures
     from opl.run.descriptions import describe_cell as describe_cell
     from opl.run.descriptions import describe_job as describe_job
     from opl.run.descriptions import face_figures as face_figures
     from opl.run.exporting import with_png as with_png
+    from opl.run.job_folder import claim_folder as claim_folder
     from opl.run.listings import compare_programs as compare_programs
     from opl.run.listings import describe_program as describe_program
     from opl.run.other_pages import cell_page as cell_page
@@ -206,7 +206,8 @@ _HOMES = {
     "opl.program.ratios": "import_pulse_ratios with_ratios",
     "opl.report.arm_view": "arm_view",
     "opl.run.batch": "BatchRow find_jobs",
-    "opl.run.delivery": "claim_folder deliver",
+    "opl.run.delivery": "deliver",
+    "opl.run.job_folder": "claim_folder",
     "opl.run.exporting": "with_png",
     "opl.run.descriptions": "cell_figures describe_cell describe_job face_figures",
     "opl.run.other_pages": "cell_page",

@@ -120,14 +120,14 @@ def _remove_empty(folders: Sequence[Path]) -> None:
             folder.rmdir()
 
 
-def write_files(folder: Path, texts: Mapping[str, str]) -> list[Path]:
-    """Write texts by file name into a folder, which is made if needed, in one step.
+def write_files(folder: Path, contents: Mapping[str, str] | Mapping[str, bytes]) -> list[Path]:
+    """Write texts or bytes by name into a folder, which is made if needed, in one step.
 
     Raises:
         InputError: If another process holds the folder, or it cannot be written to.
     """
     with claimed(folder) as claim:
-        return claim.switch(texts)
+        return claim.switch(contents)
 
 
 def _missing(place: Path) -> list[Path]:
