@@ -124,11 +124,7 @@ def _made(controller, part, motion):
     stages.draw_charts = lambda *_: {}  # pictures take longer than all the rest
     try:
         with tempfile.TemporaryDirectory() as folder:
-            job = (
-                _arch(controller, motion)
-                if part == "arch"
-                else _shipped(controller, part, motion, Path(folder))
-            )
+            job = _arch() if part == "arch" else _shipped(controller, part, motion, Path(folder))
             run = run_job(job)
     finally:
         stages.draw_charts = drawn
@@ -169,15 +165,11 @@ def _shipped(controller, part, motion, home):
     return load_job(home / "job.yaml")
 
 
-def _arch(controller, motion):
+def _arch():
     """Return the job of the example with a surface from Python, with the actions of the others."""
     content, surface, part = _arched_bar()
     content["passes"].update(end_margin_mm=25, max_chord_error_mm=0.05)
     content["search"].update(max_contact_error_mm=0.1, method="recursive")
-    content["program"].update(controller=controller, motion=motion)
-    if controller != "DX200":
-        content["robot"], home = ARMS[controller]
-        content["process"]["home_deg"] = list(home)
     for path, value in ACTIONS.items():
         content["program"][path.split(".")[1]] = value
     return load_job(content, surface=surface, part=part)
