@@ -4,7 +4,9 @@ A controller takes speeds of few digits, so a move on the wheel may make up for 
 those before it (`opl.program.speeds`). And where a configuration grinds between two cutter points
 is recognised to a fraction of a millimetre only. So the feed is held against the ground point's
 lead over where it would be at the feed: moves that were slow use it up, and at a cutter point,
-which is recognised exactly, nothing but the last digit of a speed may be left of it.
+which is recognised exactly, nothing but the last digit of a speed may be left of it. Where joints,
+the contact's way over the wheel or slow neighbours allow less, the time that moves save is counted
+in the same way: the ratio of two times says nothing of a move as short as places are uncertain.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ import numpy as np
 
 from opl.findings import Finding, Level
 from opl.motion.motion import Motion, MoveKind, Phase, TimedMotion
-from opl.motion.timing import Cause, Timing
+from opl.motion.timing import Timing
 from opl.program.moves import SAME_CONFIGURATION
 from opl.program.played import Playback, ReadMove, SpeedUnit
 from opl.program.posts import PASS_TIME_TOLERANCE
@@ -27,9 +29,6 @@ BETWEEN = 2.5e-4  # [m] the same between two, where places are recognised less w
 # What a move may be off where joints or the contact's way over the wheel limit it, and off the
 # wheel: faster, and slower; times of moves too short to be written go to the next one.
 LIMITED = 1.3
-# The same where nothing but a slow neighbour does: how slow that is depends on places between two
-# cutter points, and on a short move they may be off by as much as it is long.
-BY_NEIGHBOUR = LIMITED**2
 FASTER = 1.05
 SLOWER = 1.5
 
@@ -72,6 +71,7 @@ def _ahead(
     """Look at the moves of a pass, given by their indices."""
     motion = written.motion
     lead = late = 0.0  # of the ground point in [m], negative if it is too early; of the time in [s]
+    saved = 0.0  # [s] by which the moves so far were too fast where not the feed limits them
     for k in moves:
         takes, wanted = float(written.duration[k]), float(requested.timed.duration[k])
         distance = float(requested.surface_distance[k])
@@ -83,8 +83,10 @@ def _ahead(
         lead += takes * (1.0 + AHEAD) * feed - distance
         early, lead = -lead, min(max(lead, -allowed), allowed)
         by_feed = wanted * feed <= distance * (1.0 + AHEAD)
-        limit = BY_NEIGHBOUR if requested.cause[k] is Cause.NEIGHBOUR else LIMITED
-        too_fast = not by_feed and takes + digit < min(aims) / limit
+        # a short move may be off by as much as it is long, many of them by no more than one place
+        slack = allowed / feed
+        saved = max(saved + min(aims) / LIMITED - takes, 0.0)
+        too_fast, saved = not by_feed and saved > slack, min(saved, slack)
         too_slow = takes > max(aims) * LIMITED + digit + BETWEEN / feed
         if too_fast or too_slow or (early > allowed and wanted > FASTER * takes):
             yield _finding(written, playback, k, wanted, "the feed")
