@@ -10,7 +10,7 @@ import traceback
 
 import FreeCAD
 import Part
-from opl_workbench import job_object, running
+from opl_workbench import job_object, motion_object, running
 from opl_workbench.client import Client
 
 given = json.loads(os.environ["OPL_WALK"])
@@ -55,6 +55,14 @@ def walk():
     again = FreeCAD.openDocument(given["document"])
     (job,) = job_object.jobs_of(again)
     told["reopened"] = [job.Status, job.Figures, sorted(running.kept(job, "RunKept"))]
+    motion = motion_object.motion_view_of(job)
+    motion.recompute()
+    told["moments"] = []
+    for part in (0.0, 0.3, 0.5, 1.0):
+        motion_object.show_moment(motion, part * motion.Seconds)
+        a = motion.Part.toMatrix().A
+        pose = [a[4 * k : 4 * k + 4] for k in range(4)]
+        told["moments"].append([motion.Moment, list(motion.Posture), pose, motion.Where])
     job.Pitch = 4.0
     again.recompute()
     told["changed"] = job.Status
