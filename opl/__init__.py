@@ -48,6 +48,7 @@ Many jobs
 Results
     `make_report`       `Run` -> `Report`: the content of ``result.json``
     `deliver`           `Run` -> program, table, pictures, page and ``result.json`` in a folder
+    `with_png`          `Run` -> the same, its charts as PNG too
     `run_page`          `Run` -> its page: HTML that opens from disk; `find_page` finds one
     `claim_folder`      keeps a folder for the run of one job, from before its work
     `release_folders`   of this process, where a signal ends it
@@ -134,12 +135,13 @@ if TYPE_CHECKING:
     from opl.report.arm_view import arm_view as arm_view
     from opl.run.batch import BatchRow as BatchRow
     from opl.run.batch import find_jobs as find_jobs
-    from opl.run.delivery import claim_folder as claim_folder
     from opl.run.delivery import deliver as deliver
     from opl.run.descriptions import cell_figures as cell_figures
     from opl.run.descriptions import describe_cell as describe_cell
     from opl.run.descriptions import describe_job as describe_job
     from opl.run.descriptions import face_figures as face_figures
+    from opl.run.exporting import with_png as with_png
+    from opl.run.job_folder import claim_folder as claim_folder
     from opl.run.listings import compare_programs as compare_programs
     from opl.run.listings import describe_program as describe_program
     from opl.run.other_pages import cell_page as cell_page
@@ -204,7 +206,9 @@ _HOMES = {
     "opl.program.ratios": "import_pulse_ratios with_ratios",
     "opl.report.arm_view": "arm_view",
     "opl.run.batch": "BatchRow find_jobs",
-    "opl.run.delivery": "claim_folder deliver",
+    "opl.run.delivery": "deliver",
+    "opl.run.job_folder": "claim_folder",
+    "opl.run.exporting": "with_png",
     "opl.run.descriptions": "cell_figures describe_cell describe_job face_figures",
     "opl.run.other_pages": "cell_page",
     "opl.run.page": "run_page",

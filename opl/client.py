@@ -162,6 +162,11 @@ class Client:
         found = json.loads(self._ask("GET", f"/v1/jobs?{urllib.parse.urlencode(asked)}"))
         return [_job(one) for one in found["jobs"]]
 
+    def counts(self) -> dict[str, int]:
+        """Return how many jobs there are in each state."""
+        found: dict[str, int] = json.loads(self._ask("GET", "/v1/jobs?most=1"))["counts"]
+        return found
+
     def follow(self, id_: str) -> Iterator[RemoteJob]:
         """Yield a job whenever something of it has changed; with its figures when it has ended."""
         request = self._request("GET", f"/v1/jobs/{id_}/events")

@@ -53,14 +53,14 @@ HOMES = {
     "contourpy": {"geometry/section_curves"},
     "OCP": {"geometry/cad"},
     "xacro": {"cell/xacro_file"},
-    "toppra": {"motion/time_law"},
+    "toppra": {"motion/engine"},
     "ompl": {"motion/sampling"},
     "fastapi": {"service"},
     "starlette": {"service"},
     "uvicorn": {"service"},
     "distributed": {"work/cluster"},
     "sqlite3": {"store"},
-    "numba": {"cell/wheel_distance", "search"},
+    "numba": {"cell/wheel_distance", "cell/separating", "search"},
 }
 
 # rooms that run inside of other programs, with Python's own library and what the host has

@@ -6,7 +6,7 @@ Part against wheel is not checked here: that pair may touch, and has a closed fo
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from copy import copy
 
 import coal
@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from opl.cell.robot import collision_shapes, forward_kinematics
+from opl.cell.separation import Bodies, Separation
 from opl.cell.workcell import (
     PART,
     SECOND_OPINION,
@@ -26,6 +27,8 @@ from opl.geometry.mesh import TriangleMesh, winding_number
 from opl.geometry.shapes import Body, Box, Cylinder
 
 BodyPair = tuple[str, str]
+ROUND_OFF = 1e-6  # [m] of coal: bodies farther apart by more than this do not collide for it
+BLOCK = 4096  # configurations that are looked at in one call
 
 
 class CollisionScene:
@@ -49,6 +52,7 @@ class CollisionScene:
         self._add_bodies(cell)
         self._pairs: list[BodyPair] = []
         self._needed = np.array(self._choose_pairs(cell))
+        self._bodies = Bodies.of(self._model, self._geometry)
         self._margins = self._needed
         self._prepare(self._margins, range(0))
 
@@ -61,13 +65,10 @@ class CollisionScene:
             request.enable_contact = False
             # the default of 1 mm goes on to measure distances of pairs nearly in contact
             request.break_distance = 0.0
-        for index in unchecked:
-            self._geometry_data.deactivateCollisionPair(index)
-        # checks a pair only where the bounding boxes, widened by its margin, overlap; measured
-        # faster here than the managers that sort or nest the boxes
-        self._manager = pin.BroadPhaseManager_NaiveCollisionManager(
-            self._model, self._geometry, self._geometry_data
-        )
+        # coal looks only at pairs that are not certainly farther apart than this
+        self._enough = np.array(margins) + ROUND_OFF
+        self._enough[list(unchecked)] = -np.inf
+        self._separation = self.separation(np.arange(len(margins)))
 
     def for_second_opinion(self) -> CollisionScene:
         """Return the scene with as much more clearance as the replay may find less.
@@ -145,16 +146,30 @@ class CollisionScene:
 
     def collides(self, q: Array) -> np.ndarray:
         """Return which configurations in [rad], shape (n, 6), collide; shape (n,) of bool."""
-        return np.array([self._compute(configuration, True) for configuration in q], dtype=bool)
+        found: np.ndarray = np.zeros(len(q), dtype=bool)
+        for first in range(0, len(q), BLOCK):
+            block = q[first : first + BLOCK]
+            near = self._separation.near(block, self._enough)
+            for k in np.flatnonzero(near.any(axis=1)) if near.any() else ():
+                found[first + k] = any(True for _ in self._hits(block[k], near[k]))
+        return found
 
     def colliding_pairs(self, q: Array) -> list[BodyPair]:
         """Return the names of every pair in collision at one configuration, shape (6,)."""
-        results = self._geometry_data.collisionResults
-        for result in results:
-            result.clear()  # the broad phase leaves those of the pairs it passes over as they were
-        self._compute(q, False)
-        hits = [pair for pair, hit in zip(self._pairs, results, strict=True) if hit.isCollision()]
-        return list(dict.fromkeys(hits))
+        near = self._separation.near(q[None], self._enough)[0]
+        return list(dict.fromkeys(self._pairs[index] for index in self._hits(q, near)))
+
+    def _hits(self, q: Array, near: np.ndarray) -> Iterator[int]:
+        """Yield which of the pairs marked, shape (p,), collide at a configuration."""
+        self.place(q)
+        for index in np.flatnonzero(near).tolist():
+            if pin.computeCollision(self._geometry, self._geometry_data, index):
+                yield index
+
+    def separation(self, indices: np.ndarray) -> Separation:
+        """Return what bounds the distances of some pairs, given by their indices, shape (p,)."""
+        pairs = [self._geometry.collisionPairs[int(index)] for index in indices]
+        return Separation(self._bodies, np.array([(pair.first, pair.second) for pair in pairs]))
 
     @property
     def kept_apart(self) -> np.ndarray:
@@ -189,9 +204,6 @@ class CollisionScene:
         found = self._geometry_data.distanceResults[index]
         places = np.array([found.getNearestPoint1(), found.getNearestPoint2()])
         return transform(self._T_base_world, places)
-
-    def _compute(self, q: Array, stop_at_first: bool) -> bool:
-        return bool(pin.computeCollisions(self._model, self._data, self._manager, q, stop_at_first))
 
     def _add_bodies(self, cell: WorkCell) -> None:
         """Add held bodies at the flange, wheel and obstacles at the base frame."""

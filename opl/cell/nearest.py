@@ -43,20 +43,23 @@ def nearest_pairs(scene: CollisionScene, q: Array) -> Nearest:
     """
     scene = scene.anew()
     kept = scene.kept_apart
-    levers = scene.levers()
-    least = np.full(len(kept), -np.inf)  # what each is at least apart, as far as known
+    separation = scene.separation(kept)
+    least = separation.apart
     distance, chosen = np.full(len(q), np.inf), np.zeros(len(q), dtype=np.intp)
     points = np.zeros((len(q), 2, 3))
     for k, configuration in enumerate(q):
-        if k:
-            least -= levers @ np.abs(configuration - q[k - 1])
+        if not len(kept):
+            break
         scene.place(configuration)
-        for index in least.argsort(kind="stable"):
+        # the pair that was the nearest before is likely to be near still
+        chosen[k] = chosen[k - 1] if k else 0
+        distance[k] = scene.distance(int(kept[chosen[k]]))
+        near = np.flatnonzero(separation.near(configuration[None], np.full(len(kept), distance[k])))
+        for index in near[least[near].argsort(kind="stable")]:
             if least[index] >= distance[k]:
                 break
             least[index] = scene.distance(int(kept[index]))
             if least[index] < distance[k]:
                 distance[k], chosen[k] = least[index], index
-        if np.isfinite(distance[k]):
-            points[k] = scene.nearest_points(int(kept[chosen[k]]))
+        points[k] = scene.nearest_points(int(kept[chosen[k]]))
     return Nearest(distance, chosen, points, tuple(scene.pair(int(index)) for index in kept))

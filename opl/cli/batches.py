@@ -23,6 +23,8 @@ def limits(command: Callable[..., Any]) -> Callable[..., Any]:
     for option in reversed(
         [
             click.option("--workers", type=click.IntRange(min=1), help="Default one per core."),
+            click.option("--scheduler", metavar="ADDRESS",
+                         help="Run on a cluster of Dask, tcp://HOST:PORT."),
             click.option("--time-limit", type=click.FloatRange(min=1.0), metavar="S",
                          help="Seconds that a job may take."),
             click.option("--memory-limit", type=click.IntRange(min=500), metavar="MB",
@@ -35,11 +37,16 @@ def limits(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def settings_of(
-    workers: int | None, time_limit: float | None, memory_limit: int | None, force: bool = False
+    workers: int | None,
+    scheduler: str | None,
+    time_limit: float | None,
+    memory_limit: int | None,
+    force: bool = False,
 ) -> opl.BatchSettings:
     """Return how a batch is run."""
     memory = None if memory_limit is None else memory_limit * 1_000_000
-    return opl.BatchSettings(workers or os.cpu_count() or 1, force, time_limit, memory)
+    count = workers or os.cpu_count() or 1
+    return opl.BatchSettings(count, force, time_limit, memory, scheduler)
 
 
 @click.command()
@@ -58,6 +65,7 @@ def batch(
     paths: tuple[Path, ...],
     out: Path,
     workers: int | None,
+    scheduler: str | None,
     time_limit: float | None,
     memory_limit: int | None,
     log: Path | None,
@@ -101,7 +109,7 @@ def batch(
             click.echo(f"{'unchanged, ' if row.unchanged else ''}{row.status}: {row.job}", err=True)
 
     run_batch = opl.run_batch  # loaded before signals raise
-    settings = settings_of(workers, time_limit, memory_limit, force)
+    settings = settings_of(workers, scheduler, time_limit, memory_limit, force)
     try:
         with stopped_by_raising():
             try:

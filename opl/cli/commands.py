@@ -68,6 +68,7 @@ def main() -> None:
     help="Print the time of each part of the cycle and of each stage too.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print result.json instead of tables.")
+@click.option("--png", is_flag=True, help="Write the charts as PNG too.")
 @click.option("--open", "opened", is_flag=True, help="Open report.html when the run has ended.")
 def run_job(
     job: Path,
@@ -77,6 +78,7 @@ def run_job(
     quiet: bool,
     verbose: bool,
     as_json: bool,
+    png: bool,
     opened: bool,
 ) -> None:
     """Plan, prove and write the program of one job.
@@ -88,7 +90,7 @@ def run_job(
     with opl.claim_folder(folder, loaded.name) as claim:
         with progress_bar(quiet or as_json) as watch:
             run = opl.run_job(loaded, watch, workers or os.cpu_count() or 1)
-        written = opl.deliver(run, claim)
+        written = opl.deliver(opl.with_png(run) if png else run, claim)
     report = opl.make_report(run)
     if as_json:
         click.echo(opl.to_json(report))

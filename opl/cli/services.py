@@ -23,6 +23,9 @@ TOKEN = "OPL_TOKEN"
 @click.option("--port", type=click.IntRange(0, 65535), default=8765, show_default=True,
               help="0 takes one that is free.")  # fmt: skip
 @click.option("--workers", type=click.IntRange(min=1), help="Processes; default one per core.")
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="Do jobs on a cluster of Dask, tcp://HOST:PORT."
+)
 @click.option("--token-file", type=FILE, help=f"File with the token; or in {TOKEN}.")
 @click.option("--time-limit", type=click.FloatRange(min=1.0), default=600.0, show_default=True,
               help="Seconds that a job may take.")  # fmt: skip
@@ -36,6 +39,7 @@ def serve(
     host: str,
     port: int,
     workers: int | None,
+    scheduler: str | None,
     token_file: Path | None,
     time_limit: float,
     memory_limit: int,
@@ -60,6 +64,7 @@ def serve(
         seconds=time_limit,
         memory=memory_limit * 1_000_000,
         most_bytes=max_upload * 1_000_000,
+        scheduler=scheduler,
     )
     opl.serve(settings, lambda address: click.echo(f"opl serves {address}, {address}/docs"))
 
@@ -72,6 +77,7 @@ def watch(
     inbox: Path,
     outbox: Path,
     workers: int | None,
+    scheduler: str | None,
     time_limit: float | None,
     memory_limit: int | None,
     log: Path | None,
@@ -86,7 +92,7 @@ def watch(
     opl.check_folder(outbox)
     log_to(log)
     watch_inbox = opl.watch_inbox  # loaded before signals raise
-    settings = settings_of(workers, time_limit, memory_limit)
+    settings = settings_of(workers, scheduler, time_limit, memory_limit)
 
     def done(row: opl.BatchRow) -> None:
         click.echo(f"{row.status}: {row.job}")

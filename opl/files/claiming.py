@@ -32,26 +32,31 @@ class Claim:
     folder: Path
     place: Path
 
-    def switch(self, texts: Mapping[str, str], leaving: Set[str] = frozenset()) -> list[Path]:
-        """Put texts into the folder by file name, and take other files out of it, in one step.
+    def switch(
+        self, contents: Mapping[str, str | bytes], leaving: Set[str] = frozenset()
+    ) -> list[Path]:
+        """Put files into the folder by name, and take other files out of it, in one step.
 
         Line ends stay as they are. `opl.files.switching` says what one step is.
 
         Args:
-            texts: The texts; the last is the one whose presence says that all are there.
+            contents: Texts or bytes; the last is the one whose presence says that all are there.
             leaving: Names of files that go, if they are there.
 
         Raises:
             InputError: If the folder cannot be written to; it is then whole, with the old
                 files or the new.
         """
-        files = {name: text.encode("utf-8") for name, text in texts.items()}
+        files = {
+            name: content if isinstance(content, bytes) else content.encode("utf-8")
+            for name, content in contents.items()
+        }
         try:
             self.place.mkdir(parents=True, exist_ok=True)  # somebody may have removed it
             switch(self.place, files, leaving)
         except OSError as error:
             raise unwritable(self.folder, error) from error
-        return [self.folder / name for name in texts]
+        return [self.folder / name for name in contents]
 
 
 @contextmanager
@@ -115,14 +120,14 @@ def _remove_empty(folders: Sequence[Path]) -> None:
             folder.rmdir()
 
 
-def write_files(folder: Path, texts: Mapping[str, str]) -> list[Path]:
-    """Write texts by file name into a folder, which is made if needed, in one step.
+def write_files(folder: Path, contents: Mapping[str, str] | Mapping[str, bytes]) -> list[Path]:
+    """Write texts or bytes by name into a folder, which is made if needed, in one step.
 
     Raises:
         InputError: If another process holds the folder, or it cannot be written to.
     """
     with claimed(folder) as claim:
-        return claim.switch(texts)
+        return claim.switch(contents)
 
 
 def _missing(place: Path) -> list[Path]:

@@ -13,9 +13,10 @@ LISTS = frozenset(
     {
         "T_base_contact0_mm", "T_base_user_mm", "T_flange_tool_mm", "T_flange_workpiece_mm",
         "accept_unverified_pulses", "after_pass", "at_end", "at_mm", "at_start", "axle",
-        "before_pass", "bodies", "box_mm", "cylinder_mm", "faces", "front", "home_deg", "joints",
-        "left_edge", "left_side", "max_acceleration_deg_s2", "obstacles", "plane_normal",
-        "right_edge", "right_side", "rim", "rotation_deg", "rx_ry_rz_deg", "xyz_mm",
+        "before_pass", "bodies", "box_mm", "centre_mm", "cylinder_mm", "faces", "front",
+        "home_deg", "joints", "left_edge", "left_side", "max_acceleration_deg_s2", "obstacles",
+        "plane_normal", "right_edge", "right_side", "rim", "rotation_deg", "rx_ry_rz_deg",
+        "xyz_mm",
     }
 )  # fmt: skip
 

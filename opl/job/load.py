@@ -27,6 +27,7 @@ from opl.job.sweeps import with_value
 from opl.job.user_frame import home_in_user_frame
 from opl.job.workpiece import GIVEN
 from opl.motion.process_settings import ProcessSettings
+from opl.program.led import StationaryTool
 from opl.program.settings import ProgramSettings
 
 
@@ -139,7 +140,10 @@ def _in_si(file: JobFile, source: Source, method: str | None,
     home = around.home
     if file.program.positions == "user":
         home = home_in_user_frame(robot, home)
+    at_wheel = StationaryTool(cell.wheel.T_base_contact0, cell.T_flange_workpiece)
     load = file.workpiece.load_in_hand(part, cell.T_flange_workpiece)
+    if file.program.gripper is not None and load is None:
+        raise InputError(source.at("program.gripper"), "goes with workpiece.density_kg_m3")
     return Job(
         source=source,
         name=file.name,
@@ -149,7 +153,5 @@ def _in_si(file: JobFile, source: Source, method: str | None,
         passes=file.passes.in_si(source, surface, cell.wheel.radius),
         search=search,
         process=file.process.in_si(home, file.program.one_job_per_pass),
-        program=file.program.in_si(
-            source, file.name, robot, home, cell.wheel.T_base_contact0, load
-        ),
+        program=file.program.in_si(source, file.name, robot, home, at_wheel, load),
     )

@@ -20,8 +20,10 @@ from opl.job.bodies import Matrix, pose_of
 from opl.job.refusals import keys_named
 from opl.job.source import Source
 from opl.job.user_frame import UserFrameSection
+from opl.job.workpiece import GripperSection
 from opl.program.actions import Actions
 from opl.program.export import try_out
+from opl.program.led import StationaryTool
 from opl.program.posts import Post, find_post, known_posts
 from opl.program.ratios import with_ratios
 from opl.program.settings import (
@@ -138,6 +140,11 @@ class ProgramSection(Document):
         description="Who switches the belt where the program does not, e.g. `the operator`; else "
         "opl asks.",
     )
+    gripper: GripperSection | None = Field(
+        default=None,
+        description="What the gripper weighs. With it and `workpiece.density_kg_m3` programs set "
+        "the load of both together: in TOOL.CND, $LOAD, set_target_payload; RAPID has them apart.",
+    )
     comment: str | None = Field(default=None, description="A line about the program, in its head.")
     at_start: Annotated[list[ActionSection], at_most(500)] = Field(
         default=[], description="Actions at home, before anything else."
@@ -185,7 +192,7 @@ class ProgramSection(Document):
         name: str,
         robot: Robot,
         home: Array,
-        T_base_contact0: Array,
+        at_wheel: StationaryTool,
         load: Load | None,
     ) -> ProgramSettings:
         """Return the settings, tried out on a program that only goes home.
@@ -195,7 +202,7 @@ class ProgramSection(Document):
             name: The program's name.
             robot: Whose program.
             home: Joint positions in [rad], shape (6,).
-            T_base_contact0: Contact frame 0 of the wheel, shape (4, 4).
+            at_wheel: Contact frame 0 of the wheel, and the part in the hand.
             load: The part in the hand, None where nobody says what it weighs.
 
         Raises:
@@ -207,7 +214,7 @@ class ProgramSection(Document):
                 if joint not in robot.joint_names:
                     known = ", ".join(robot.joint_names)
                     raise SettingError("accepted_pulses", f"no such joint {joint!r}; have: {known}")
-            settings = self._settings(source, find_post(self.controller), T_base_contact0, load)
+            settings = self._settings(source, find_post(self.controller), at_wheel, load)
             try:
                 try_out(name, home, robot, settings)
             except SettingError:
@@ -217,9 +224,10 @@ class ProgramSection(Document):
         return settings
 
     def _settings(
-        self, source: Source, post: Post, T_base_contact0: Array, load: Load | None
+        self, source: Source, post: Post, at_wheel: StationaryTool, load: Load | None
     ) -> ProgramSettings:
         levels, tool = self.position_levels, self.T_flange_tool_mm
+        stands = post.knows_stationary_tools and self._form(post) is MotionForm.STRAIGHT
         frame = self.user_frame
         if frame is None and self.positions == "user":
             frame = UserFrameSection.model_validate({})
@@ -229,8 +237,9 @@ class ProgramSection(Document):
             tool=self.tool,
             T_flange_tool=np.eye(4) if tool is None else pose_of(tool),
             motion=self._form(post),
+            stationary=at_wheel if stands else None,
             positions=PositionForm(self.positions),
-            user_frame=None if frame is None else frame.in_si(T_base_contact0),
+            user_frame=None if frame is None else frame.in_si(at_wheel.T_base_tool),
             levels=ByKind(levels.on_wheel, levels.lead, levels.free_move),
             acceleration=self.acceleration_percent.in_si(),
             deceleration=self.deceleration_percent.in_si(),
@@ -238,6 +247,7 @@ class ProgramSection(Document):
             accepted_pulses=tuple(self.accept_unverified_pulses),
             one_job_per_pass=self.one_job_per_pass,
             load=load,
+            gripper=None if self.gripper is None else self.gripper.in_si(),
             belt_switched_by=self.belt_switched_by,
             title=self.comment,
             template=None
@@ -247,8 +257,8 @@ class ProgramSection(Document):
 
     def _require_possible(self, source: Source, post: Post, robot: Robot) -> None:
         """Refuse another maker's arm, and keys that the post would pass over in silence."""
-        straight = self._form(post) is MotionForm.STRAIGHT
-        if (straight or self.positions != "pulses") and self.tool and not self.T_flange_tool_mm:
+        led = self._form(post) is MotionForm.STRAIGHT and not post.knows_stationary_tools
+        if (led or self.positions != "pulses") and self.tool and not self.T_flange_tool_mm:
             raise InputError(
                 source.at(keys.PROGRAM_TOOL_POSE),
                 "positions in a frame and straight moves need the data of tool "

@@ -17,6 +17,7 @@ from opl.geometry.machined import CAD, MESHES, load_machined
 from opl.geometry.mesh import TriangleMesh, load_mesh
 from opl.geometry.passes import MachinedSurface
 from opl.geometry.surface_on_solid import SizeError, check_sizes, facing_inward
+from opl.job.bodies import MM, Triple
 from opl.job.source import Source
 from opl.program.settings import Load
 
@@ -27,6 +28,22 @@ _Id = Annotated[int, between(1, 1_000_000)]
 
 # key of the validation context: what a program gives as a value, ``surface`` or ``part`` or both
 GIVEN = "given"
+
+
+class GripperSection(Document):
+    """What the gripper weighs."""
+
+    model_config = ConfigDict(title="Gripper")
+
+    mass_kg: Annotated[float, between(0.001, 10_000.0)] = Field(
+        description="Mass of the gripper and all else between flange and part.",
+        json_schema_extra={"unit": "kg"},
+    )
+    centre_mm: Triple = Field(description="Its centre of gravity in the flange frame.")
+
+    def in_si(self) -> Load:
+        """Return the load."""
+        return Load(self.mass_kg, np.array(self.centre_mm) * MM)
 
 
 class WorkpieceSection(Document):
@@ -74,7 +91,8 @@ class WorkpieceSection(Document):
     density_kg_m3: Annotated[float, between(1.0, 25_000.0)] | None = Field(
         default=None,
         description="Density of the part: its mass and centre of gravity, from its mesh, are told "
-        "in the program and in the tool data of Yaskawa controllers. The gripper is not in it.",
+        "in the program and where its controller keeps them: TOOL.CND, RAPID's loaddata; with "
+        "`program.gripper` KRL's $LOAD and UR's payload too. FANUC's PAYLOAD is set there.",
         json_schema_extra={"unit": "kg/m3"},
     )
 

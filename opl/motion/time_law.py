@@ -13,12 +13,10 @@ from typing import Any
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
-from toppra.algorithm import TOPPRA
-from toppra.constraint import LinearConstraint
-from toppra.interpolator import AbstractGeometricPath
 
 from opl.errors import TimeLawError, UnsafeError
 from opl.geometry.frames import Array
+from opl.motion.engine import TOPPRA, AbstractGeometricPath, LinearConstraint
 from opl.motion.rounded import SAME_PLACE, RoundedLine
 
 # What a sampled joint speed or acceleration may be beyond its limit, as a fraction: round-off.

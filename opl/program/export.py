@@ -11,6 +11,7 @@ from opl.geometry.frames import Array
 from opl.motion.motion import VerifiedMotion
 from opl.program.cycle import cycle_time
 from opl.program.lines import with_straight_moves
+from opl.program.loads import load_comments
 from opl.program.moves import START_SPEED, Move, Program, Purpose, plan_moves
 from opl.program.posts import find_post
 from opl.program.pulses import PulseScale
@@ -54,14 +55,12 @@ def export_program(
     Raises:
         OplError: If the controller does not take the program with the settings of the job.
     """
-    post = find_post(settings.controller)
+    post, comments = find_post(settings.controller), [*comments, *load_comments(settings)]
     program = plan_moves(
         verified, name, robot.max_speed, comments, robot.joint_names, settings.actions
     )
     if settings.motion is MotionForm.STRAIGHT:
-        program = with_straight_moves(
-            program, robot, settings.T_flange_tool, limit.corners, limit.tolerance
-        )
+        program = with_straight_moves(program, robot, settings.led, limit.corners, limit.tolerance)
     written = post.write(program, robot, settings, date)
     Ts_controller_flange = controller_poses(robot, verified.motion.q)
     table = render_table(verified, written, PulseScale.of(robot), Ts_controller_flange)

@@ -14,8 +14,9 @@ import numpy as np
 from opl.cell.full_turns import nearest_turn
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
-from opl.geometry.frames import Array, inverse, rotation_angle, transform
+from opl.geometry.frames import Array, rotation_angle, transform
 from opl.geometry.rotations import straight_between
+from opl.program.led import Led
 from opl.program.moves import Program, Purpose
 
 _BETWEEN = np.array([0.25, 0.5, 0.75])
@@ -28,18 +29,18 @@ _FURTHEST_TURN = np.deg2rad(20.0)  # of a joint from one to the next on a line: 
 
 
 def with_straight_moves(
-    program: Program, robot: Robot, T_flange_tool: Array, corners: Array, tolerance: float
+    program: Program, robot: Robot, led: Led, corners: Array, tolerance: float
 ) -> Program:
     """Return a program with moves on the wheel and along its normal straight where they may be.
 
     Args:
         program: Joint moves.
         robot: Whose moves.
-        T_flange_tool: The tool whose point runs straight, shape (4, 4).
+        led: What runs straight.
         corners: Corners of a box around the held part in the flange frame in [m], shape (8, 3).
         tolerance: Farthest that any of them may be from the verified path in [m].
     """
-    strays = stray(robot, np.array([move.q for move in program.moves]), T_flange_tool, corners)
+    strays = stray(robot, np.array([move.q for move in program.moves]), led, corners)
     moves = [program.moves[0]] if program.moves else []
     for move, distance in zip(program.moves[1:], strays, strict=True):
         straight = move.kind is not Purpose.AIR and bool(distance <= tolerance)
@@ -47,13 +48,13 @@ def with_straight_moves(
     return replace(program, moves=tuple(moves))
 
 
-def stray(robot: Robot, q: Array, T_flange_tool: Array, corners: Array) -> Array:
+def stray(robot: Robot, q: Array, led: Led, corners: Array) -> Array:
     """Return how far straight moves lead from joint moves between the same configurations.
 
     Args:
         robot: Whose moves.
         q: Configurations in [rad], shape (n, 6).
-        T_flange_tool: The tool whose point runs straight, shape (4, 4).
+        led: What runs straight.
         corners: Points that move along, in the flange frame in [m], shape (k, 3).
 
     Returns:
@@ -62,32 +63,30 @@ def stray(robot: Robot, q: Array, T_flange_tool: Array, corners: Array) -> Array
     start, end = q[:-1], q[1:]
     s = _BETWEEN[:, None, None]
     Ts_joint = forward_kinematics(robot, start + s * (end - start))
-    Ts_start, Ts_end = (forward_kinematics(robot, one) @ T_flange_tool for one in (start, end))
-    Ts_straight = np.stack(
-        [straight_between(Ts_start, Ts_end, np.full(len(start), one)) for one in _BETWEEN]
-    ) @ inverse(T_flange_tool)
+    Ts_start, Ts_end = (led.frames(forward_kinematics(robot, one)) for one in (start, end))
+    Ts_straight = led.flanges(
+        np.stack([straight_between(Ts_start, Ts_end, np.full(len(start), s)) for s in _BETWEEN])
+    )
     apart = transform(Ts_joint[..., None, :, :], corners) - transform(
         Ts_straight[..., None, :, :], corners
     )
     return np.asarray(np.linalg.norm(apart, axis=-1).max(axis=(0, 2)))
 
 
-def straight_configurations(
-    robot: Robot, start: Array, end: Array, T_flange_tool: Array
-) -> Array | None:
+def straight_configurations(robot: Robot, start: Array, end: Array, led: Led) -> Array | None:
     """Return the configurations of a straight move after its start, the last of them its end.
 
     Args:
         robot: Whose move.
         start: Joint positions in [rad], shape (6,).
         end: As start.
-        T_flange_tool: The tool whose point runs straight, shape (4, 4).
+        led: What runs straight.
 
     Returns:
         Joint positions in [rad], shape (k, 6); None if the line leaves the reach, passes through a
         singularity, or ends in another configuration.
     """
-    T_start, T_end = forward_kinematics(robot, np.stack([start, end])) @ T_flange_tool
+    T_start, T_end = led.frames(forward_kinematics(robot, np.stack([start, end])))
     longest = max(
         np.linalg.norm(T_end[:3, 3] - T_start[:3, 3]) / LINE_STEP,
         float(rotation_angle(T_start, T_end)) / LINE_TURN,
@@ -95,9 +94,9 @@ def straight_configurations(
         1.0,
     )
     s = np.arange(1, int(np.ceil(longest)) + 1) / np.ceil(longest)
-    Ts_base_tool = straight_between(T_start, T_end, s)
+    Ts_base_flange = led.flanges(straight_between(T_start, T_end, s))
     guess = start + s[:, None] * (end - start)
-    slots = inverse_kinematics(robot.arm, Ts_base_tool @ inverse(T_flange_tool), guess)
+    slots = inverse_kinematics(robot.arm, Ts_base_flange, guess)
     found, q = [], start
     for candidates in slots:
         turned = nearest_turn(candidates, q)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from opl.program.posts import Reader
 from opl.program.settings import ProgramSettings
 from opl.program.statements import Listing
 
+Declared = Callable[[Sequence[tuple[str, str]], ProgramSettings, Robot], Iterable[tuple[str, str]]]
+
 
 def listing_reader(
     suffix: str,
@@ -33,6 +35,7 @@ def listing_reader(
     rounded: Rounding,
     start: Callable[[Robot], WrittenSpeed],
     corners: Corners,
+    declared: Declared = lambda found, settings, robot: (),
 ) -> Reader:
     """Return the reader of a language whose programs are listings of one file.
 
@@ -44,6 +47,8 @@ def listing_reader(
         rounded: See `Reader`.
         start: The fastest first move.
         corners: The largest corners, whatever the job.
+        declared: Gives place and message of each fault in what a file declares of tools and loads,
+            given place and text of these, the settings of the job and its robot.
     """
 
     def parsed(name: str, content: bytes) -> Listing:
@@ -62,7 +67,9 @@ def listing_reader(
             if called not in settings.actions.calls:
                 message = f"calls {called}, which the job does not call"
                 doubts.append(Finding(Level.ERROR, "program", place, message))
-        playback, faults = play(listing.moves, listing.events, robot, settings.T_flange_tool)
+        for place, message in declared(listing.data, settings, robot):
+            doubts.append(Finding(Level.ERROR, "frame", place, message))
+        playback, faults = play(listing.moves, listing.events, robot, settings.led)
         doubts += faults
         foreign = tuple(dict.fromkeys(called for called, _ in listing.calls))
         return Reading(listing.name, None if doubts else playback, foreign, tuple(doubts))
@@ -133,7 +140,7 @@ def pose_coordinates(values: Sequence[float]) -> tuple[Coordinate, ...]:
 
 def _where(move: ReadMove, robot: Robot) -> Iterator[str]:
     if move.target.shape == (4, 4):
-        yield "in the base frame: " + pose_text(pose_values(move.target))
+        yield f"in {move.frame}: " + pose_text(pose_values(move.target))
         return
     yield angles_text(move.target, robot)
     yield "flange " + pose_text(pose_values(controller_poses(robot, move.target)))

@@ -20,8 +20,9 @@ from opl.cell.full_turns import nearest_turn
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import Robot, forward_kinematics
 from opl.findings import Finding, Level
-from opl.geometry.frames import Array, inverse, rotation_angle
+from opl.geometry.frames import Array, rotation_angle
 from opl.program.events import Event
+from opl.program.led import Led
 from opl.program.lines import straight_configurations
 from opl.program.moves import Purpose
 
@@ -109,8 +110,8 @@ class ReadMove:
     """A move as a file gives it.
 
     Attributes:
-        target: Where it ends: a configuration in [rad], shape (6,), or the pose of the tool in the
-            base frame that the controller counts from, shape (4, 4).
+        target: Where it ends: a configuration in [rad], shape (6,), or the pose that runs straight
+            as the controller counts it, shape (4, 4).
         straight: Whether the tool point runs on a straight line instead of the joints.
         speed: How fast.
         corner: How its end may be rounded.
@@ -122,6 +123,7 @@ class ReadMove:
         starts: Whether a program begins with it, so that nobody knows from where it comes.
         ramps: What it says of speeding up and slowing down, as written; empty where it leaves both
             to the controller.
+        frame: What a pose is counted from, for people.
     """
 
     target: Array
@@ -134,6 +136,7 @@ class ReadMove:
     quarters: tuple[int, ...] = ()
     starts: bool = False
     ramps: str = ""
+    frame: str = "the base frame"
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +178,7 @@ class Reading:
 
 
 def play(
-    moves: Sequence[ReadMove], events: Sequence[Event], robot: Robot, T_flange_tool: Array
+    moves: Sequence[ReadMove], events: Sequence[Event], robot: Robot, led: Led
 ) -> tuple[Playback | None, list[Finding]]:
     """Return what a controller does with moves, and what is in doubt; None if something is.
 
@@ -183,7 +186,7 @@ def play(
         moves: In the order the controller makes them.
         events: What it does besides.
         robot: Whose moves.
-        T_flange_tool: The tool whose point runs straight, shape (4, 4).
+        led: What straight moves lead along lines.
     """
     if not moves:
         return None, [Finding(Level.ERROR, "program", "program", "moves nothing")]
@@ -192,19 +195,19 @@ def play(
     found: list[Finding] = []
     q: Array | None = None
     for move in moves:
-        end = _end(move, q, robot, T_flange_tool)
+        end = _end(move, q, robot, led)
         found += _faults(move, end)
         if end is None:
             continue
         leg: Array | None = end[None]
         if move.straight and q is not None:
-            leg = straight_configurations(robot, q, end, T_flange_tool)
+            leg = straight_configurations(robot, q, end, led)
             if leg is None:
                 message = "the straight move does not lead to the configuration that is written"
                 found.append(_fault(move, message))
                 leg = end[None]
         assert leg is not None
-        time = 0.0 if q is None else move_time(move.speed, q, end, robot, T_flange_tool)
+        time = 0.0 if q is None else move_time(move.speed, q, end, robot, led)
         legs.append(leg)
         times.append(np.full(len(leg), time / len(leg)))
         q = end
@@ -215,13 +218,13 @@ def play(
     return Playback(q_all, times_all, stations, tuple(moves), tuple(events)), []
 
 
-def _end(move: ReadMove, q: Array | None, robot: Robot, T_flange_tool: Array) -> Array | None:
+def _end(move: ReadMove, q: Array | None, robot: Robot, led: Led) -> Array | None:
     """Return the configuration a move ends in: of a pose the one next to where it starts."""
     if move.target.shape != (4, 4):
         return None if np.isnan(move.target).any() else move.target
     if q is None:
         return None
-    T_base_flange = inverse(robot.T_controller_base) @ move.target @ inverse(T_flange_tool)
+    T_base_flange = led.flanges(led.from_counted(move.target, robot))
     (candidates,) = inverse_kinematics(robot.arm, T_base_flange[None], q[None])
     turned = nearest_turn(candidates, q)
     away = np.abs(turned - q).max(axis=1)
@@ -240,9 +243,7 @@ def _faults(move: ReadMove, end: Array | None) -> Iterator[Finding]:
             yield _fault(move, "the quarter turns of its axes are not those of its pose")
 
 
-def move_time(
-    speed: WrittenSpeed, start: Array, end: Array, robot: Robot, T_flange_tool: Array
-) -> float:
+def move_time(speed: WrittenSpeed, start: Array, end: Array, robot: Robot, led: Led) -> float:
     """Return the time of a move in [s], ramps left out."""
     if speed.unit is SpeedUnit.SECONDS:
         return speed.value
@@ -252,7 +253,7 @@ def move_time(
     elif speed.unit is SpeedUnit.LEADING_JOINT:
         distance = float(turned.max())
     else:
-        T_start, T_end = forward_kinematics(robot, np.stack([start, end])) @ T_flange_tool
+        T_start, T_end = led.frames(forward_kinematics(robot, np.stack([start, end])))
         if speed.unit is SpeedUnit.TOOL_POINT:
             distance = float(np.linalg.norm(T_end[:3, 3] - T_start[:3, 3]))
         else:

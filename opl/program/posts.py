@@ -100,6 +100,7 @@ class Post:
         variables: What its templates get: name and meaning.
         counts_pulses: Whether positions may be written in encoder pulses.
         motion: How moves on the wheel are written unless the job says so.
+        knows_stationary_tools: Whether straight moves lead the part past a tool that stands.
         reader: Reads its programs back; None where they are written and not read back.
     """
 
@@ -109,6 +110,7 @@ class Post:
     variables: Mapping[str, str]
     counts_pulses: bool = False
     motion: MotionForm = MotionForm.JOINT
+    knows_stationary_tools: bool = False
     reader: Reader | None = None
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.program.actions import NO_ACTIONS, Actions
+from opl.program.led import HandTool, Led, StationaryTool
 from opl.program.moves import Purpose
 
 
@@ -44,7 +45,7 @@ class UserFrame:
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """What the flange carries in the tool data of a controller.
+    """Something that the flange carries.
 
     Attributes:
         mass: In [kg].
@@ -84,6 +85,8 @@ class ProgramSettings:
         tool: Number of the tool in whose name positions are kept.
         T_flange_tool: That tool as it is set on the controller, shape (4, 4).
         motion: How moves on the wheel are written.
+        stationary: The tool at the wheel past which straight moves lead the part, None where the
+            tool in the hand runs straight.
         positions: How positions are written.
         user_frame: The frame of positions in a user frame.
         levels: How far corners may be rounded where the robot does not stop (PL of a Yaskawa).
@@ -93,6 +96,7 @@ class ProgramSettings:
         accepted_pulses: Joints whose unverified pulse ratios are accepted.
         one_job_per_pass: Whether each pass is a job of its own, called by a master.
         load: The part in the hand, None where nobody says what it weighs.
+        gripper: What holds it, None where nobody says what it weighs.
         belt_switched_by: Who switches the belt if not the program, None where nobody says.
         title: A line about the program, None without one.
         template: The user's own template, None for the one that comes with opl.
@@ -102,6 +106,7 @@ class ProgramSettings:
     tool: int = 0
     T_flange_tool: Array = field(default_factory=lambda: np.eye(4))
     motion: MotionForm = MotionForm.JOINT
+    stationary: StationaryTool | None = None
     positions: PositionForm = PositionForm.PULSES
     user_frame: UserFrame | None = None
     # the finest level that does not stop: a pass must not, or the belt digs in
@@ -112,6 +117,12 @@ class ProgramSettings:
     accepted_pulses: tuple[str, ...] = ()
     one_job_per_pass: bool = False
     load: Load | None = None
+    gripper: Load | None = None
     belt_switched_by: str | None = None
     title: str | None = None
     template: Path | None = None
+
+    @property
+    def led(self) -> Led:
+        """What straight moves lead along lines."""
+        return self.stationary or HandTool(self.T_flange_tool)

@@ -46,6 +46,7 @@ class Listing:
         events: What it does besides moving, in order.
         calls: Names of the programs it calls, with the place of the call.
         doubts: What cannot be followed.
+        data: What it declares of tools and loads, with the place of each.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Listing:
     events: tuple[Event, ...]
     calls: tuple[tuple[str, str], ...]
     doubts: tuple[Finding, ...]
+    data: tuple[tuple[str, str], ...] = ()
 
     @property
     def moves(self) -> tuple[ReadMove, ...]:
@@ -96,6 +98,7 @@ class Notes:
     _events: list[Event] = field(default_factory=list)
     _calls: list[tuple[str, str]] = field(default_factory=list)
     _doubts: list[Finding] = field(default_factory=list)
+    _data: list[tuple[str, str]] = field(default_factory=list)
     _depth: int = 0
     _last_move: int = -1  # counted from 0
 
@@ -106,6 +109,11 @@ class Notes:
     def doubt(self, line: int, message: str) -> None:
         """Note what cannot be followed."""
         self._doubts.append(Finding(Level.ERROR, "program", self.place(line), message))
+
+    def declaration(self, line: int, code: str) -> None:
+        """Note what is declared of a tool or a load."""
+        self._data.append((self.place(line), code))
+        self._note(line, code, None, code)
 
     def setting(self, line: int, code: str) -> None:
         """Note a statement that sets how the robot moves."""
@@ -170,6 +178,7 @@ class Notes:
             tuple(self._events),
             tuple(self._calls),
             tuple(self._doubts),
+            tuple(self._data),
         )
 
     def _note(self, line: int, code: str, move: ReadMove | None, meaning: str) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeAlias
 
 import matplotlib
 import numpy as np
@@ -21,6 +21,8 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from opl.geometry.frames import Array
 
 SIZE = (11.0, 6.0)  # [inch], fills a landscape page
+Picture: TypeAlias = Figure  # drawn, not yet SVG or PNG
+PNG_DPI = 200
 INK, FAINT, RULE = "#22303c", "#5b6670", "#9aa5ae"
 STYLE: dict[Any, Any] = {
     "svg.hashsalt": "opl",
@@ -100,9 +102,19 @@ def draw_pass_borders(axes: Axes, pass_index: np.ndarray) -> None:
         axes.axvline(border + 0.5, color=RULE, linewidth=0.8, zorder=1.5)
 
 
+@house_style()
 def svg(figure: Figure, title: str) -> str:
     """Return the figure as SVG text without date, version or random names."""
     text = io.StringIO()
     metadata = {"Title": title, "Creator": "opl", "Date": None}
     figure.savefig(text, format="svg", metadata=metadata)
     return text.getvalue()
+
+
+@house_style()
+def png(figure: Figure) -> bytes:
+    """Return the figure as PNG, without date or version."""
+    file = io.BytesIO()
+    metadata: dict[str, Any] = {"Software": None}
+    figure.savefig(file, format="png", dpi=PNG_DPI, metadata=metadata)
+    return file.getvalue()

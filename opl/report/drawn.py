@@ -10,7 +10,7 @@ from matplotlib import colormaps
 
 from opl.cell.drawn_cell import DrawnChain, DrawnSolid
 from opl.cell.workcell import PART, WHEEL
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, inverse, transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import ContactWheel
@@ -144,13 +144,15 @@ def _drawn(pieces: Sequence[DrawnSolid], wheels: Collection[str], packer: Packer
     first = pieces[0]
     is_wheel = first.body.name in wheels
     corners, faces = triangles([piece.body for piece in pieces])
+    T = first.body.T_parent_body  # passes and the part alone are drawn in the frame of the part
     return {
         "name": first.body.name,
         "joint": first.joint,
         "robot": first.of_robot,
         "around": _stands_around(first) and not is_wheel,
         "colour": WHEEL_COLOUR if is_wheel else _colour(first),
-        "vertices": packer.floats(corners),
+        "T": flat(T),
+        "vertices": packer.floats(transform(inverse(T), corners)),
         "faces": packer.counts(faces),
     }
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
@@ -27,7 +28,6 @@ from opl.report.canvas import (
     house_style,
     legend_below,
     line_by_pass,
-    svg,
 )
 
 # one per state, free first; they differ in lightness too, for colour-blind eyes and grey printers
@@ -67,7 +67,7 @@ def contact_chart(
     flat_end: float,
     path: GrindingPath,
     held_at: Sequence[float] = (),
-) -> str:
+) -> Figure:
     """Draw what is free at every cutter point and contact position, and the path through it.
 
     Args:
@@ -79,9 +79,6 @@ def contact_chart(
         flat_end: Contact position in belt units where the flat ends.
         path: The path found.
         held_at: Cutter points that keep the joint range sum from being smaller.
-
-    Returns:
-        The picture as SVG text.
     """
     figure = blank_figure(title)
     axes = figure.subplots()
@@ -126,7 +123,7 @@ def contact_chart(
     axes.set_xlabel("cutter point")
     axes.set_ylabel("contact position t\n(mm on the flat, degrees on the edges)")
     legend_below(figure, handles)
-    return svg(figure, title)
+    return figure
 
 
 @house_style()
@@ -137,7 +134,7 @@ def joint_chart(
     path: GrindingPath,
     fixed_q: Array | None,
     pass_index: np.ndarray,
-) -> str:
+) -> Figure:
     """Draw the joint angles along the found path beside those with the contact kept at t = 0.
 
     Args:
@@ -147,9 +144,6 @@ def joint_chart(
         fixed_q: The contact-fixed configuration at each cutter point in [rad], shape (N, 6), or
             None.
         pass_index: Pass of each cutter point, 0, 1, ..., shape (N,).
-
-    Returns:
-        The picture as SVG text.
     """
     figure = blank_figure(title)
     panels = figure.subplots(2, 3, sharex=True)
@@ -179,7 +173,7 @@ def joint_chart(
         axes.set_xlabel("cutter point")
     styles = [FOUND, *([FIXED] if fixed_q is not None else []), *([LIMIT] if limit_seen else [])]
     legend_below(figure, [Line2D([], [], **style) for style in styles])
-    return svg(figure, title)
+    return figure
 
 
 def _state_colour(code: int) -> tuple[float, float, float]:

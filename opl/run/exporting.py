@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from datetime import datetime, timezone
 
 import numpy as np
@@ -18,9 +19,10 @@ from opl.planning.survey import NodeState, NodeSurvey
 from opl.program.export import StraightLimit, export_program
 from opl.program.moves import Program
 from opl.proof.digest import inputs_mark
+from opl.report.canvas import Picture, png, svg
 from opl.report.pictures import contact_chart, joint_chart
 from opl.report.trace import motion_trace
-from opl.run.values import Prepared, Proven
+from opl.run.values import Prepared, Proven, Refused, Run
 
 
 def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
@@ -51,11 +53,29 @@ def _home_moved(job: Job) -> list[str]:
 
 
 def draw_charts(prepared: Prepared, plan: Plan, survey: NodeSurvey) -> Mapping[str, str]:
-    """Return the contact chart and the joint angles, by file name."""
+    """Return the contact chart and the joint angles as SVG, by file name."""
+    charts = _charts(prepared, plan, survey)
+    return {f"{name}.svg": svg(figure, title) for name, title, figure in charts}
+
+
+def with_png(run: Run) -> Run:
+    """Return a run whose charts are delivered as PNG too; a refused one as it is."""
+    if isinstance(run, Refused):
+        return run
+    planned = run.proven.planned
+    charts = _charts(planned.prepared, planned.plan, planned.survey)
+    return replace(run, pictures={f"{name}.png": png(figure) for name, _, figure in charts})
+
+
+def _charts(
+    prepared: Prepared, plan: Plan, survey: NodeSurvey
+) -> Iterator[tuple[str, str, Picture]]:
+    """Yield file name, title and figure of each chart."""
     surfaced, path = prepared.surfaced, plan.path
     job, pass_index = surfaced.job, surfaced.points.pass_index
+    title = f"{job.name}: where the part touches the wheel"
     contact = contact_chart(
-        title=f"{job.name}: where the part touches the wheel",
+        title=title,
         contact_positions=prepared.problem.field.contact_positions,
         states=survey.states,
         state_names=[state.value for state in NodeState],
@@ -64,14 +84,16 @@ def draw_charts(prepared: Prepared, plan: Plan, survey: NodeSurvey) -> Mapping[s
         path=path,
         held_at=[one.place for one in plan.holders],
     )
+    yield f"{job.name}_contact", title, contact
+    title = f"{job.name}: joint angles along the path"
     joints = joint_chart(
-        title=f"{job.name}: joint angles along the path",
+        title=title,
         robot=job.cell.robot,
         path=path,
         fixed_q=prepared.fixed.q,
         pass_index=pass_index,
     )
-    return {f"{job.name}_contact.svg": contact, f"{job.name}_joints.svg": joints}
+    yield f"{job.name}_joints", title, joints
 
 
 def job_date() -> datetime:

@@ -151,7 +151,7 @@ def _slow(report: Report) -> str:
     ]
     heads = ("", "lowest mm/s", "longer s", "dwell s", "why")
     caption = f"slower than the feed of {report.feed.set_mm_s:g} mm/s"
-    return table(caption, heads, rows, [mark for mark, _ in slow_marks(report)])
+    return table(caption, heads, rows, [mark for mark, _ in slow_marks(report)], "reasons")
 
 
 def _frames(job: Job) -> str:

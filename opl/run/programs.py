@@ -17,7 +17,7 @@ from opl.job.refusals import keys_named
 from opl.program.posts import find_post
 from opl.proof.digest import changed_since, digests_in, other_inputs, read_result
 from opl.proof.prove import Proof, prove
-from opl.run.delivery import MOST_RESULT
+from opl.run.job_folder import MOST_RESULT
 from opl.run.listings import read_program
 from opl.run.reporting import replay_report
 from opl.run.result import RESULT, VerificationReport

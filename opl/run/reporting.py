@@ -218,8 +218,8 @@ def _place(one: Extreme | None) -> result.PlaceReport | None:
 
 def _program(written: Written) -> result.ProgramReport:
     return result.ProgramReport(
-        files=list(written.files),
-        sha256={name: digest(text.encode()) for name, text in written.files.items()},
+        files=list(written.contents),
+        sha256={name: digest(content) for name, content in written.contents.items()},
         read_back=written.read_back is not None,
         moves=len(written.program.moves),
         duration_s=round(written.proven.motion.timed.seconds, 3),

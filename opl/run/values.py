@@ -8,7 +8,7 @@ A run ends as `Written` or, wherever it stops, as `Refused`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeAlias
 
@@ -166,6 +166,7 @@ class Written:
         read_back: What was found when the program was read back from its texts; None for languages
             that opl writes, but does not read.
         seconds: Time of each stage in [s].
+        pictures: More files by name that are no texts, only where somebody asked for them.
     """
 
     proven: Proven
@@ -173,11 +174,17 @@ class Written:
     files: Mapping[str, str]
     read_back: FileProof | None
     seconds: Mapping[Stage, float]
+    pictures: Mapping[str, bytes] = field(default_factory=dict)
 
     @property
     def status(self) -> str:
         """``ok``."""
         return "ok"
+
+    @property
+    def contents(self) -> dict[str, bytes]:
+        """All files by name, as their bytes."""
+        return {name: text.encode() for name, text in self.files.items()} | dict(self.pictures)
 
     @property
     def surfaced(self) -> Surfaced:

@@ -10,7 +10,7 @@ from opl.files.digests import digest
 from opl.files.reading import read_bytes
 from opl.job import keys
 from opl.proof.digest import digests_in, read_result
-from opl.run.delivery import MOST_RESULT
+from opl.run.job_folder import MOST_RESULT
 from opl.run.listings import read_program
 from opl.run.result import PAGE, RESULT
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +15,7 @@ from opl.files.reading import MB
 from opl.store.events import tell
 from opl.store.jobs import Store
 from opl.version import VERSION
+from opl.work.cluster import Cluster
 from opl.work.crew import Crew, Doer
 from opl.work.worker import Limits, Worker
 
@@ -36,6 +37,8 @@ class ServiceSettings:
         seconds: Longest time of a job.
         memory: Most bytes of data of a worker.
         most_bytes: Of a request.
+        scheduler: Address of a scheduler of Dask whose workers do the jobs; None for processes
+            here.
     """
 
     folder: Path
@@ -46,6 +49,7 @@ class ServiceSettings:
     seconds: float = 600.0
     memory: int = 3000 * MB
     most_bytes: int = 100 * MB
+    scheduler: str | None = None
 
 
 def serve(settings: ServiceSettings, listening: Callable[[str], None] | None = None) -> None:
@@ -72,7 +76,12 @@ def serve(settings: ServiceSettings, listening: Callable[[str], None] | None = N
     with claimed(settings.folder):  # by one service
         store = Store(settings.folder / STORE)
         limits = Limits(settings.seconds, settings.memory)
-        doers: list[Doer] = [Worker(limits, warm=True) for _ in range(settings.workers)]
+        doers: Sequence[Doer]
+        if settings.scheduler is not None:
+            cluster = Cluster(settings.scheduler)
+            doers = cluster.doers(limits, cluster.threads)
+        else:
+            doers = [Worker(limits, warm=True) for _ in range(settings.workers)]
         with _bound(settings.host, settings.port) as listener:
             app = make_app(store, Crew(store, doers), settings.token, settings.most_bytes)
             config = uvicorn.Config(

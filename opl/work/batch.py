@@ -9,22 +9,23 @@ from pathlib import Path
 
 from opl.errors import InputError
 from opl.files.claiming import clear_after_others
-from opl.files.reading import MB, read_bytes
+from opl.files.reading import read_bytes
 from opl.files.writing import write_file
 from opl.job.files import Digests
 from opl.run.batch import BatchRow
 from opl.run.batch_page import batch_page
+from opl.run.job_folder import MOST_RESULT
 from opl.run.result import PAGE, read_report
 from opl.store.jobs import Store
 from opl.store.made import changed_files
 from opl.store.values import State, StoredJob
+from opl.work.cluster import Cluster
 from opl.work.crew import Crew, Doer
 from opl.work.wanted import Wanted, ask, wanted_jobs
 from opl.work.worker import BUG, Limits, Worker
 
 STORE = "opl-jobs.sqlite"
 LOOK = 0.3  # [s] between two looks at jobs that others work on
-MOST_RESULT = 20 * MB
 
 
 @dataclass(frozen=True)
@@ -36,12 +37,15 @@ class BatchSettings:
         force: Run all jobs, unchanged ones too.
         seconds: Longest time of a job, None for no limit.
         memory: Most bytes of data of a worker, None for no limit.
+        scheduler: Address of a scheduler of Dask whose workers run the jobs; None for processes
+            here.
     """
 
     workers: int = 1
     force: bool = False
     seconds: float | None = None
     memory: int | None = None
+    scheduler: str | None = None
 
 
 def run_batch(
@@ -130,7 +134,15 @@ class _Batch:
                     return replace(claimed, task=wanted.task)
             return None
 
-        crew = Crew(self._store, self._doers(len(jobs)), pick, ended.put)
+        limits = Limits(self._settings.seconds, self._settings.memory)
+        scheduler = self._settings.scheduler
+        cluster = None if scheduler is None else Cluster(scheduler)
+        doers: Sequence[Doer]
+        if cluster is not None:
+            doers = cluster.doers(limits, len(jobs))
+        else:
+            doers = [Worker(limits) for _ in range(min(self._settings.workers, len(jobs)))]
+        crew = Crew(self._store, doers, pick, ended.put)
         rows = []
         crew.start()
         try:
@@ -154,6 +166,8 @@ class _Batch:
                     tell(row)
         finally:
             crew.end()
+            if cluster is not None:
+                cluster.close()
             clear_after_others(self._out)
         return rows
 
@@ -167,10 +181,6 @@ class _Batch:
 
     def _submit(self, wanted: Wanted, again: bool = False) -> None:
         self._store.submit(wanted.id, wanted.target, wanted.name, wanted.task, again)
-
-    def _doers(self, jobs: int) -> list[Doer]:
-        limits = Limits(self._settings.seconds, self._settings.memory)
-        return [Worker(limits) for _ in range(min(self._settings.workers, jobs))]
 
     def _newer(self, wanted: Wanted) -> Wanted | None:
         """Return what a job is now, if its files were changed while it was run."""

@@ -11,7 +11,7 @@ from opl.errors import OplError
 from opl.store.events import tell
 from opl.store.jobs import Store
 from opl.store.values import Outcome, State, StoredJob, Task
-from opl.work.worker import Beat, WorkerDied
+from opl.work.worker import BUG, Beat, WorkerDied
 
 IDLE = 0.5  # [s] between two looks for work, unless somebody says that there is some
 SAID = 0.4  # [s] between two words about progress
@@ -126,6 +126,11 @@ class Crew:
                 if (found := self._store.get(job.id)) is None or found.state is State.FAILED:
                     self._ended(job.id)
             return
+        except OplError:  # of the store
+            raise
+        except Exception as error:  # a bug, which must not end the thread for all other jobs
+            message = f"{type(error).__name__}: {error} (a bug of opl)"
+            outcome = Outcome("error", BUG, message, final=False)
         if self._stop.is_set() and outcome is None:
             self._store.give_back(job.id)
             return

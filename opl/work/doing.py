@@ -17,8 +17,9 @@ from opl.files.confining import confine_to
 from opl.files.resources import folder
 from opl.geometry.faces import list_faces
 from opl.job.load import Job, load_job
-from opl.run.delivery import claim_folder, deliver
+from opl.run.delivery import deliver
 from opl.run.descriptions import describe_job, face_figures
+from opl.run.job_folder import claim_folder
 from opl.run.points import cell_file, points_files, report_points
 from opl.run.programs import prove_program
 from opl.run.result import RESULT, to_json

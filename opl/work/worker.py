@@ -1,16 +1,19 @@
 """A worker: one process that does one task after the other, within limits, and may die.
 
-It is spawned, never forked: the children of a process with threads would inherit their locks. What
-computes is loaded in it only, so that whoever hands out tasks stays small.
+It is a new process, no copy: that of one with threads would inherit their locks. What computes is
+loaded in it only, so that whoever hands out tasks stays small.
 """
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
+import socket
+import subprocess
+import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -20,6 +23,15 @@ from opl.files.claiming import release_folders
 from opl.store.values import Outcome, Task
 
 BEAT = 0.1  # [s] between two looks at a task
+# what the process does first: the same modules as here, nothing of the folder that it stands in
+_CHILD = """
+import sys
+from multiprocessing.connection import Connection
+pipe = Connection(int(sys.argv[1]))
+sys.path[:] = pipe.recv()
+from opl.work.worker import work
+work(pipe, int(sys.argv[2]))
+"""
 GRACE = 0.7  # [s] to leave folders in order
 LISTENS = 5.0  # [s] for a task to hear that it is cancelled
 BUG = 1  # exit status of what ended with an error that is not opl's own
@@ -56,14 +68,14 @@ class Worker:
     def __init__(self, limits: Limits, warm: bool = False) -> None:
         self._limits = limits
         self._warm = warm
-        self._process: multiprocessing.process.BaseProcess | None = None
+        self._process: subprocess.Popen[bytes] | None = None
         self._pipe: Connection | None = None
 
     @property
     def pid(self) -> int | None:
         """The number of its process, None while there is none."""
         process = self._process
-        return None if process is None or not process.is_alive() else process.pid
+        return None if process is None or process.poll() is not None else process.pid
 
     def start(self) -> None:
         """Start the process and wait until it is ready.
@@ -74,18 +86,21 @@ class Worker:
         if self.pid is not None:
             return
         self._drop()
-        context = multiprocessing.get_context("spawn")
-        self._pipe, other = context.Pipe()
-        self._process = context.Process(
-            target=_work, args=(other, self._limits.memory, self._warm), daemon=True
-        )
-        # SIGINT stays blocked in the child until it leaves Ctrl-C to the process that began it
+        ours, theirs = socket.socketpair()
+        command = [sys.executable, "-I", "-c", _CHILD, str(theirs.fileno()), str(os.getpid())]
+        # blocked in the child until it leaves Ctrl-C to the process that began it
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
-            self._process.start()
+            self._process = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, pass_fds=[theirs.fileno()]
+            )
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-        other.close()
+            theirs.close()
+        self._pipe = Connection(ours.detach())
+        # whole names: the process goes to the folders of jobs, where strangers put what they like
+        self._pipe.send([os.path.abspath(place) for place in sys.path])
+        self._pipe.send((self._limits.memory, self._warm))
         self._receive(self._pipe)
 
     def do(self, task: Task, beat: Beat) -> Outcome | None:
@@ -129,12 +144,10 @@ class Worker:
 
     def end(self) -> None:
         """End the process, with time to leave its folders in order."""
-        process = self._process
-        if process is not None and process.pid is not None:
-            process.terminate()
-            process.join(GRACE)
-            process.kill()
-            process.join()
+        if self._process is not None:
+            self._process.terminate()
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(GRACE)
         self._drop()
 
     def _receive(self, pipe: Connection) -> Outcome | tuple[str, float] | None:
@@ -148,20 +161,21 @@ class Worker:
     def _drop(self) -> None:
         if self._pipe is not None:
             self._pipe.close()
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
         self._pipe = self._process = None
 
 
-def _work(pipe: Connection, memory: int | None, warm: bool) -> None:
+def work(pipe: Connection, parent: int) -> None:
     """Do what comes through a pipe until it closes: the process of a worker."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _stop)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
-    parent = multiprocessing.parent_process()
-    assert parent is not None and parent.pid is not None, "a worker is started by another process"
-    end_with_parent(parent.pid)
+    end_with_parent(parent)
     from opl.work import doing
 
-    doing.prepare(memory, warm)
+    doing.prepare(*pipe.recv())
     pipe.send(None)
     home = Path.cwd()
     while True:

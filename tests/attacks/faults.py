@@ -57,9 +57,9 @@ class Case:
 
     @property
     def middle(self):
-        """A move to a cutter point in the middle of the first pass, amid others on the wheel."""
+        """A move in the middle of the first pass, amid others on the wheel; to a cutter point."""
         own = [k for k in self.on_wheel if self.passes[k] == self.passes[self.on_wheel[0]]]
-        inner = [k for k in own[1:-1] if self.labels[k] == "GRIND" and k > own[0] + 1]
+        inner = [k for k in own[2:-1] if self.labels[k] == "GRIND"] or own[2:-1]
         return inner[len(inner) // 2]
 
     @property
@@ -182,6 +182,22 @@ def _(case):
     for move in script.moves:
         move.target[0] = case.language.degrees(move.target[0], 0.1, 0)
     return case.render(script)
+
+
+for _percent in (0.01, 0.02, 0.05, 0.1, 1.0):
+    for _axis in range(6):
+
+        @kind("ratio", f"the ratio of axis {_axis + 1} wrong by {_percent:g} %")
+        def _(case, axis=_axis, factor=1.0 + 0.01 * _percent):
+            # a controller that counts so many more to a turn: all numbers of the axis are so larger
+            script = case.script.copy()
+            if any(move.word == "LIN" for move in script.moves):
+                return None  # its controller makes joint angles of poses
+            for move in script.moves:
+                number = move.target[axis]
+                decimals = len(number.partition(".")[2])
+                move.target[axis] = f"{float(number) * factor:.{decimals}f}"
+            return case.render(script)
 
 
 for _name, _place in (("start", 0), ("end", -1)):
@@ -714,6 +730,8 @@ for _name, _changes in HEADS.items():
         if case.controller not in changes:
             return None
         old, new = changes[case.controller]
+        if "APO.CPTP" in old and "C_PTP" not in case.text:
+            return None  # no corner of the program is of that kind
         return case.text.replace(old, new, 1) if old in case.text else None
 
 

@@ -28,12 +28,12 @@ from opl.verification.replay import Verification
 from tests.attacks.faults import KINDS, Case
 from tests.support.small_programs import PROGRAMS, small_program
 
-# what a fault may do and not be seen: the part of a millimetre that a ground point is elsewhere,
-# and the part of a time that a move or a pass takes more or less
-CONTACT = 1e-4  # [m]
-PLACE = 2.5e-4  # [m] along the pass, between two cutter points, at a contact that is kept
-SPEED = 0.02  # of a pass
+# what a fault may do and not be seen: how far a ground point is moved, in any direction, and the
+# part of its time that a pass takes more or less than the job asks for
+PLACE = 1e-4  # [m]
+SPEED = 0.02
 WORDS = ("caught", "below", "missed", "proven", "refused", "-")
+ALL_KINDS = tuple(KINDS.values())
 NOTHING = Verification("", 0, 0, 0.0, 0.0, 0, (), None)
 
 
@@ -41,15 +41,24 @@ INTRODUCTION = """# Faults that are caught, and what cannot be
 
 Written by `python -m tests.attacks.inject --write docs/faults.md`, which puts each of these faults
 into small programs of every language, as somebody with an editor would, and holds the file against
-its job as `opl verify` does. DX200 to URSCRIPT are rows of the V part on an arm of the maker, then
-rows of the S part, and of a bar that does not come with opl.
+its job as `opl verify` does. DX200 to URSCRIPT are rows of the V part on an arm of the maker, in
+joint moves, KRL straight the same in straight ones; then rows of the S part, and of a bar with an
+arched top that does not come with opl.
 
 - **caught** (by what): refused, or not proven. **-**: the language has no place for it.
-- **below**: what it does is less than is resolved, so the program is proven as it stands: the
-  contact stays within the limit of the job (0.1 mm here), a ground point that is no cutter point
-  is less than 0.25 mm from where it was along its pass, or the time of a pass is within 2 %, that
-  of a move within its last digit and 0.25 mm of the feed (where joints limit it, 1.3 times).
+- **below**: what it does is less than is resolved, so the program is proven as it stands. In mm:
+  so far the ground point is moved where the fault is, less than 0.1 mm, the contact limit of these
+  jobs. In % of a pass: so much the time of the pass is off what the job asks for, 2 % at the most,
+  because speeds of few digits are off by nearly as much; a single move may be 1.3 times as slow or
+  as fast where others make up for it, and 0.25 mm ahead of the feed, since places between two
+  cutter points are recognised less well than the points. "Straight, and replayed so": the other
+  way of the move was replayed in the cell, and is free and on the contact model.
 - **proven**: it does no harm, and must be proven.
+
+An event (an output, a wait, a dwell, a call, a jump) has no size: none is below.
+
+A ratio that is wrong by 0.02 % or more is caught unless the ground point moves by less than 0.1 mm:
+of an axis that hardly turns, or turns about the ground point, no contact tells.
 
 All of this is without `result.json`. Beside the `result.json` of its run every changed byte is
 refused, and a program tells by the digest in it that it was changed; both are asserted for every
@@ -111,10 +120,10 @@ def outcome(kind, program, case):
         return Outcome("refused", first) if kinds else Outcome("proven")
     if kinds:
         return Outcome("caught", ", ".join(dict.fromkeys(kinds)))
-    return _missed(program, text)
+    return _missed(kind, program, text)
 
 
-def _missed(program, text):
+def _missed(kind, program, text):
     """Say by how much a program that is proven differs from what was written."""
     before, after = program.read(program.text).playback, program.read(text).playback
     if len(before.stations) != len(after.stations):
@@ -123,16 +132,31 @@ def _missed(program, text):
         return Outcome("below", "straight, and replayed so")
     moved = _ground_points(program, after) - _ground_points(program, before)
     far = float(np.linalg.norm(moved, axis=-1).max())
-    late = abs(after.duration.sum() - before.duration.sum())
-    slow = float(np.abs(after.duration - before.duration).max())
+    takes, took = _times(after), _times(before)
     if far > 0.0:
         why = f"{1e3 * far:.3f} mm"
         return Outcome("below" if far < PLACE else "missed", why)
-    if slow > 0.0:
-        run = before.duration[program.motion.grinding].sum() / program.points.n_passes
-        why = f"{100.0 * late / run:.2f} % of a pass"
-        return Outcome("below" if late <= SPEED * run else "missed", why)
+    if (takes != took).any():
+        late = max(_off_time(program, takes), key=abs)
+        return Outcome(
+            "below" if abs(late) <= SPEED else "missed", f"{100.0 * late:+.2f} % of a pass"
+        )
+    if kind.group in ("target", "ratio"):
+        return Outcome("below", "the same configurations")
     return Outcome("missed", "nothing that moves")
+
+
+def _times(playback):
+    """Return the time of each move in [s]; a straight one is played in several steps."""
+    ends = np.cumsum(playback.duration)[playback.stations]
+    return np.diff(ends, prepend=0.0)
+
+
+def _off_time(program, takes):
+    """Return by how much the time of each pass is off what is asked for, as parts of that."""
+    motion, asked = program.motion, program.asked_times
+    passes = [motion.grinding & (motion.pass_index == k) for k in range(program.points.n_passes)]
+    return [float(takes[own].sum() / asked[own].sum() - 1.0) for own in passes]
 
 
 def _ground_points(program, playback):
@@ -145,11 +169,11 @@ def _ground_points(program, playback):
     return transform((Ts @ cell.T_flange_workpiece)[:, None], nearest[:, None])[:, 0]
 
 
-def outcomes_in(name):
-    """Return what becomes of each kind of fault in a program, by the name of the kind."""
+def outcomes_in(name, kinds=ALL_KINDS):
+    """Return what becomes of kinds of faults in a program, by the name of the kind."""
     program = small_program(**PROGRAMS[name])
     case = case_of(program)
-    found = {kind.name: outcome(kind, program, case) for kind in KINDS.values()}
+    found = {kind.name: outcome(kind, program, case) for kind in kinds}
     for kind, one in found.items():
         if one.bad:
             print(f"{name}: {kind}: {one}", flush=True)

@@ -160,8 +160,10 @@ def _render_rapid(script):
 
 
 _KRL = re.compile(
-    r"BAS\(#VEL_PTP, (?P<speed>\d+)\)\r\n(?P<word>PTP) \{(?P<target>[^}]*)\}(?P<corner>[^\r]*)\r\n"
+    r"(?:BAS\(#VEL_PTP, |\$VEL\.CP = )(?P<speed>[0-9.]+)\)?\r\n"
+    r"(?P<word>PTP|LIN) \{(?P<target>[^}]*)\}(?P<corner>[^\r]*)\r\n"
 )
+_AXES = {"PTP": [f"A{axis}" for axis in range(1, 7)], "LIN": list("XYZABC")}
 
 
 def _parse_krl(text):
@@ -173,8 +175,10 @@ def _parse_krl(text):
 
 def _render_krl(script):
     def line(move, k):
-        target = ",".join(f"A{axis} {value}" for axis, value in enumerate(move.target, 1))
-        speed = f"BAS(#VEL_PTP, {move.speed})\r\n" if move.speed else ""
+        pairs = zip(_AXES[move.word], move.target, strict=True)
+        target = ",".join(f"{axis} {value}" for axis, value in pairs)
+        speed = f"$VEL.CP = {move.speed}" if move.word == "LIN" else f"BAS(#VEL_PTP, {move.speed})"
+        speed = f"{speed}\r\n" if move.speed else ""
         return f"{speed}{move.word} {{{target}}}{move.corner}\r\n"
 
     return _joined(script, line, "\r\n")

@@ -177,9 +177,45 @@ def test_jobs_with_spoiled_values(tmp_path):
     assert attack(tmp_path, list(job_cases(random.Random(SEED), 130, "check", "job.yaml"))) == []
 
 
+RUN = ("run", "job.yaml", "--out", OUT)
+
+
 def test_whole_runs_of_jobs_with_spoiled_values(tmp_path):
-    command = ("run", "job.yaml", "--out", OUT)
-    assert attack(tmp_path, list(job_cases(random.Random(SEED + 1), 120, *command))) == []
+    assert attack(tmp_path, list(job_cases(random.Random(SEED + 1), 120, *RUN))) == []
+
+
+def odd_number(rng, content):
+    """Return keys and values with a number that may still be right, so that much is made of it."""
+    content = json.loads(json.dumps(content))
+    numbers = [
+        path
+        for path in places(content)
+        if path and isinstance(get(content, path), (int, float)) and get(content, path) is not True
+    ]
+    *parents, key = rng.choice(numbers)
+    inner = get(content, parents)
+    inner[key] = inner[key] * rng.choice([-1, 0, 0.5, 0.9, 1.1, 2])
+    if isinstance(inner[key], float) and rng.random() < 0.5:
+        inner[key] = round(inner[key])
+    return content
+
+
+def get(content, path):
+    for key in path:
+        content = content[key]
+    return content
+
+
+def test_whole_runs_of_jobs_with_odd_numbers(tmp_path):
+    rng, cases = random.Random(SEED + 2), []
+    for _ in range(40):
+        text = yaml.safe_dump(odd_number(rng, document()))
+
+        def write(place, text=text):
+            (place / "job.yaml").write_text(text, encoding="utf-8")
+
+        cases.append(("odd number", opl(*RUN), write))
+    assert attack(tmp_path, cases) == []
 
 
 # texts that are small and mean much

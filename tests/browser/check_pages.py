@@ -5,6 +5,7 @@ python -m pytest -n 0 tests/browser/check_pages.py
 
 import json
 import os
+import re
 import shutil
 
 import numpy as np
@@ -13,6 +14,8 @@ import pytest
 import opl
 from opl.cell.robot import forward_kinematics
 from opl.files.resources import folder
+from opl.report.drawn import LIFT
+from opl.run.batch_page import batch_page
 from tests.support.jobs import POST, document, write_job, write_trough
 
 sync_api = pytest.importorskip("playwright.sync_api")
@@ -140,10 +143,27 @@ def test_the_drawn_robot_is_where_the_motion_is_and_its_point_on_the_wheel(runs,
     times = np.cumsum(run.proven.motion.timed.duration)
     joint = run.surfaced.job.cell.robot
     T_joint_flange = np.array(one.page.evaluate("() => window.opl.page.cell.flange")).reshape(4, 4)
-    for move in np.linspace(1, len(motion) - 1, 6).astype(int):
+    whole = np.flatnonzero(motion.on_wheel & (motion.cutter_point % 1.0 == 0.0))
+    met = 0
+    for move in [*np.linspace(1, len(motion) - 1, 4).astype(int), *whole[[0, len(whole) // 2]]]:
         one.scrub(float(times[move]))
         drawn = one.flange() @ T_joint_flange
         assert np.allclose(drawn, forward_kinematics(joint, motion.q[move]), atol=2e-5)
+        if motion.on_wheel[move] and motion.cutter_point[move] % 1.0 == 0.0:
+            on_part, on_wheel = one.page.evaluate(
+                """(point) => {
+                  const { scene, trace, dot } = window.opl.view;
+                  scene.updateMatrixWorld();
+                  const place = dot.position.clone();
+                  place.fromBufferAttribute(trace.geometry.getAttribute("position"), point);
+                  place.applyMatrix4(trace.matrixWorld);
+                  return [place.toArray(), dot.position.toArray()];
+                }""",
+                int(motion.cutter_point[move]),
+            )
+            assert np.linalg.norm(np.subtract(on_part, on_wheel)) < LIFT + 1e-4
+            met += 1
+    assert met > 0
 
 
 def test_scrubbing_moves_chart_and_curves_together(runs, opened):
@@ -242,6 +262,18 @@ def test_a_line_of_the_program_leads_to_its_configuration_and_back(runs, opened)
         assert "now" in row.get_attribute("class").split()
 
 
+@pytest.mark.parametrize("name", ["good", "post", "trough"])
+def test_a_page_prints_on_two_sheets_whose_words_fit(name, runs, opened, tmp_path):
+    one = opened(runs[name][1] / "report.html")
+    printed = one.page.pdf(prefer_css_page_size=True)
+    assert len(re.findall(rb"/Type\s*/Page\b", printed)) == 2
+    one.page.emulate_media(media="print")
+    one.page.set_viewport_size({"width": 718, "height": 1000})  # 190 mm of paper
+    pieces = "() => [...document.querySelectorAll('table, p, ul')]"
+    wide = f"{pieces}.filter((one) => one.getBoundingClientRect().right > 719)"
+    assert one.page.evaluate(f"{wide}.map((one) => one.innerText)") == []
+
+
 def test_a_cell_is_saved_as_gltf(runs, opened, tmp_path):
     one = opened(runs["good"][1] / "report.html", accept_downloads=True)
     with one.page.expect_download() as download:
@@ -297,7 +329,7 @@ def test_a_batch_is_sorted_by_a_click(browser, runs, tmp_path):
         opl.BatchRow(out.parent / "job.yaml", run.status, 0, out, "", opl.make_report(run))
         for run, out in runs.values()
     ]
-    (tmp_path / "report.html").write_text(opl.batch_page(rows, tmp_path))
+    (tmp_path / "report.html").write_text(batch_page(rows, tmp_path))
     context = browser.new_context()
     page = context.new_page()
     page.goto((tmp_path / "report.html").as_uri())

@@ -64,7 +64,7 @@ def test_the_broad_phase_misses_no_pair_however_large_the_clearance():
     np.testing.assert_array_equal(collides, wanted)
 
 
-def test_asking_every_pair_agrees_with_the_broad_phase():
+def test_asking_every_pair_agrees_with_asking_whether_any_collides():
     cell = replace(v_job().cell, required_clearance=0.03)
     scene = CollisionScene(cell)
     configurations = configurations_of_interest(cell, seed=2)

@@ -40,8 +40,20 @@ def inform_times(program, q):
             yield tool_point(program, start, end) / (float(number) / 1000.0)
 
 
+def over_part(program, start, end):
+    """Return how far the origin of contact frame 0 of the wheel moves over the part in [m]."""
+    cell = program.job.cell
+    ends = forward_kinematics(cell.robot, np.stack([start, end])) @ cell.T_flange_workpiece
+    places = [np.linalg.solve(T, cell.wheel.T_base_contact0[:, 3])[:3] for T in ends]
+    return np.linalg.norm(places[1] - places[0])
+
+
 def rapid_times(program, q):
-    yield from (float(time) for time in re.findall(r"\\T:=([0-9.]+),", program.text))
+    found = re.findall(r"(?:\\T:=([0-9.]+)|\[([0-9.]+),500,5000,1000\]), \w+, ", program.text)
+    for (seconds, millimetres), start, end in zip(found, q[:-1], q[1:], strict=True):
+        yield (
+            float(seconds) if seconds else over_part(program, start, end) * 1e3 / float(millimetres)
+        )
 
 
 def krl_times(program, q):
@@ -112,3 +124,32 @@ def test_whole_percents_are_too_coarse_and_so_krl_is_straight_unless_a_job_insis
     }
     assert load_job(write_job(tmp_path, keys)).program.motion is MotionForm.STRAIGHT
     assert load_job(write_job(tmp_path)).program.motion is MotionForm.JOINT
+
+
+def test_stationary_tool_point_is_the_cutter_point_where_the_contact_stays_in_the_middle():
+    """So the speed of a move in the file is the feed over the surface there."""
+    program = small_program("RAPID", motion="straight")
+    q = program.run.proven.planned.prepared.fixed.q
+    frames = program.job.program.led.frames(forward_kinematics(program.job.cell.robot, q))
+    wanted = program.points.Ts_workpiece_cutter[:, :3, 3]
+    np.testing.assert_allclose(frames[:, :3, 3], wanted, atol=1e-9)
+    assert len(re.findall(r"MoveL .*\[[0-9.]+,500,5000,1000\], ", program.text)) > 80
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("opl_wheel := [FALSE,[[", "opl_wheel := [FALSE,[[1", "is not what the job"),
+        ("wobjdata opl_part := [TRUE", "wobjdata opl_part := [FALSE", "is not what the job"),
+        ("LOCAL PERS wobjdata opl_part", "! LOCAL PERS wobjdata opl_part", "is missing"),
+        ("VAR bool", "LOCAL PERS loaddata other := [1,[0,0,1],[1,0,0,0],0,0,0];\n  VAR bool",
+         "nothing of that name"),
+        ("opl_wheel\\WObj:=opl_part;", "tool0;", "moves with tool tool0"),
+    ],
+)  # fmt: skip
+def test_other_stationary_tools_than_that_of_the_job_are_found(old, new, message):
+    program = small_program("RAPID", motion="straight")
+    assert not program.read(program.text).findings
+    assert old in program.text
+    found = program.read(program.text.replace(old, new, 1)).findings
+    assert any(message in str(finding) for finding in found), found

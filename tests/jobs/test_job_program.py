@@ -18,10 +18,14 @@ from opl.job.source import Source
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.export import try_out
 from opl.program.inform import TEMPLATE
+from opl.program.led import StationaryTool
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings
 from tests.support.program_samples import HOME, ROBOT, UNVERIFIED
 
 EYE = "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 180], [0, 0, 0, 1]]"
+
+
+AT_WHEEL = StationaryTool(np.eye(4), np.eye(4))
 
 
 def settings(tmp_path, text, robot=ROBOT):
@@ -30,7 +34,7 @@ def settings(tmp_path, text, robot=ROBOT):
     source = Source.of_file(path)
     section = read(path, ProgramSection)
     counted = section.robot_as_counted(source, robot)
-    return section.in_si(source, "SAMPLE", counted, HOME, np.eye(4), None)
+    return section.in_si(source, "SAMPLE", counted, HOME, AT_WHEEL, None)
 
 
 def test_nothing_asked_for_is_a_pulse_job_of_joint_moves(tmp_path):

@@ -1,5 +1,6 @@
 """The pages of runs, cutter points, cells and batches, as texts."""
 
+import hashlib
 import json
 import re
 from pathlib import Path
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 import opl
+from opl.run.batch_page import batch_page
 from opl.run.delivery import deliver
 from tests.support.jobs import POST, document, write_job, write_trough
 from tests.support.jobs import opl as run_opl
@@ -88,6 +90,18 @@ def test_the_trace_is_the_proven_motion(good):
     assert trace["time_s"][-1] == pytest.approx(verified.timed.seconds, abs=1e-6)
     assert trace["kind"] == [kind.value for kind in verified.motion.kind]
     assert trace["t"][0] is None and trace["pass"][-1] is None
+
+
+def test_charts_are_delivered_as_png_where_asked_for_and_go_with_the_next_run(good, tmp_path):
+    deliver(opl.with_png(good[0]), tmp_path / "out")
+    names = {"V_SHAPE_contact.png", "V_SHAPE_joints.png"}
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    for name in names:
+        content = (tmp_path / "out" / name).read_bytes()
+        assert content[:4] == b"\x89PNG"
+        assert hashlib.sha256(content).hexdigest() == result["program"]["sha256"][name]
+    deliver(good[0], tmp_path / "out")
+    assert names.isdisjoint(path.name for path in (tmp_path / "out").iterdir())
 
 
 def test_what_the_replay_found_least_or_largest_leads_to_its_configuration(good):
@@ -185,6 +199,6 @@ def test_the_page_of_a_batch_names_every_job_and_leads_to_their_pages(good, tmp_
         opl.BatchRow(home / "job.yaml", "ok", 0, home / "out/V_SHAPE", "", opl.make_report(run)),
         opl.BatchRow(Path("bad & <b>.yaml"), "bad input", 2, None, "why <not>", None),
     ]
-    page = opl.batch_page(rows, home / "out")
+    page = batch_page(rows, home / "out")
     assert 'href="V_SHAPE/report.html"' in page and "1 of 2 jobs have a program" in page
     assert "bad &amp; &lt;b&gt;.yaml" in page and "why &lt;not&gt;" in page

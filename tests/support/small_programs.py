@@ -5,6 +5,7 @@ the S part; and of a bar with an arched top, which is no part that comes with op
 """
 
 import copy
+import json
 import runpy
 import shutil
 import tempfile
@@ -12,6 +13,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+import trimesh
 import yaml
 
 from opl.files.digests import digest
@@ -59,6 +62,7 @@ S_PART = {
 # what attacks take: a controller, and a part
 PROGRAMS = {
     **{name: {"controller": name} for name in ARMS},
+    "KRL straight": {"controller": "KRL", "motion": "straight"},
     "S part": {"controller": "DX200", "part": "s_shape"},
     "arch": {"controller": "DX200", "part": "arch"},
 }
@@ -92,6 +96,13 @@ class SmallProgram:
         """The proven configurations that are written, one for each move."""
         rows = [move.motion_index for move in self.run.program.moves]
         return self.run.proven.motion.motion.take(rows)
+
+    @property
+    def asked_times(self) -> np.ndarray:
+        """The time in [s] that the feed asks of each of these moves."""
+        rows = [move.motion_index for move in self.run.program.moves]
+        ends = np.cumsum(self.run.proven.motion.timed.duration)[rows]
+        return np.diff(ends, prepend=0.0)
 
     def read(self, text):
         """Read a text as this program is read."""
@@ -156,11 +167,34 @@ def _shipped(controller, part, motion, home):
 
 def _arch():
     """Return the job of the example with a surface from Python, with the actions of the others."""
-    example = runpy.run_path(str(EXAMPLE))
-    content = copy.deepcopy(example["JOB"])
+    content, surface, part = _arched_bar()
     content["passes"].update(end_margin_mm=25, max_chord_error_mm=0.05)
-    content["search"]["max_contact_error_mm"] = 0.1
-    content["search"]["method"] = "recursive"
+    content["search"].update(max_contact_error_mm=0.1, method="recursive")
     for path, value in ACTIONS.items():
         content["program"][path.split(".")[1]] = value
-    return load_job(content, surface=example["arched_top"](), part=example["bar"]())
+    return load_job(content, surface=surface, part=part)
+
+
+def _arched_bar():
+    example = runpy.run_path(str(EXAMPLE))
+    return copy.deepcopy(example["JOB"]), example["arched_top"](), example["bar"]()
+
+
+def write_arch(home):
+    """Write the example with a surface from Python as files, the job searched as by default."""
+    content, surface, part = _arched_bar()
+    home.mkdir(parents=True)
+    net = {
+        "degree_u": surface.degree_u,
+        "degree_v": surface.degree_v,
+        "knots_u": surface.knots_u.tolist(),
+        "knots_v": surface.knots_v.tolist(),
+        "control_points_mm": (1e3 * surface.control_points).tolist(),
+        "weights": surface.weights.tolist(),
+    }
+    (home / "arch.json").write_text(json.dumps(net), encoding="utf-8")
+    trimesh.Trimesh(1e3 * part.vertices, part.faces).export(home / "arch.stl")
+    content["workpiece"] = {"surface": "arch.json", "mesh": "arch.stl", "mesh_unit": "mm"}
+    path = home / "job.yaml"
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    return path

@@ -7,6 +7,7 @@ from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import rotation_angle
 from opl.program.inform import parse, write_jobs
 from opl.program.inform.times import job_configurations
+from opl.program.led import HandTool
 from opl.program.lines import stray, with_straight_moves
 from opl.program.moves import Purpose, plan_moves
 from opl.program.profiles import DX200
@@ -14,12 +15,13 @@ from opl.program.settings import ProgramSettings
 from tests.support.program_samples import DATE, MAX_SPEED, ROBOT, verified_motion
 
 T_FLANGE_TOOL = np.eye(4)
+LED = HandTool(T_FLANGE_TOOL)
 CORNERS = np.array(np.meshgrid(*([-0.1, 0.1],) * 3)).reshape(3, -1).T
 
 
 def straight(tolerance=1e-3):
     program = plan_moves(verified_motion(n_points=40), "SAMPLE", MAX_SPEED)
-    return with_straight_moves(program, ROBOT, T_FLANGE_TOOL, CORNERS, tolerance)
+    return with_straight_moves(program, ROBOT, LED, CORNERS, tolerance)
 
 
 def test_moves_on_the_wheel_and_along_its_normal_become_straight_and_no_others():
@@ -30,7 +32,7 @@ def test_moves_on_the_wheel_and_along_its_normal_become_straight_and_no_others()
 def test_moves_that_stray_too_far_stay_joint_moves():
     assert not any(move.straight for move in straight(tolerance=0.0).moves)
     program = straight()
-    strays = stray(ROBOT, np.array([m.q for m in program.moves]), T_FLANGE_TOOL, CORNERS)
+    strays = stray(ROBOT, np.array([m.q for m in program.moves]), LED, CORNERS)
     for move, distance in zip(program.moves[1:], strays, strict=True):
         assert not move.straight or distance <= 1e-3
 
@@ -40,8 +42,8 @@ def test_stray_is_what_the_two_paths_are_apart_half_way():
     wrist = np.zeros((1, 3))
     radius = np.hypot(*forward_kinematics(ROBOT, q[0])[:2, 3])
     sagitta = radius * (1.0 - np.cos(np.deg2rad(10.0)))
-    assert stray(ROBOT, q, T_FLANGE_TOOL, wrist)[0] == pytest.approx(sagitta)
-    assert stray(ROBOT, q[[0, 0]], T_FLANGE_TOOL, CORNERS)[0] == pytest.approx(0.0)
+    assert stray(ROBOT, q, LED, wrist)[0] == pytest.approx(sagitta)
+    assert stray(ROBOT, q[[0, 0]], LED, CORNERS)[0] == pytest.approx(0.0)
 
 
 def test_speed_of_straight_moves_gives_each_its_wanted_time():

@@ -11,7 +11,8 @@ import pytest
 
 from opl.cell.robot import load_robot
 from opl.motion.path import GrindingPath
-from opl.report.pictures import contact_chart, joint_chart
+from opl.report import pictures
+from opl.report.canvas import png, svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 NAMES = ("free", "out of reach", "beyond joint limits", "part cuts into wheel", "robot collides")
@@ -61,6 +62,14 @@ def joint_arguments(n_passes=5, n_points=60, fixed=True):
     }
 
 
+def contact_chart(**arguments):
+    return svg(pictures.contact_chart(**arguments), arguments["title"])
+
+
+def joint_chart(**arguments):
+    return svg(pictures.joint_chart(**arguments), arguments["title"])
+
+
 @cache
 def contact_svg(*size):
     return contact_chart(**contact_arguments(*size))
@@ -93,6 +102,11 @@ def test_same_input_gives_same_bytes_whatever_matplotlib_is_set_to(chart, argume
         assert matplotlib.rcParams["font.size"] == 30
     assert first == again
     assert "<dc:date>" not in first
+
+
+def test_a_chart_is_a_png_too_with_the_same_bytes_every_time():
+    first, again = (png(pictures.contact_chart(**contact_arguments())) for _ in range(2))
+    assert first == again and first[:8] == b"\x89PNG\r\n\x1a\n" and b"Matplotlib" not in first
 
 
 def test_title_is_shown_as_it_is():

@@ -5,18 +5,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import forward_kinematics
 from opl.cli.commands import main
 from opl.errors import InputError, OplError
+from opl.geometry.frames import pose
 from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.export import StraightLimit, export_program
 from opl.program.inform import job_faults, parse
 from opl.program.inform.job_layout import VARIABLES, JobLayout, JobStep
+from opl.program.led import StationaryTool
 from opl.program.moves import Program, plan_moves
 from opl.program.posts import find_post, known_posts, reader_for
 from opl.program.profiles import PROFILES
-from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings, UserFrame
+from opl.program.settings import (
+    ByKind,
+    Load,
+    MotionForm,
+    PositionForm,
+    ProgramSettings,
+    UserFrame,
+)
 from tests.support.example_post import install, install_example_post
 from tests.support.program_samples import (
     DATE,
@@ -59,6 +69,76 @@ def test_whole_programs_are_the_golden_ones(controller, assert_golden):
         assert_golden(f"{controller}/joint/{name}", text)
     for name, text in programs(controller, motion=MotionForm.STRAIGHT).items():
         assert_golden(f"{controller}/straight/{name}", text)
+
+
+def test_program_past_a_stationary_tool_is_the_golden_one(assert_golden):
+    wheel = pose(
+        Rotation.from_euler("xyz", [90, 0, 90], degrees=True).as_matrix(), np.array([1.1, 0.5, 0.6])
+    )
+    part = pose(np.eye(3), np.array([0.0, 0.0, 0.1]))
+    texts = programs(
+        "RAPID",
+        motion=MotionForm.STRAIGHT,
+        stationary=StationaryTool(wheel, part),
+        load=Load(1.25, np.array([0.01, 0.0, 0.13])),
+    )
+    assert_golden("RAPID/stationary/SAMPLE.mod", texts["SAMPLE.mod"])
+
+
+PART_KG, GRIPPER_KG = (
+    Load(1.25, np.array([0.01, 0.0, 0.13])),
+    Load(3.75, np.array([0.0, 0.02, 0.05])),
+)
+# of both together: sums of moments over the sum of masses
+BOTH = 5.0, (2.5, 15.0, 70.0)
+LOADS = {
+    "DX200": ("TOOL.CND", r"\r\n(\S+),(\S+),(\S+)\r\n(5\.000)\r\n", "mm last"),
+    "KRL": ("SAMPLE.src", r"\$LOAD = {M (\S+),CM {X (\S+),Y (\S+),Z (\S+),A", "mm"),
+    "URSCRIPT": ("SAMPLE.script", r"set_target_payload\((\S+), \[(\S+), (\S+), (\S+)\]\)", "m"),
+}
+
+
+@pytest.mark.parametrize("controller", LOADS)
+def test_load_of_part_and_gripper_stands_where_the_controller_keeps_it(controller):
+    file, pattern, form = LOADS[controller]
+    changes = {"load": PART_KG, "tool": 3 if controller == "DX200" else 0}
+    (found,) = re.findall(pattern, programs(controller, gripper=GRIPPER_KG, **changes)[file])
+    mass, *centre = (found[-1], *found[:-1]) if "last" in form else found
+    assert float(mass) == BOTH[0]
+    millimetres = np.array(centre, dtype=float) * (1e3 if form == "m" else 1.0)
+    np.testing.assert_allclose(millimetres, BOTH[1], atol=0.05)
+    texts = programs(controller, **changes)
+    if controller != "DX200":  # the gripper is unknown, and the whole load with it
+        assert not re.search(pattern, texts[file])
+    assert "GRIPPER NOT IN IT" in "".join(texts.values())
+
+
+def test_rapid_has_the_load_of_the_part_in_the_frame_of_its_tool():
+    tool = pose(np.eye(3), np.array([0.0, 0.0, 0.03]))
+    text = programs("RAPID", load=PART_KG, T_flange_tool=tool, tool=2)["SAMPLE.mod"]
+    assert "loaddata opl_load := [1.250,[10.000,0.000,100.000],[1,0,0,0],0,0,0];" in text
+    assert text.index("GripLoad opl_load;") < text.index("MoveAbsJ")
+
+
+def test_fanuc_tells_the_load_to_people_alone():
+    text = programs("FANUC", load=PART_KG, gripper=GRIPPER_KG)["SAMPLE.LS"]
+    assert "!PART 1.250 KG ;" in text and "!WITH GRIPPER 5.000 KG ;" in text
+    assert "PAYLOAD" not in text
+
+
+@pytest.mark.parametrize("controller", OTHERS)
+def test_programs_with_loads_are_read_without_doubt_and_the_load_is_something_they_do(controller):
+    changes = {"load": PART_KG, "gripper": GRIPPER_KG, "motion": MotionForm.JOINT}
+    _, files = write(controller, **changes)
+    reader = find_post(controller).reader
+    content = {name: text.encode() for name, text in files.items() if name.endswith(reader.suffix)}
+    settings = ProgramSettings(controller=controller, actions=ACTIONS, **changes)
+    reading = reader.read(content, ROBOT, settings)
+    assert reading.findings == ()
+    before = [event.text for event in reading.playback.events if event.after < 0]
+    loads = {"RAPID": "GripLoad", "KRL": "$LOAD", "URSCRIPT": "set_target_payload", "FANUC": "\0"}
+    found = [text for text in before if text.startswith(loads[controller])]
+    assert len(found) == (controller != "FANUC")
 
 
 @pytest.mark.parametrize("controller", YASKAWA)

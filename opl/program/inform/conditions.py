@@ -18,6 +18,7 @@ from opl.geometry.frames import Array
 from opl.program.controller import ControllerProfile
 from opl.program.digits import fixed
 from opl.program.inform.cartesian import rectan
+from opl.program.loads import carried
 from opl.program.settings import PositionForm, ProgramSettings
 
 USER_FRAMES, TOOLS = "UFRAME.CND", "TOOL.CND"
@@ -44,7 +45,7 @@ def condition_files(settings: ProgramSettings, profile: ControllerProfile) -> di
             f"////BUSER {_shown(frame.T_base_user, profile)}",
         ]
         files[USER_FRAMES] = "\r\n".join([*lines, ""])
-    load = settings.load
+    load = carried(settings) or settings.load
     if settings.tool or load is not None:
         mass = 0.0 if load is None else load.mass
         centre = np.zeros(3) if load is None else load.p_flange * 1e3
@@ -69,15 +70,6 @@ def frame_comments(settings: ProgramSettings, profile: ControllerProfile) -> tup
     named = [f"{name} {value}" for name, value in zip(("X", "Y", "Z", "RX", "RY", "RZ"), values,
                                                       strict=True)]  # fmt: skip
     return tuple(f"UF{frame.number} {' '.join(named[k : k + 2])}" for k in (0, 2, 4))
-
-
-def load_comments(settings: ProgramSettings) -> tuple[str, ...]:
-    """Return the comment lines that tell a person what the part in the hand weighs, and where."""
-    load = settings.load
-    if load is None:
-        return ()
-    centre = " ".join(fixed(float(value), 1) for value in load.p_flange * 1e3)
-    return (f"PART {fixed(load.mass, 3)} KG", f"CENTRE {centre} MM")
 
 
 def condition_findings(

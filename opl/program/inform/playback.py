@@ -62,7 +62,7 @@ def play_jobs(
         moves.append(_move(one, target, resolution, one.job is not before))
         before = one.job
     found += other_tools(moves, str(settings.tool))
-    playback, doubtful = play(moves, events, robot, settings.T_flange_tool)
+    playback, doubtful = play(moves, events, robot, settings.led)
     if not found:
         return playback, doubtful
     return None, [*found, *(doubtful if moves else [])]

@@ -15,7 +15,7 @@ from opl.cell.robot import Robot
 from opl.errors import InputError, SettingError
 from opl.files import resources
 from opl.program.controller import ControllerProfile
-from opl.program.inform.conditions import frame_comments, load_comments
+from opl.program.inform.conditions import frame_comments
 from opl.program.inform.faults import job_faults
 from opl.program.inform.heads import attributes, frame
 from opl.program.inform.job_layout import JobLayout, JobStep, differences
@@ -88,7 +88,7 @@ def _layout(
     pulses = form is PositionForm.PULSES
     postype = "PULSE" if pulses else form.value.upper()
     notes = _ratio_notes(robot, profile.comment_length) if pulses else []
-    notes += [*frame_comments(settings, profile), *load_comments(settings)]
+    notes += frame_comments(settings, profile)
     return JobLayout(
         name=part.name,
         tool=str(settings.tool),

@@ -10,6 +10,7 @@ from opl.cell.robot import Robot
 from opl.geometry.frames import Array, inverse
 from opl.program.inform.cartesian import configurations, rectan_pose
 from opl.program.inform.job import ROBOT_KINDS, InformJob, Instruction
+from opl.program.led import HandTool
 from opl.program.played import SpeedUnit, WrittenSpeed, move_time
 from opl.program.pulses import PulseScale
 
@@ -61,7 +62,7 @@ def move_times(job: InformJob, robot: Robot, T_base_frame: Array, T_flange_tool:
     """
     q = job_configurations(job, robot, T_base_frame, T_flange_tool)
     times = [
-        move_time(written_speed(move), start, end, robot, T_flange_tool)
+        move_time(written_speed(move), start, end, robot, HandTool(T_flange_tool))
         for move, (start, end) in zip(job.moves[1:], pairwise(q), strict=True)
     ]
     return np.array([np.nan, *times][: len(q)])

@@ -32,10 +32,12 @@ CORNERS = Corners(_STOP, _ROUNDED, _ROUNDED, _ROUNDED)
 
 _BOOL = "(?:TRUE|FALSE)"
 _INPUT = rf"\$IN\[[0-9]+\] ?(?:==|<>) ?{_BOOL}"
+_XYZ = rf"X {NUMBER} ?, ?Y {NUMBER} ?, ?Z {NUMBER}"
+_LOAD_NUMBERS = rf"{NUMBER} ?, ?CM \{{{_XYZ}(?: ?, ?[ABC] 0\.0){{3}}\}} ?, ?J \{{{_XYZ}\}}"
 _WORDS = Words(
     passing=re.compile(
         rf"\$OUT\[[0-9]+\] ?= ?{_BOOL}|\$TIMER\[[0-9]+\] ?= ?-?[0-9]+"
-        rf"|\$TIMER_STOP\[[0-9]+\] ?= ?{_BOOL}",
+        rf"|\$TIMER_STOP\[[0-9]+\] ?= ?{_BOOL}|\$LOAD ?= ?\{{M {_LOAD_NUMBERS}\}}",
         re.I,
     ),
     waits=re.compile(

@@ -22,6 +22,7 @@ from opl.program import dialect
 from opl.program.dialect import ActionTexts, Dialect
 from opl.program.digits import degrees
 from opl.program.krl.read import DECIMALS
+from opl.program.loads import carried
 from opl.program.moves import Move, Program
 from opl.program.posts import Written
 from opl.program.settings import MotionForm, ProgramSettings
@@ -61,7 +62,11 @@ _SLOWEST = 1e-5  # [m/s] of the tool point on a straight move: below, it turns a
 # Farthest that the time of a single joint move on the wheel may be from the wanted one, as a
 # fraction of it, in a program of straight moves.
 _FEED_TOLERANCE = 0.05
-VARIABLES = {**dialect.VARIABLES, "step.speed": "instruction that sets the speed of the move"}
+VARIABLES = {
+    **dialect.VARIABLES,
+    "step.speed": "instruction that sets the speed of the move",
+    "load": "instruction that sets the load of gripper and part, or none",
+}
 
 
 def tool_name(settings: ProgramSettings) -> str:
@@ -82,7 +87,22 @@ def write(program: Program, robot: Robot, settings: ProgramSettings, date: datet
             program.moves, Ts_base_tool, speeds, times, strict=True
         )
     ]
-    return DIALECT.write(program, settings, date, tool_name(settings), moves)
+    own = {"load": _load(settings)}
+    return DIALECT.write(program, settings, date, tool_name(settings), moves, lambda steps: own)
+
+
+def _load(settings: ProgramSettings) -> str | None:
+    """Return the instruction that sets mass and centre of what the flange carries, in its frame.
+
+    $LOAD is the load of all that the flange carries (KUKA System Software, load data), so it is not
+    set where the gripper is unknown: that of the controller's tool data holds then.
+    """
+    load = carried(settings)
+    if load is None:
+        return None
+    x, y, z = (f"{value + 0.0:.1f}" for value in (1e3 * load.p_flange).round(1))
+    centre = f"{{X {x},Y {y},Z {z},A 0.0,B 0.0,C 0.0}}"
+    return f"$LOAD = {{M {load.mass:.3f},CM {centre},J {{X 0.0,Y 0.0,Z 0.0}}}}"
 
 
 def _speeds(program: Program, Ts_base_tool: Array, robot: Robot) -> tuple[list[str], list[float]]:

@@ -13,9 +13,11 @@ import numpy as np
 from opl.geometry.frames import pose
 from opl.geometry.rotations import from_quaternion
 from opl.program.played import Corner, Corners, ReadMove, SpeedUnit, WrittenSpeed
+from opl.program.rapid.tool_data import DECLARATION, GRIP
 from opl.program.statements import NUMBER, Listing, Notes, Words, code_lines
 
 DECIMALS = 4
+V_DECIMALS = 3  # of speeds in [mm/s]
 # Of the move to the first configuration, which has no time.
 START = WrittenSpeed(SpeedUnit.TOOL_POINT, 0.05, "v50")
 _FINEST_ZONE = 0.3  # z0 in [mm] of the tool point; the others are named after theirs
@@ -23,7 +25,7 @@ _ZONE = Corner(_FINEST_ZONE, "z0")
 CORNERS = Corners(Corner(0.0, "fine"), _ZONE, _ZONE, _ZONE)
 
 _WORDS = Words(
-    passing=re.compile(r'(?:SetDO do[0-9]+, ?[01]|TPWrite "[^"]*"|TPErase) ?;', re.I),
+    passing=re.compile(rf'(?:SetDO do[0-9]+, ?[01]|TPWrite "[^"]*"|TPErase|{GRIP[:-1]}) ?;', re.I),
     waits=re.compile(
         rf"(?:WaitTime {NUMBER}|Stop"
         rf"|WaitDI di[0-9]+, ?[01](?: ?\\MaxTime ?:= ?{NUMBER} ?\\TimeFlag ?:= ?late)?) ?;",
@@ -35,7 +37,10 @@ _WORDS = Words(
 )
 _ROW = rf"\[((?:{NUMBER},)*{NUMBER})\]"
 _NO_AXES = r"\[9E9(?:,9E9){5}\]"
-_REST = rf",v([0-9]+)(?:\\T:=({NUMBER}))?,(fine|z[0-9]+),(\w+);"
+_REST = (
+    rf",(?:v([0-9]+)|\[({NUMBER}),500,5000,1000\])(?:\\T:=({NUMBER}))?"
+    r",(fine|z[0-9]+),(\w+(?:\\WObj:=\w+)?);"
+)
 _ABSOLUTE = re.compile(rf"MoveAbsJ\[{_ROW},{_NO_AXES}\](?:\\NoEOffs)?{_REST}", re.I)
 _LINE = re.compile(rf"MoveL\[{_ROW},{_ROW},{_ROW},{_NO_AXES}\]{_REST}", re.I)
 _HALF_DIGIT = np.full(6, 0.5 * np.deg2rad(10.0**-DECIMALS))
@@ -70,6 +75,8 @@ def parse(text: str, source: str) -> Listing:
                 notes.name = found["name"]
         elif passed == _INSIDE - 1 and _VARIABLE.fullmatch(code):
             declared = True
+        elif passed == _INSIDE - 1 and DECLARATION.fullmatch(code):
+            notes.declaration(line, code)
         elif passed != _INSIDE:
             notes.doubt(line, f"{code} stands outside of the procedure")
         elif switch := _CONF.fullmatch(code):
@@ -88,7 +95,7 @@ def _statement(notes: Notes, line: int, code: str, free: bool) -> None:
     tight = code.replace(" ", "")
     found = _ABSOLUTE.fullmatch(tight) or _LINE.fullmatch(tight)
     groups = found.groups() if found else ()
-    *rows, v, time, zone, tool = groups or ("", "", "", "")
+    *rows, v, tcp, time, zone, tool = groups or ("", "", "", "", "")
     numbers = [np.array([float(number) for number in row.split(",")]) for row in rows]
     sizes = [len(row) for row in numbers]
     quarters: tuple[int, ...] = ()
@@ -106,9 +113,15 @@ def _statement(notes: Notes, line: int, code: str, free: bool) -> None:
     else:
         notes.other(line, code)
         return
-    if time is None:
+    if tcp is not None:
+        if time is not None or len(rows) == 1:
+            notes.doubt(line, "a speed in mm/s goes with straight moves that have no time")
+        speed = WrittenSpeed.of_number(
+            SpeedUnit.TOOL_POINT, 1e-3, tcp, V_DECIMALS, f"[{tcp},500,5000,1000]"
+        )
+    elif time is None:
         if notes.begun:
-            notes.doubt(line, "a move after the first one needs its time (argument T)")
+            notes.doubt(line, "a move after the first one needs a time (argument T) or mm/s")
         speed = WrittenSpeed.of_number(SpeedUnit.TOOL_POINT, 1e-3, v, 0, f"v{v}")
     else:
         speed = WrittenSpeed.of_number(SpeedUnit.SECONDS, 1.0, time, 4, f"\\T:={time}")
@@ -118,7 +131,8 @@ def _statement(notes: Notes, line: int, code: str, free: bool) -> None:
         straight=len(rows) > 1,
         speed=speed,
         corner=Corner(0.0 if zone == "fine" else float(zone[1:]) or _FINEST_ZONE, zone),
-        tool=tool.lower(),
+        tool=tool.lower().replace("\\wobj", "\\WObj"),
+        frame="the frame of the part" if "\\" in tool else "the base frame",
         place=notes.place(line),
         resolution=_POSE_DIGITS if len(rows) > 1 else _HALF_DIGIT,
         quarters=quarters,

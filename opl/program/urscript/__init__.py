@@ -4,12 +4,11 @@ Positions are joint positions in radians, of straight moves too; every move carr
 is proven goes through the written points; the corners that the blends cut off, up to 1 mm, are not.
 """
 
-from opl.program.dialect import VARIABLES
 from opl.program.digits import rounded_radians
 from opl.program.listing import listing_reader
 from opl.program.posts import Post
 from opl.program.urscript.read import CORNERS, DECIMALS, parse, start_speed
-from opl.program.urscript.write import DIALECT, tool_name, write
+from opl.program.urscript.write import DIALECT, VARIABLES, tool_name, write
 
 POST = Post(
     "Universal Robots URScript",

@@ -24,6 +24,7 @@ _BOOL = "(?:True|False)"
 _WORDS = Words(
     passing=re.compile(
         rf"set_standard_digital_out\([0-9]+, ?{_BOOL}\)"
+        rf"|set_target_payload\({NUMBER}(?: ?, ?\[?{NUMBER}){{3}} ?\]\)"
         rf"|waited ?= ?{NUMBER}|waited ?= ?waited ?\+ ?{NUMBER}"
     ),
     waits=re.compile(rf'sleep\({NUMBER}\)|sync\(\)|popup\("[^"]*", ?blocking ?= ?True\)'),

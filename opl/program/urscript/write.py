@@ -11,8 +11,10 @@ from opl.cell.robot import Robot, controller_poses
 from opl.files import resources
 from opl.geometry.frames import Array
 from opl.geometry.rotations import rotation_vector
+from opl.program import dialect
 from opl.program.dialect import ActionTexts, Dialect, rounded_times
 from opl.program.digits import fixed
+from opl.program.loads import carried
 from opl.program.moves import Program
 from opl.program.posts import Written
 from opl.program.settings import ProgramSettings
@@ -47,6 +49,10 @@ DIALECT = Dialect(
         remark="# {text}",
     ),
 )
+VARIABLES = {
+    **dialect.VARIABLES,
+    "load": "instruction that sets the payload of gripper and part, or none",
+}
 _BLEND_SHARE = 0.4  # of the shorter neighbouring move: two blends must not overlap
 _START_ACCELERATION = 0.3  # [rad/s^2] of the move to the first configuration
 
@@ -76,7 +82,21 @@ def write(program: Program, robot: Robot, settings: ProgramSettings, date: datet
         word = "movel" if move.straight else "movej"
         moves.append((f"{word}({target}, {speed}, r={blend:.5f})", target, speed, float(time)))
     tool = "p[" + ", ".join(_tool_pose(settings)) + "]"
-    return DIALECT.write(program, settings, date, tool, moves)
+    own = {"load": _load(settings)}
+    return DIALECT.write(program, settings, date, tool, moves, lambda steps: own)
+
+
+def _load(settings: ProgramSettings) -> str | None:
+    """Return the instruction that sets mass and centre of what the flange carries, in its frame.
+
+    It is the whole payload (UR, script manual, set_target_payload), so it is not set where the
+    gripper is unknown: that of the installation holds then.
+    """
+    load = carried(settings)
+    if load is None:
+        return None
+    centre = ", ".join(fixed(float(value), 4) for value in load.p_flange)
+    return f"set_target_payload({load.mass:.3f}, [{centre}])"
 
 
 def _blends(program: Program, Ts_base_tool: Array) -> Array:

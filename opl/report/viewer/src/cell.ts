@@ -10,7 +10,7 @@ import { GLTFExporter } from "three/examples/jsm/exporters/GLTFExporter.js";
 import { type Block, colour, type Packed, type Page, type Solid } from "./data";
 
 const RED = 0xd03030;
-const [SLOW, ENOUGH, COARSEST] = [40, 6, 0.5]; // ms of a picture, how many of them make the next coarser, and how coarse at the most
+const [COARSE, FAST, SLOW, ENOUGH] = [0.5, 20, 40, 6]; // pixels for one of the page, ms of a picture, and how many of them tell
 type Wheel = NonNullable<Page["wheel"]>;
 type Drawn = Mesh<BufferGeometry, MeshLambertMaterial>;
 
@@ -43,8 +43,8 @@ export class CellView {
   private red: string[] = [];
   private waiting = false;
   private settling = 0;
-  private moving = Math.min(1, devicePixelRatio); // pixels for one of the page
-  private slow = 0; // pictures
+  private moving = COARSE;
+  private pace = 0; // fast pictures less slow ones
   private before = 0; // when the last one was asked for
   drawn = 0; // pictures made up to now
 
@@ -170,7 +170,7 @@ export class CellView {
     this.draw();
   }
 
-  // In motion coarser where pictures take long, as without a graphics card; at rest twice as sharp as the screen.
+  // In motion coarse until pictures prove fast, as with a graphics card; at rest twice as sharp as the screen.
   private draw(atRest = false): void {
     clearTimeout(this.settling);
     if (!atRest) this.settling = setTimeout(() => this.draw(true), 250);
@@ -178,9 +178,11 @@ export class CellView {
     this.waiting = true;
     requestAnimationFrame((now) => {
       this.waiting = false;
-      if (!atRest && now - this.before > SLOW && now - this.before < 5 * SLOW) this.slow++;
+      const took = now - this.before;
       this.before = now;
-      if (this.slow > ENOUGH) [this.moving, this.slow] = [Math.max(COARSEST, 0.7 * this.moving), 0];
+      if (!atRest && took < 5 * SLOW) this.pace += took < FAST ? 1 : took > SLOW ? -1 : 0;
+      if (this.pace > ENOUGH && this.moving === COARSE) [this.moving, this.pace] = [Math.min(1, devicePixelRatio), 0];
+      if (this.pace < -ENOUGH && this.moving > COARSE) [this.moving, this.pace] = [COARSE, Number.NEGATIVE_INFINITY]; // once and for all
       const ratio = atRest ? 2 * devicePixelRatio : this.moving;
       if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
       this.renderer.render(this.scene, this.camera);
@@ -207,8 +209,8 @@ export class CellView {
     const geometry = indexed.setIndex([...this.block.array(solid.faces)]).toNonIndexed(); // so that faces are flat
     geometry.computeVertexNormals();
     const opacity = solid.around ? 0.35 : 1;
-    const material = new MeshLambertMaterial({ color: solid.colour, side: DoubleSide, transparent: solid.around, opacity, depthWrite: !solid.around, forceSinglePass: true });
-    const mesh = placed(new Mesh(geometry, material), new Matrix4());
+    const material = new MeshLambertMaterial({ color: solid.colour, side: DoubleSide, transparent: solid.around, opacity, depthWrite: !solid.around, forceSinglePass: true, polygonOffset: solid.around, polygonOffsetFactor: 4 });
+    const mesh = placed(new Mesh(geometry, material), matrix(solid.T));
     mesh.userData = { colour: solid.colour, opacity };
     mesh.name = solid.name;
     mesh.add(new LineSegments(new EdgesGeometry(geometry, 25), new LineBasicMaterial({ color: 0x22303c, transparent: true, opacity: 0.4 })));

@@ -57,7 +57,7 @@ export class Curves {
     for (let k = step ? 1 : 0; k < ys.length; k++) {
       if (Number.isNaN(ys[k])) continue;
       const [x, y] = [this.across(xs[k]).toFixed(1), up(ys[k]).toFixed(1)];
-      if (step) d += `M${this.across(xs[k - 1]).toFixed(1)} ${y}H${x}`;
+      if (step) d += `${k === 1 || Number.isNaN(ys[k - 1]) ? `M${this.across(xs[k - 1]).toFixed(1)} ` : "V"}${y}H${x}`;
       else d += `${k === 0 || Number.isNaN(ys[k - 1]) ? "M" : "L"}${x} ${y}`;
     }
     return d;

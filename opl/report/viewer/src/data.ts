@@ -8,7 +8,7 @@ export type Unpacked = ReturnType<Block["array"]>;
 export type Unpacking<R> = { [Name in keyof R as R[Name] extends Packed ? Name : never]: Unpacked };
 
 export type Solid = {
-  name: string; robot: boolean; around: boolean; colour: number; vertices: Packed; faces: Packed;
+  name: string; robot: boolean; around: boolean; colour: number; T: number[]; vertices: Packed; faces: Packed;
   joint: number; // how many joints move it
 };
 

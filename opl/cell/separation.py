@@ -1,0 +1,133 @@
+"""How far apart pairs of bodies are at the least, for many configurations in one call.
+
+Along any direction two bodies that do not reach each other are apart by what is between them there,
+so a few likely directions give a lower bound of their distance. Boxes and cylinders are taken as
+they are, anything else as the box around it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from opl.cell.separating import separate
+from opl.geometry.frames import Array
+
+MORE = 0.05  # [m] that a bound is improved beyond what is asked: for that long it is left alone
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """Solids on a chain of joints.
+
+    Attributes:
+        Ts_before_joint: Pose of each joint at angle 0 in the frame of the one before, (j, 4, 4).
+        axes: Unit axis of each joint in its own frame, shape (j, 3).
+        joint: Of each body the number of the joint that moves it, 0 for none, shape (b,).
+        Ts_joint_body: Middle and axes of each body in the frame of that joint, shape (b, 4, 4).
+        sizes: Half the edges of a box; radius, half length and -1 of a cylinder about z; in [m],
+            shape (b, 3).
+        levers: How far anything of each body can be from the axis of each joint that moves it, at
+            any configuration, in [m]; 0 for the others; shape (b, j).
+    """
+
+    Ts_before_joint: Array
+    axes: Array
+    joint: np.ndarray
+    Ts_joint_body: Array
+    sizes: Array
+    levers: Array
+
+    @classmethod
+    def of(cls, model: pin.Model, geometry: pin.GeometryModel) -> Bodies:
+        """Return the bodies of a model whose joints all turn, one after the other."""
+        data = model.createData()
+        pin.computeJointJacobians(model, data, pin.neutral(model))
+        joints = range(1, model.nq + 1)
+        Ts = np.array([model.jointPlacements[k].homogeneous for k in joints])
+        axes = np.array([data.oMi[k].rotation.T @ data.J[3:, k - 1] for k in joints])
+        objects = geometry.geometryObjects
+        boxes = [_box(body) for body in objects]
+        levers = np.zeros((len(objects), model.nq))
+        for lever, body, (T_joint_body, size) in zip(levers, objects, boxes, strict=True):
+            # of the middle, or of the origin of the next joint, in the frame of a joint; and how
+            # far anything of the body can be from there
+            place, rest = T_joint_body[:3, 3], float(np.linalg.norm(np.maximum(size, 0.0)))
+            for k in range(body.parentJoint - 1, -1, -1):
+                lever[k] = float(np.linalg.norm(np.cross(axes[k], place))) + rest
+                rest += float(np.linalg.norm(place))
+                place = Ts[k, :3, 3]
+        moved_by = np.array([body.parentJoint for body in objects], dtype=np.int64)
+        sizes = np.array([size for _, size in boxes])
+        return cls(Ts, axes, moved_by, np.array([T for T, _ in boxes]), sizes, levers)
+
+
+class Separation:
+    """Lower bounds of the distances of pairs of bodies, from one configuration to the next.
+
+    Since a bound was found, a distance cannot have shrunk by more than the joints between the two
+    bodies turned times their levers: what is far apart is left alone for as long as it must be.
+    """
+
+    def __init__(self, bodies: Bodies, pairs: np.ndarray) -> None:
+        """Begin with nothing known.
+
+        Args:
+            bodies: The bodies.
+            pairs: Numbers of two bodies each, shape (p, 2).
+        """
+        self._bodies = bodies
+        pairs = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        # the one that is moved by fewer joints first
+        order = bodies.joint[pairs].argsort(axis=1, kind="stable")
+        self._pairs = np.ascontiguousarray(np.take_along_axis(pairs, order, axis=1))
+        self._last = np.zeros(len(bodies.axes))
+        self._best = np.zeros(len(pairs), dtype=np.int64)  # direction of each pair
+        self.apart = np.full(len(pairs), -np.inf)  # at the last configuration, at the least, in [m]
+
+    def near(self, q: Array, enough: Array) -> np.ndarray:
+        """Return which pairs may be as near as that; all others are certainly farther apart.
+
+        Args:
+            q: Configurations in [rad]; the nearer they follow each other, the faster; shape (n, j).
+            enough: Distances of the pairs in [m], shape (p,).
+
+        Returns:
+            Shape (n, p) of bool.
+        """
+        near: np.ndarray = np.empty((len(q), len(self._pairs)), dtype=bool)
+        bodies = self._bodies
+        separate(
+            np.array(q, dtype=float, order="C"),  # compiled for arrays that can be written to
+            bodies.Ts_before_joint,
+            bodies.axes,
+            bodies.joint,
+            bodies.Ts_joint_body,
+            bodies.sizes,
+            bodies.levers,
+            self._pairs,
+            enough,
+            MORE,
+            self._last,
+            self.apart,
+            self._best,
+            near,
+        )
+        return near
+
+
+def _box(body: pin.GeometryObject) -> tuple[Array, Array]:
+    """Return T_joint_body and size of a body as `Bodies` has them."""
+    shape = body.geometry
+    shape.computeLocalAABB()  # levers rest on it, too
+    if isinstance(shape, coal.Cylinder):
+        middle, size = np.zeros(3), np.array([shape.radius, shape.halfLength, -1.0])
+    else:
+        middle, size = shape.aabb_local.center(), np.array(
+            [shape.aabb_local.width(), shape.aabb_local.height(), shape.aabb_local.depth()]
+        ) / 2.0  # fmt: skip
+    placement = body.placement * pin.SE3(np.eye(3), middle)
+    return placement.homogeneous, size

@@ -1,0 +1,129 @@
+"""Jobs on a real scheduler with two worker processes: the same bytes, lost workers, versions."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import opl
+from opl.store.values import Outcome, Task
+from opl.work import cluster
+from opl.work.worker import Limits
+from tests.support.jobs import opl as command
+from tests.support.jobs import write_job
+
+distributed = pytest.importorskip("distributed", reason="needs the extra opl[cluster]")
+EPOCH = {"SOURCE_DATE_EPOCH": "1700000000"}
+CHILD = {**os.environ, **EPOCH, "PYTHONPATH": str(Path(opl.__file__).parents[1])}
+SMALL = {"passes.max_step_mm": 40, "search.contact_positions": 15}
+
+
+@pytest.fixture(scope="module")
+def machines(tmp_path_factory):
+    """Start a scheduler and two workers that stand in folders of their own; yield its address."""
+    home = tmp_path_factory.mktemp("cluster")
+    port = 38786
+    address = f"tcp://127.0.0.1:{port}"
+    scheduler = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1",
+                 "--port", str(port), "--no-dashboard"]  # fmt: skip
+    processes = [subprocess.Popen(scheduler, cwd=home, env=CHILD, stderr=subprocess.DEVNULL)]
+    for number in range(2):
+        place = home / str(number)
+        place.mkdir()
+        worker = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1",
+                  "--no-dashboard", "--local-directory", str(place)]  # fmt: skip
+        processes.append(subprocess.Popen(worker, cwd=place, env=CHILD, stderr=subprocess.DEVNULL))
+    client = distributed.Client(address, timeout="60s", set_as_default=False)
+    client.wait_for_workers(2, timeout=60)
+    yield address, client
+    client.close()
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        process.wait(30)
+
+
+def made(folder):
+    """Return what jobs made in a folder, without what is measured."""
+    found = {}
+    for path in sorted(folder.glob("*/*")):
+        if path.name == "report.html":
+            continue
+        content = path.read_bytes()
+        if path.name == "result.json":
+            result = json.loads(content)
+            del result["seconds"]
+            content = json.dumps(result).encode()
+        found[path.relative_to(folder).as_posix()] = content
+    return found
+
+
+def test_the_same_bytes_come_back_though_a_worker_is_killed(machines, tmp_path, monkeypatch):
+    address, client = machines
+    monkeypatch.setenv(*next(iter(EPOCH.items())))
+    monkeypatch.chdir(tmp_path)
+    for number in range(6):
+        changes = {**SMALL, "name": f"J{number}", "process.feed_mm_s": 20 + number}
+        write_job(tmp_path / "jobs" / str(number), changes)
+    write_job(tmp_path / "jobs" / "bad", {**SMALL, "name": "BAD", "wheel.width_mm": -3})
+    batch = subprocess.Popen(
+        [sys.executable, "-c", "import sys; from opl.cli.commands import main; sys.exit(main())",
+         "batch", "jobs", "--scheduler", address, "--out", "there", "--json"],
+        cwd=tmp_path, env=CHILD, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 120.0
+    while not list((tmp_path / "there").glob("*/result.json")):
+        assert time.monotonic() < deadline and batch.poll() is None
+        time.sleep(0.1)
+    victim = next(iter(client.run(os.getpid).values()))
+    os.kill(victim, signal.SIGKILL)
+    out, _ = batch.communicate(timeout=300)
+    rows = {Path(row["job"]).parent.name: row for row in json.loads(out)}
+    assert [rows[str(number)]["status"] for number in range(6)] == ["ok"] * 6
+    assert (
+        rows["bad"]["message"] == "jobs/bad/job.yaml: wheel.width_mm: must be more than 0, got -3"
+    )
+    assert batch.returncode == 2
+    assert command("batch", "--audit", "--out", "there").status == 0
+    assert command("batch", "jobs/0", "jobs/3", "--out", "here", "-q").status == 0
+    here, there = made(tmp_path / "here"), made(tmp_path / "there")
+    assert len(here) == 12
+    assert {name: there[name] for name in here} == here
+    again = json.loads(command("batch", "jobs", "--out", "there", "--json").out)
+    assert all(row["unchanged"] for row in again)  # where they were done makes no difference
+
+
+def test_other_versions_are_refused_with_the_reason(machines, tmp_path, monkeypatch):
+    _, client = machines
+    monkeypatch.chdir(write_job(tmp_path, SMALL).parent)
+    versions = {**cluster.made_with(), "numpy": "1.0", "code": "other"}
+    monkeypatch.setattr(cluster, "made_with", lambda: versions)
+    doer = cluster.ClusterDoer(client, Limits())
+    outcome = doer.do(Task("run", "job.yaml", "out"), lambda *_: True)
+    assert isinstance(outcome, Outcome) and (outcome.status, outcome.final) == ("error", False)
+    assert outcome.message.startswith("job.yaml: a worker of the cluster has other versions")
+    assert (
+        f"numpy {versions and __import__('numpy').__version__} there, 1.0 here" in outcome.message
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_cannot_travel_is_refused(machines, tmp_path, monkeypatch):
+    _, client = machines
+    mesh = write_job(tmp_path / "a", SMALL).parent / "v_shape.stl"
+    job = write_job(tmp_path / "b", {**SMALL, "workpiece.mesh": str(mesh)})
+    monkeypatch.chdir(job.parent)
+    doer = cluster.ClusterDoer(client, Limits())
+    outcome = doer.do(Task("run", "job.yaml", "out"), lambda *_: True)
+    assert outcome.message == f"job.yaml: names {mesh}, which other machines do not have"
+
+
+def test_a_scheduler_that_does_not_answer_is_refused(monkeypatch):
+    monkeypatch.setattr(cluster, "PATIENCE", "1s")
+    with pytest.raises(opl.InputError, match=r"--scheduler tcp://127.0.0.1:9: does not answer"):
+        cluster.Cluster("tcp://127.0.0.1:9")

@@ -1,0 +1,123 @@
+"""Lower bounds of distances, and what rests on them, against every pair measured one by one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from opl.cell.collision import CollisionScene
+from opl.cell.nearest import nearest_pairs
+from opl.cell.robot import load_robot
+from opl.cell.separation import Bodies, Separation
+from opl.geometry.frames import pose
+from opl.geometry.rotations import from_rotation_vector
+from opl.geometry.shapes import Body, Box, Cylinder
+from tests.support.planned import v_job
+
+
+def turned(rng):
+    """A pose somewhere around the robot."""
+    return pose(from_rotation_vector(rng.normal(size=3)), rng.uniform(-1.2, 1.2, 3))
+
+
+def crowded(robot, seed):
+    """The V part held by a robot among boxes and cylinders that lie about at random."""
+    rng = np.random.default_rng(seed)
+    shapes = [Box(rng.uniform(0.05, 0.6, 3)) for _ in range(3)]
+    shapes += [Cylinder(rng.uniform(0.02, 0.3), rng.uniform(0.05, 0.8)) for _ in range(3)]
+    solids = tuple(Body(f"solid {k}", shape, turned(rng)) for k, shape in enumerate(shapes))
+    return replace(v_job().cell, robot=load_robot(robot), obstacles=solids, required_clearance=0.02)
+
+
+def configurations(robot, seed, n=40):
+    """Some far apart and some that follow each other closely."""
+    rng = np.random.default_rng(seed)
+    far = rng.uniform(robot.lower, robot.upper, (n, 6))
+    return np.concatenate([far, far[-1] + np.cumsum(rng.normal(0.0, 0.01, (n, 6)), axis=0)])
+
+
+def all_distances(scene, q):
+    """The distance of every pair, measured."""
+    found = []
+    for one in q:
+        scene.place(one)
+        found.append([scene.distance(k) for k in range(len(scene._pairs))])
+    return np.array(found)
+
+
+@pytest.mark.parametrize("robot", ["mh24", "ur10e"])
+@given(seed=st.integers(0, 2**20))
+@settings(max_examples=4, deadline=None)
+def test_no_bound_is_above_the_distance(robot, seed):
+    cell = crowded(robot, seed)
+    scene = CollisionScene(cell)
+    every = np.arange(len(scene._pairs))
+    q = configurations(cell.robot, seed)
+    distances = all_distances(scene, q)
+    for enough in (0.0, 0.05, 10.0):
+        separation = scene.separation(every)
+        for one, distance in zip(q, distances, strict=True):
+            near = separation.near(one[None], np.full(len(every), enough))[0]
+            # into each other coal tells depths of its own
+            assert (separation.apart <= np.maximum(distance, 0.0) + 1e-6).all()
+            assert (near == (separation.apart <= enough)).all()
+
+
+@pytest.mark.parametrize("robot", ["mh24", "gp25", "ur10e"])
+def test_collisions_are_those_of_every_pair_asked_one_by_one(robot):
+    cell = crowded(robot, seed=5)
+    scene = CollisionScene(cell)
+    q = configurations(cell.robot, seed=6, n=80)
+    for one in (scene, scene.for_second_opinion(), scene.less(0.015)):
+        data = one._geometry_data
+        wanted = []
+        for configuration in q:
+            one.place(configuration)
+            count = len(one._pairs)
+            wanted.append([pin.computeCollision(one._geometry, data, k) for k in range(count)])
+        hit = np.any(wanted, axis=1)
+        assert 0.05 < hit.mean() < 0.95
+        np.testing.assert_array_equal(one.collides(q), hit)
+        for configuration, pairs in zip(q[:20], wanted, strict=False):
+            names = {one.pair(k) for k in np.flatnonzero(pairs)}
+            assert set(one.colliding_pairs(configuration)) == names
+
+
+def test_configurations_may_be_read_only():
+    scene = CollisionScene(v_job().cell)
+    q = np.tile(v_job().process.home, (3, 1))
+    q.setflags(write=False)
+    assert not scene.collides(q).any()
+    assert scene.colliding_pairs(q[0]) == []
+
+
+def test_the_nearest_pair_is_the_least_of_all_pairs_that_keep_a_distance():
+    cell = crowded("mh24", seed=8)
+    scene = CollisionScene(cell)
+    q = configurations(cell.robot, seed=9)
+    found = nearest_pairs(scene, q)
+    least = all_distances(scene, q)[:, scene.kept_apart].min(axis=1)
+    np.testing.assert_allclose(found.distance, least, atol=5e-6)
+    ends = np.linalg.norm(found.points[:, 0] - found.points[:, 1], axis=1)
+    apart = least > 0.0
+    np.testing.assert_allclose(ends[apart], least[apart], atol=1e-5)
+
+
+def test_bounds_of_boxes_and_cylinders_apart_along_a_face_or_an_axis_are_exact():
+    # two cubes on one joint-less chain: 0.3 m between faces, whatever lies across
+    chain = Bodies(
+        np.eye(4)[None],
+        np.array([[0.0, 0.0, 1.0]]),
+        np.zeros(3, dtype=np.int64),
+        np.array(
+            [pose(np.eye(3), np.array([x, y, 0.0])) for x, y in ((0, 0), (0.5, 0.15), (2, 0))]
+        ),
+        np.array([[0.1, 0.1, 0.1], [0.1, 0.1, 0.1], [0.4, 0.2, -1.0]]),
+        np.zeros((3, 1)),
+    )
+    separation = Separation(chain, np.array([[0, 1], [0, 2]]))
+    separation.near(np.zeros((1, 1)), np.full(2, 10.0))
+    np.testing.assert_allclose(separation.apart, [0.3, 1.5], atol=1e-12)
