@@ -54,7 +54,13 @@ class CollisionScene:
         self._needed = np.array(self._choose_pairs(cell))
         self._bodies = Bodies.of(self._model, self._geometry)
         self._margins = self._needed
+        self._asked = [0]  # of all scenes made of this one
         self._prepare(self._margins, range(0))
+
+    @property
+    def queries(self) -> int:
+        """How many configurations this scene and those made of it have been asked about."""
+        return self._asked[0]
 
     def _prepare(self, margins: Array, unchecked: Iterable[int]) -> None:
         """Make ready for checks with these margins in [m], without some of the pairs."""
@@ -146,6 +152,7 @@ class CollisionScene:
 
     def collides(self, q: Array) -> np.ndarray:
         """Return which configurations in [rad], shape (n, 6), collide; shape (n,) of bool."""
+        self._asked[0] += len(q)
         found: np.ndarray = np.zeros(len(q), dtype=bool)
         for first in range(0, len(q), BLOCK):
             block = q[first : first + BLOCK]

@@ -1,9 +1,9 @@
-"""How fast the inverse solutions turn: their derivatives along a motion of the flange, enclosed.
+"""The inverse solutions and their derivatives along a motion of the flange, enclosed.
 
 The closed forms of `spherical_wrist` and `parallel_axes` are square roots and quotients up to the
 last step, the arc tangent. So their derivatives can be enclosed over a whole piece of a motion,
 without a sample and without an estimate. Where a piece touches a singularity or the end of the
-reach, nothing is known there of the joints that it concerns.
+reach, nothing is known there of the derivatives that it concerns, only where the joints are.
 """
 
 from __future__ import annotations
@@ -45,12 +45,16 @@ class JointDerivatives:
     """Enclosures over n cells, not finite where nothing is known.
 
     Attributes:
+        middle: Middle of what holds the angle in [rad], up to full turns, shape (8, 6, n).
+        radius: Half of what holds it, shape (8, 6, n).
         first: Largest size of the first derivative in [rad] per unit, shape (8, 6, n).
         second_low: Least second derivative, shape (8, 6, n).
         second_high: Greatest second derivative, shape (8, 6, n).
         none: Where there is certainly no posture in the whole cell, shape (8, n).
     """
 
+    middle: Array
+    radius: Array
     first: Array
     second_low: Array
     second_high: Array
@@ -64,15 +68,19 @@ def joint_derivatives(arm: Arm, flange: FlangeJets) -> JointDerivatives:
     else:
         slots = _parallel_axes(arm, flange)
     shape = (N_IK_BRANCHES, 6, *np.shape(flange.p[0].value.middle))
-    first, low, high = np.empty(shape), np.empty(shape), np.empty(shape)
+    middle, radius, first, low, high = (np.empty(shape) for _ in range(5))
     none = np.empty((N_IK_BRANCHES, *shape[2:]), dtype=bool)
     for slot, (joints, out_of_reach) in enumerate(slots):
         none[slot] = out_of_reach
-        for joint, (angle, sign) in enumerate(zip(joints, arm.signs, strict=True)):
-            second = angle.second.times(float(sign))
-            first[slot, joint] = np.abs(angle.first.middle) + angle.first.radius
+        for joint, (theta, offset, sign) in enumerate(
+            zip(joints, arm.offsets, arm.signs, strict=True)
+        ):
+            second = theta.second.times(float(sign))
+            middle[slot, joint] = sign * (theta.angle.middle + offset)
+            radius[slot, joint] = theta.angle.radius
+            first[slot, joint] = np.abs(theta.first.middle) + theta.first.radius
             low[slot, joint], high[slot, joint] = second.low, second.high
-    return JointDerivatives(first, low, high, none)
+    return JointDerivatives(middle, radius, first, low, high, none)
 
 
 def _spherical_wrist(arm: SphericalWristArm, flange: FlangeJets) -> list[Slot]:
@@ -87,9 +95,10 @@ def _spherical_wrist(arm: SphericalWristArm, flange: FlangeJets) -> list[Slot]:
         x_ahead, _ = _turned(flange.x, cos1, sin1)
         y_ahead, _ = _turned(flange.y, cos1, sin1)
         for elbow in (0, 1):
-            theta2, theta3, (cos_link, sin_link), beyond = _triangle(
+            theta2, bend, (cos_link, sin_link), beyond = _triangle(
                 forward, up, arm.c2, forearm, elbow
             )
+            theta3 = bend.plus(-tilt_zero)
             none = beside | beyond
             # the forearm axis stands off the line to the wrist by the angle of its offset
             c, s = float(np.cos(tilt_zero)), float(np.sin(tilt_zero))
@@ -104,8 +113,8 @@ def _spherical_wrist(arm: SphericalWristArm, flange: FlangeJets) -> list[Slot]:
             theta6 = turning(y3, -x3)
             slot = 2 * back + elbow
             slots[slot] = (theta1, theta2, theta3, theta4, theta5, theta6), none
-            flipped = (theta1, theta2, theta3, theta4, _negative(theta5), theta6)
-            slots[slot + 4] = flipped, none
+            turned = theta4.plus(np.pi), -theta5, theta6.plus(np.pi)
+            slots[slot + 4] = (theta1, theta2, theta3, *turned), none
     return [slots[slot] for slot in range(N_IK_BRANCHES)]
 
 
@@ -133,7 +142,7 @@ def _parallel_axes(arm: ParallelAxesArm, flange: FlangeJets) -> list[Slot]:
             for elbow in (0, 1):
                 theta2, theta3, _, beyond = _triangle(forward, up, arm.c2, arm.c3, elbow)
                 theta4 = tilt - theta2 - theta3
-                flipped = _negative(theta5) if flip else theta5
+                flipped = -theta5 if flip else theta5
                 joints = (theta1, theta2, theta3, theta4, flipped, theta6)
                 slots[4 * flip + 2 * back + elbow] = joints, beside | beyond
     return [slots[slot] for slot in range(N_IK_BRANCHES)]
@@ -183,7 +192,3 @@ def _triangle(
     sin2 = (forward * along - up * across) / away
     cos_link, sin_link = cos2 * cos_bend - sin2 * sin_bend, sin2 * cos_bend + cos2 * sin_bend
     return turning(sin2, cos2), bend, (cos_link, sin_link), np.asarray(beyond)
-
-
-def _negative(angle: Turning) -> Turning:
-    return Turning(-angle.first, -angle.second)

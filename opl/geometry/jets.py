@@ -61,9 +61,8 @@ class Interval:
         return self * Interval(other.middle / apart, other.radius / apart)
 
     def root(self) -> Interval:
-        """Return the square roots."""
-        low = np.sqrt(np.where(self.low > 0.0, self.low, np.nan))
-        high = np.sqrt(np.where(self.low > 0.0, self.high, np.nan))
+        """Return the square roots, 0 of what is less than 0."""
+        low, high = np.sqrt(np.maximum(self.low, 0.0)), np.sqrt(np.maximum(self.high, 0.0))
         return Interval((low + high) / 2.0, (high - low) / 2.0)
 
 
@@ -130,21 +129,33 @@ class Jet:
 
 @dataclass(frozen=True)
 class Turning:
-    """How fast an angle turns, over cells.
+    """An angle and how fast it turns, over cells.
 
     Attributes:
+        angle: Holds the angle in [rad].
         first: Holds its first derivative in [rad] per unit of the variable.
         second: Holds its second derivative.
     """
 
+    angle: Interval
     first: Interval
     second: Interval
 
     def __add__(self, other: Turning) -> Turning:
-        return Turning(self.first + other.first, self.second + other.second)
+        return Turning(
+            self.angle + other.angle, self.first + other.first, self.second + other.second
+        )
 
     def __sub__(self, other: Turning) -> Turning:
-        return Turning(self.first - other.first, self.second - other.second)
+        return self + -other
+
+    def __neg__(self) -> Turning:
+        return Turning(-self.angle, -self.first, -self.second)
+
+    def plus(self, angle: float) -> Turning:
+        """Return it turned by an exact angle in [rad]."""
+        turned = Interval(self.angle.middle + angle, self.angle.radius)
+        return Turning(turned, self.first, self.second)
 
 
 def turning(sine: Jet, cosine: Jet) -> Turning:
@@ -154,7 +165,12 @@ def turning(sine: Jet, cosine: Jet) -> Turning:
     first = numerator / length
     change = cosine.value * sine.second - sine.value * cosine.second
     half = cosine.value * cosine.first + sine.value * sine.first
-    return Turning(first, (change - (first * half).times(2.0)) / length)
+    # sine and cosine lie in a rectangle: from its middle it is seen under this angle at the most
+    middle = np.arctan2(sine.value.middle, cosine.value.middle)
+    away = np.hypot(sine.value.middle, cosine.value.middle)
+    off = np.hypot(sine.value.radius, cosine.value.radius)
+    seen = np.arcsin(np.divide(off, away, out=np.full_like(away, np.nan), where=off < away))
+    return Turning(Interval(middle, seen), first, (change - (first * half).times(2.0)) / length)
 
 
 def constant(value: Array, like: Array) -> Jet:

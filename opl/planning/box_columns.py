@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,8 @@ from opl.search.in_box import missing_chords, sampled
 
 FINE = 33  # contact positions of a place at which a box is held against it
 ROW_SAMPLES = 8  # between two cutter points at one contact position
+POSTURES_OF_WORK = 400  # that cost a unit of work
+DISTANCES_OF_WORK = 50  # to the wheel that cost one
 BORDER = 1e-2  # belt units to look beyond what lies in the box
 
 
@@ -69,9 +71,15 @@ class Columns:
             float(after[0]) if len(after) else None,
         )
 
-    def missing(self, box: JointBox) -> Array:
-        """Return by how much a box must grow for each place, in [rad], shape (n,)."""
-        return missing_chords(self.q, self.free, box)
+    def missed(self, box: JointBox, known: Collection[float], allowed: float) -> list[float]:
+        """Return the places that a box misses by more than allowed in [rad], the worst first.
+
+        Those in ``known`` are left out.
+        """
+        missing = missing_chords(self.q, self.free, box)
+        missing[np.isin(self.places, list(known))] = 0.0
+        worst = np.argsort(-missing, kind="stable")
+        return [float(self.places[k]) for k in worst if missing[k] > allowed]
 
 
 class ColumnSampler:
@@ -86,6 +94,7 @@ class ColumnSampler:
         self._problem = problem
         self._seams = seams
         self.collisions = False  # whether postures that collide are left out
+        self.work = 0.0  # what was sampled so far, in units of work
 
     def columns(self, box: JointBox, placements: Sequence[Placement], places: Array) -> Columns:
         """Sample the postures of places where they are near to a box.
@@ -124,6 +133,7 @@ class ColumnSampler:
     ) -> Columns:
         """Return the postures of places at contact positions, shape (n, m)."""
         problem = self._problem
+        self.work += t.size / POSTURES_OF_WORK
         q = inverse_solutions(problem.cell, there.Ts_workpiece_cutter[:, None], t)
         q = self._placed(there.pass_index, q, placements)
         free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
@@ -170,6 +180,7 @@ class ColumnSampler:
         for column in (np.floor(places).astype(int), np.ceil(places).astype(int)):
             near += cuts[column[:, None], after - 1].astype(int) + cuts[column[:, None], after]
         unsure = (near > 0) & (near < 4)
+        self.work += np.count_nonzero(unsure) / DISTANCES_OF_WORK
         distance = wheel_distances(self._problem.scene, there, t, unsure)
         found = distance < -self._problem.cell.planned_penetration
         return np.asarray(np.where(unsure, found, near == 4))

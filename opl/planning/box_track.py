@@ -37,7 +37,7 @@ FINE_SHARE = 3e-5  # of the box: what an edge may bulge
 LEVELS = 4  # contact positions of a sweep that are looked at
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
-MOST_CHECKS = 12  # of motions in one box
+MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
 MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
 
 
@@ -61,12 +61,17 @@ class BoxTracks:
         most: Travel,
     ) -> None:
         self._problem = problem
-        self._sampler = sampler
+        self.sampler = sampler
         self._costs = costs
         self._max_contact_change = max_contact_change
         self._most = most
         self._wider = CollisionScene(problem.cell.widened(costs.push_away))
-        self.checks = 0
+        self.checks = self.places_checked = 0
+
+    @property
+    def queries(self) -> int:
+        """How many configurations were asked about for more than the clearance needed."""
+        return self._wider.queries
 
     def push_charge(self, q: Array) -> Array:
         """Return what nodes are charged for little clearance, q in [rad], shape (n, 6)."""
@@ -98,7 +103,7 @@ class BoxTracks:
         inner = box.widened(room / 2.0)
         t, spacing = samples_in(columns.t, columns.q, columns.free, inner, SAMPLES)
         t = np.concatenate([t, levels(columns.places, rows, inner, t[:, :1])], axis=1)
-        at = self._sampler.at(columns.places, columns.points, columns.placements, t)
+        at = self.sampler.at(columns.places, columns.points, columns.placements, t)
         coarse = sampled = _Sampled(self, at, rows, inner)
         track = sampled.smoothest()
         if track is None:
@@ -144,12 +149,14 @@ class _Sampled:
             wheel_distance=np.zeros(columns.t.shape),
         )
         self.matrices = open_matrices(self.problem)
+        self._swept = False
         shut = shut_edges(columns.places, columns.t, rows, box)
         for matrix in self.matrices:
             matrix.blocked.update(shut)
 
     def sweep(self) -> None:
         """Close every node that collides."""
+        self._swept = True
         hits: dict[int, np.ndarray] = {}
         asked: dict[int, np.ndarray] = {}
         for matrix in self.matrices:
@@ -201,7 +208,7 @@ class _Sampled:
         about = np.linspace(-1.0, 1.0, SAMPLES)
         last = search._problem.cell.wheel.last_position
         t = np.clip(own[:, None] + about * spacing[:, None], -last, last)
-        around = search._sampler.at(columns.places, columns.points, columns.placements, t)
+        around = search.sampler.at(columns.places, columns.points, columns.placements, t)
         return _Sampled(search, around, self._rows, self._box)
 
     def bulges(self, track: Track, box: JointBox) -> Bulges | None:
@@ -241,18 +248,23 @@ class _Sampled:
     def check(self, track: Track) -> Plan | None:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free."""
         search, places = self._search, self._columns.places
-        for _ in range(MOST_CHECKS):
+        most = search.checks + MOST_CHECKS
+        while search.checks < most:
             proposals = twins(self.matrices, track, self.problem.cell.robot)
-            outcome = propose_and_check(self.problem, self.matrices, proposals, search.checks)
+            before = search.checks
+            outcome = propose_and_check(self.problem, self.matrices, proposals, before)
+            now = outcome.plan if isinstance(outcome, Found) else outcome
+            search.checks = now.checks
+            search.places_checked += (search.checks - before) * len(places)
             if isinstance(outcome, Found):
                 plan = outcome.plan
-                search.checks = plan.checks
                 path, motion = plan.path, plan.motion
                 columns = np.arange(len(places))
                 original = np.interp(path.cutter_point, columns, places)
                 motion = motion.renumbered(np.interp(motion.cutter_point, columns, places))
                 return replace(plan, path=replace(path, cutter_point=original), motion=motion)
-            search.checks += len(proposals)
+            if not self._swept:
+                self.sweep()
             following = self.smoothest()
             if following is None:
                 break

@@ -2,9 +2,10 @@
 
 At a place the part can touch the wheel at every contact position t. The postures over a cell of t
 lie within h^2 / 8 times their second derivative of the chord between those at its ends, and the
-closed form of the inverse kinematics encloses that derivative. Cells are left out only where it is
-certain that nothing in them is allowed: out of reach, beyond the limits, or the part deeper in the
-wheel than any point of it can move within the cell.
+closed form of the inverse kinematics encloses that derivative. Where it does not, at singularities
+and the end of the reach, the postures themselves are enclosed, over cells cut smaller. Cells are
+left out only where it is certain that nothing in them is allowed: out of reach, beyond the limits,
+or the part deeper in the wheel than any point of it can move within the cell.
 """
 
 from __future__ import annotations
@@ -23,15 +24,15 @@ from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.cut_cells import cells_of, cut_finer
+from opl.planning.enclosed import ROUND_OFF, EnclosedCells, enclosing
 from opl.planning.images import Images
 from opl.planning.obstructed import Obstructions
-from opl.search.walls import UNKNOWN, Image, Line, Piece, Wall
+from opl.search.walls import Image, Line, Piece, Wall
 
-MOST_PARTS = 32  # of a cell whose pads are large
+MOST_CUTS = 3  # of such cells, each finer than the one before
 ROW_PARTS = 16  # cells between two places of a wall along a contact position
+PART_OF_A_WALL = 0.3  # of the work for one: a cell cut finer
 FINER = 8  # cells that one is cut into where a proof needs it
-COARSE = 5e-4  # [rad] sum of the pads that is small enough
-ROUND_OFF = 1e-9  # [rad] of inverse kinematics and enclosures
 
 
 @dataclass(frozen=True)
@@ -72,15 +73,19 @@ class ColumnWalls:
         self._part = part
         self._points = points
         self.images = images
+        self.made = 0.0  # walls made so far; one cell cut finer is part of one
         self.obstructions: Obstructions | None = None  # left out once they are known to matter
 
     def walls(self, places: Sequence[float]) -> list[Wall]:
         """Return the walls at fractional cutter points."""
+        self.made += len(places)
         Ts_workpiece_cutter = self._points.frames_at(np.asarray(places, dtype=float))
         grids, cuts = cells_of(self._cell, self._part, Ts_workpiece_cutter)
         cells = self._cells(Ts_workpiece_cutter, grids, cuts)
-        parts = [np.where(cut, 1, now) for cut, now in zip(cuts, cells.parts(), strict=True)]
-        if any((now > 1).any() for now in parts):
+        for _ in range(MOST_CUTS):
+            parts = [np.where(cut, 1, now) for cut, now in zip(cuts, cells.parts(), strict=True)]
+            if not any((now > 1).any() for now in parts):
+                break
             grids = [cut_finer(t, now) for t, now in zip(grids, parts, strict=True)]
             cuts = [np.repeat(cut, now) for cut, now in zip(cuts, parts, strict=True)]
             cells = self._cells(Ts_workpiece_cutter, grids, cuts)
@@ -92,6 +97,7 @@ class ColumnWalls:
 
     def finer(self, piece: Piece, cell: int) -> tuple[Piece, ...]:
         """Return one cell of a wall as pieces with smaller cells."""
+        self.made += PART_OF_A_WALL
         grid = np.linspace(piece.at[cell], piece.at[cell + 1], FINER + 1)
         T_workpiece_cutter = piece.line.T_workpiece_cutter
         if T_workpiece_cutter is None:
@@ -143,7 +149,7 @@ class ColumnWalls:
         cells = self._enclosed(q, flange, radius, grids, none, np.empty((len(grids), 4, 4)))
         return [list(self._pieces(cells, k, t)) for k, t in enumerate(contact_positions)]
 
-    def _pieces(self, cells: _Cells, wall: int, row: float | None = None) -> Iterator[Piece]:
+    def _pieces(self, cells: EnclosedCells, wall: int, row: float | None = None) -> Iterator[Piece]:
         """Yield the pieces of one of several walls."""
         t = cells.grids[wall]
         first, corner = cells.first[wall], cells.first[wall] + wall
@@ -161,16 +167,20 @@ class ColumnWalls:
                 corners = q[low : high + 1]
                 pad_low = cells.pad_low[family][:, now][:, low:high].T
                 pad_high = cells.pad_high[family][:, now][:, low:high].T
+                middle = cells.middle[family][:, now][:, low:high].T
+                sure = known[:, low:high].T & ~np.isnan(corners[:-1] + corners[1:])
                 if kind[low] == 2:
-                    sure = known[:, low:high].T & ~np.isnan(corners[:-1] + corners[1:])
-                    pad_low = np.where(sure, pad_low, -UNKNOWN)
-                    pad_high = np.where(sure, pad_high, UNKNOWN)
-                    corners = np.nan_to_num(corners)
+                    filled = np.nan_to_num(np.concatenate([middle[:1], middle]))
+                    corners = np.where(np.isnan(corners), filled, corners)
                 seams = self.images.seams.start[family]
                 start = seams + np.remainder(corners[0] - seams, 2.0 * np.pi)
                 steps = np.diff(corners, axis=0)
                 steps -= 2.0 * np.pi * np.round(steps / (2.0 * np.pi))
                 corners = np.concatenate([start[None], start + np.cumsum(steps, axis=0)])
+                radius = cells.radius[family][:, now][:, low:high].T
+                off_low, off_high = enclosing(corners, middle, radius)
+                pad_low = np.where(sure, np.maximum(pad_low, off_low), off_low)
+                pad_high = np.where(sure, np.minimum(pad_high, off_high), off_high)
                 piece = Piece(family, line, t[low : high + 1], corners, pad_low, pad_high)
                 yield from self._within_limits(piece)
 
@@ -190,7 +200,7 @@ class ColumnWalls:
 
     def _cells(
         self, Ts_workpiece_cutter: Array, grids: list[Array], cuts: list[np.ndarray]
-    ) -> _Cells:
+    ) -> EnclosedCells:
         """Enclose the postures over all cells of some places."""
         arm = self._cell.robot.arm
         corners = np.concatenate(
@@ -216,7 +226,7 @@ class ColumnWalls:
         grids: list[Array],
         cuts: list[np.ndarray],
         Ts_workpiece_cutter: Array,
-    ) -> _Cells:
+    ) -> EnclosedCells:
         """Return cells, the motion of the flange over each of them enclosed."""
         found = joint_derivatives(self._cell.robot.arm, flange)
         counts = np.array([len(t) - 1 for t in grids])
@@ -226,48 +236,10 @@ class ColumnWalls:
         known = np.isfinite(pad_low) & np.isfinite(pad_high)
         known &= 2.0 * radius * found.first < np.pi / 2.0
         first = np.concatenate([[0], np.cumsum(counts)[:-1]])
-        return _Cells(
-            Ts_workpiece_cutter, grids, cuts, first, corners, pad_low, pad_high, known, found.none,
-            np.array(self.images.families),
+        return EnclosedCells(
+            Ts_workpiece_cutter, grids, cuts, first, corners, pad_low, pad_high, known,
+            found.middle, found.radius, found.none, np.array(self.images.families),
         )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class _Cells:
-    """The cells of several places, one place after the other.
-
-    Attributes:
-        Ts_workpiece_cutter: The places, shape (k, 4, 4).
-        grids: Ends of the cells of each.
-        cuts: In which cells of each the part surely cuts into the wheel.
-        first: First cell of each, shape (k,).
-        q: Postures at the ends, principal angles in [rad], shape (n + k, 8, 6).
-        pad_low: As in `Piece`, shape (8, 6, n).
-        pad_high: As in `Piece`.
-        known: Which pads are, shape (8, 6, n).
-        none: Where there is certainly no posture, shape (8, n).
-        families: Those that matter.
-    """
-
-    Ts_workpiece_cutter: Array
-    grids: list[Array]
-    cuts: list[np.ndarray]
-    first: np.ndarray
-    q: Array
-    pad_low: Array
-    pad_high: Array
-    known: np.ndarray
-    none: np.ndarray
-    families: np.ndarray
-
-    def parts(self) -> list[np.ndarray]:
-        """Return into how many parts each cell of each place should be cut."""
-        pads = (self.pad_high - self.pad_low)[self.families].sum(axis=1)
-        wanted = np.ceil(np.sqrt(pads / COARSE))  # pads fall with the square
-        wanted = np.where(self.known[self.families].all(axis=1), wanted, MOST_PARTS)
-        wanted = np.where(self.none[self.families], 1, wanted)
-        parts = np.minimum(wanted.max(axis=0), MOST_PARTS).astype(int)
-        return np.split(parts, self.first[1:])
 
 
 def _runs(kind: np.ndarray) -> list[tuple[int, int]]:

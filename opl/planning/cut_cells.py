@@ -54,6 +54,7 @@ def halved(
     low: Array,
     high: Array,
     surely: Callable[[np.ndarray, Array, Array], tuple[np.ndarray, np.ndarray]],
+    most_within: int = MOST_HALVINGS,
 ) -> tuple[np.ndarray, Array, Array, np.ndarray]:
     """Return cells, halved where something begins in them, and which of them it surely fills.
 
@@ -62,10 +63,11 @@ def halved(
         low: Least of each, one beginning where the one before in its run ends.
         high: Greatest of each.
         surely: Which cells of these it surely fills, and where it is at their middle.
+        most_within: How often a cell is halved that lies within it, but not surely.
     """
     cuts, deep = surely(run, low, high)
-    for _ in range(MOST_HALVINGS):
-        unsure = deep & ~cuts
+    for halving in range(MOST_HALVINGS):
+        unsure = deep & ~cuts & (halving < most_within)
         begins = (deep[:-1] != deep[1:]) & (run[:-1] == run[1:])
         unsure[:-1] |= begins & ~deep[:-1]
         unsure[1:] |= begins & ~deep[1:]

@@ -6,7 +6,7 @@ flipped. Which image a pass uses is its placement.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.planning.images import Images
 from opl.search.box import JointBox
+from opl.search.cells import Key
 from opl.search.in_box import JUMP
 from opl.search.outside import outside
 
@@ -22,6 +23,8 @@ FEW_COLUMNS = 40  # over which a box is grown at first
 STARTS = 8  # nodes from which one is grown
 MOST_PASSES = 8  # in which families are ruled out before the proof begins
 MOST_GROWN = 200  # times that a box is grown for a column
+NODES_OF_WORK = 6000  # that cost a unit of work to hold against a box
+MOST_KNOWN = 64  # passes in one image each that are kept at hand
 GROWN = 1e-7  # [rad] less need not be grown for
 
 
@@ -31,17 +34,24 @@ class Placement:
 
     Attributes:
         family: The family.
-        flip: Whether its wrist is flipped, index of `Images.flips`.
+        number: Which flip of the wrist.
+        flip: Its sign and shift.
         shift: Full turns in [rad], shape (6,).
         loose: Joints whose full turns are counted anew at each node, shape (6,).
         center: Where those should be near to, in [rad], shape (6,).
     """
 
     family: int
+    number: int
     flip: tuple[Array, Array]
     shift: Array
     loose: np.ndarray
     center: Array
+
+    @property
+    def key(self) -> tuple[int, int, bytes]:
+        """The same for those that place alike, but for loose joints."""
+        return self.family, self.number, self.shift.tobytes()
 
     def of(self, q: Array) -> Array:
         """Return the placed joint positions, shape (..., 6)."""
@@ -76,8 +86,12 @@ def grown(q: Array, free: np.ndarray, box: JointBox) -> JointBox | None:
         free: Which may be used, shape (n, m).
         box: The box.
     """
-    by_joint = np.ascontiguousarray(np.moveaxis(q, 1, 2))
-    low, high, free = box.lower.copy(), box.upper.copy(), np.ascontiguousarray(free)
+    return _grown(np.ascontiguousarray(np.moveaxis(q, 1, 2)), np.ascontiguousarray(free), box)
+
+
+def _grown(by_joint: Array, free: np.ndarray, box: JointBox) -> JointBox | None:
+    """Return a box as `grown` does, for postures of shape (n, 6, m)."""
+    low, high, q = box.lower.copy(), box.upper.copy(), by_joint
     missing, row = np.empty(len(q)), np.empty(len(q))
     for _ in range(MOST_GROWN):
         outside(by_joint, free, low, high, JUMP, missing, row)
@@ -88,11 +102,16 @@ def grown(q: Array, free: np.ndarray, box: JointBox) -> JointBox | None:
             break
         here = int(row[column])
         x = row[column] - here
-        point = q[column, here]
+        point = q[column, :, here]
         if x > 0.0:
-            point = (1.0 - x) * point + x * q[column, here + 1]
+            point = (1.0 - x) * point + x * q[column, :, here + 1]
         low, high = np.minimum(low, point), np.maximum(high, point)
     return JointBox(low, high)
+
+
+def alike(placements: Sequence[Placement]) -> bool:
+    """Return whether all passes are ground in one family with the wrist to one side."""
+    return len({(one.family, one.number) for one in placements}) == 1
 
 
 def few_columns(pass_index: np.ndarray) -> np.ndarray:
@@ -111,6 +130,9 @@ class Families:
         q: Inverse solutions in [rad], shape (N, M, 8, 6).
         cuts: Where the part would sink too deep into the wheel, shape (N, M).
         pass_index: Pass of each column, shape (N,).
+
+    Attributes:
+        work: What was held against boxes so far, in units of work.
     """
 
     def __init__(self, images: Images, q: Array, cuts: np.ndarray, pass_index: np.ndarray) -> None:
@@ -119,6 +141,8 @@ class Families:
         q, cuts, pass_index = q[few], cuts[few], pass_index[few]
         self._pass_index = pass_index
         self._unrolled = {}
+        self._known: dict[tuple[int, tuple[int, int, bytes]], tuple[Array, np.ndarray]] = {}
+        self.work = 0.0
         for family in images.families:
             start = images.seams.start[family]
             unrolled = start + np.remainder(q[:, :, family] - start, 2.0 * np.pi)
@@ -138,7 +162,7 @@ class Families:
             loose = ~self._images.seams.kept[family]
             for row in rows[np.linspace(0, len(rows) - 1, STARTS).astype(int)]:
                 start = unrolled[0, row]
-                here = Placement(family, self._images.flips[0], np.zeros(6), loose, start)
+                here = Placement(family, 0, self._images.flips[0], np.zeros(6), loose, start)
                 few = grown(here.of(unrolled[::step]), free[::step], JointBox(start, start))
                 if few is None or (best is not None and few.size >= best.size):
                     continue
@@ -163,61 +187,84 @@ class Families:
     def grown(self, box: JointBox, placements: Sequence[Placement]) -> JointBox | None:
         """Return a box grown for all columns at the field's contact positions, as `grown` does."""
         for index, placement in enumerate(placements):
-            columns = self._pass_index == index
-            unrolled, free = self._unrolled[placement.family]
-            larger = grown(placement.of(unrolled[columns]), free[columns], box)
+            larger = _grown(*self._placed(index, placement), box)
             if larger is None:
                 return None
             box = larger
         return box
 
-    def _fits(self, index: int, low: Array, high: Array, reference: bool) -> list[Fit]:
-        """Return how every image of every family of a pass fits into a box.
+    def _placed(self, index: int, placement: Placement) -> tuple[Array, np.ndarray]:
+        """Return the nodes of a pass as placed, shape (n, 6, m), and which are free, (n, m)."""
+        key = index, placement.key
+        found = self._known.get(key)
+        if found is None:
+            columns = self._pass_index == index
+            unrolled, free = self._unrolled[placement.family]
+            q = np.ascontiguousarray(np.moveaxis(placement.of(unrolled[columns]), 1, 2))
+            found = q, np.ascontiguousarray(free[columns])
+            if not placement.loose.any():
+                if len(self._known) >= MOST_KNOWN:
+                    self._known.clear()
+                self._known[key] = found
+        self.work += found[1].size / NODES_OF_WORK
+        return found
 
-        Args:
-            index: The pass.
-            low: Lower faces in [rad], shape (6,).
-            high: Upper faces.
-            reference: Whether only the families themselves count, not their images.
-        """
-        columns = self._pass_index == index
-        found = []
-        center = (low + high) / 2.0
+    def _placements(
+        self, index: int, center: Array, keys: Sequence[Key] | None
+    ) -> Iterator[Placement]:
+        """Yield the images that a pass may use; of families not decided yet those near a box."""
         for family, (unrolled, free) in self._unrolled.items():
-            for flip in self._images.flips[: 1 if reference else None]:
-                sign, shift = flip
-                now = unrolled[columns] * sign + shift
-                open_now = free[columns]
-                loose = ~self._images.seams.kept[family]
-                mean = now[open_now].mean(axis=0) if open_now.any() else center
-                turns = 2.0 * np.pi * np.round((center - mean) / (2.0 * np.pi))
-                whole = np.zeros(6) if reference else np.where(loose, 0.0, turns)
-                placement = Placement(family, flip, whole, loose, center)
-                q = np.ascontiguousarray(np.moveaxis(placement.of(unrolled[columns]), 1, 2))
-                missing, row = np.empty(len(q)), np.empty(len(q))
-                outside(q, np.ascontiguousarray(open_now), low, high, JUMP, missing, row)
-                found.append(Fit(placement, missing, row))
+            loose = ~self._images.seams.kept[family]
+            if keys is not None:
+                own = [key for name, key in keys if name == family]
+                for flip, *turns in own:
+                    shift = 2.0 * np.pi * np.array(turns, dtype=float)
+                    yield Placement(family, flip, self._images.flips[flip], shift, loose, center)
+                continue
+            columns = self._pass_index == index
+            q, open_now = unrolled[columns], free[columns]
+            mean = q[open_now].mean(axis=0) if open_now.any() else center
+            for flip, (sign, shift) in enumerate(self._images.flips):
+                whole = np.round((center - mean * sign - shift) / (2.0 * np.pi))
+                whole = 2.0 * np.pi * np.where(loose, 0.0, whole)
+                yield Placement(family, flip, (sign, shift), whole, loose, center)
+
+    def _fits(self, index: int, box: JointBox, keys: Sequence[Key] | None) -> list[Fit]:
+        """Return how the images that a pass may use fit into a box."""
+        found = []
+        for placement in self._placements(index, (box.lower + box.upper) / 2.0, keys):
+            q, free = self._placed(index, placement)
+            missing, row = np.empty(len(q)), np.empty(len(q))
+            outside(q, free, box.lower, box.upper, JUMP, missing, row)
+            found.append(Fit(placement, missing, row))
         return found
 
     def hold(
-        self, box: JointBox, reference: int, known: Collection[float], allowed: float
+        self,
+        box: JointBox,
+        keys: Mapping[int, Sequence[Key]],
+        known: Collection[float],
+        allowed: float,
     ) -> tuple[list[Placement], list[float]]:
         """Return the image of each pass that fits a box best, and where passes miss it most.
 
         Args:
             box: The box.
-            reference: The pass of which only the families themselves count, not their images.
+            keys: What is left of the families and images of passes, by pass.
             known: Cutter points that are held against the box already.
             allowed: What it may miss in [rad].
 
         Returns:
-            The images, and the worst cutter point of each pass, the worst of all first.
+            The images, none if a pass has none left, and the worst cutter point of each pass, the
+            worst of all first.
         """
         placements, missed = [], []
         for index in range(int(self._pass_index[-1]) + 1):
-            fits = self._fits(index, box.lower, box.upper, index == reference)
+            fits = self._fits(index, box, keys.get(index))
             columns = self._places[self._pass_index == index]
             there = np.array([float(column) in known for column in columns])
+            if not fits:
+                return [], []
             # the image that the proof has in mind: the walls of the pass fit into the box
             best = min(fits, key=lambda fit: _misfit(fit, there))
             placements.append(best.placement)

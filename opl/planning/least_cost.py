@@ -13,7 +13,8 @@ import numpy as np
 
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.geometry.frames import Array
-from opl.planning.columns import ROUND_OFF, ColumnWalls
+from opl.planning.columns import ColumnWalls
+from opl.planning.enclosed import ROUND_OFF
 from opl.planning.images import Images, seams_of
 from opl.planning.problem import GrindingProblem
 from opl.search.shortest_way import Cells, WayPrices, cheapest_over_ends, cheapest_ways

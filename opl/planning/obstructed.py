@@ -15,6 +15,7 @@ from opl.planning.images import Images
 from opl.search.walls import Piece
 
 MOVED = np.array([0.0, 0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064])  # [m] within a cell
+MOST_WITHIN = 2  # halvings of a cell all in collision, but not deep enough to be sure
 
 
 class Obstructions:
@@ -44,7 +45,7 @@ class Obstructions:
 
         n = len(pads)
         first = np.arange(n, dtype=float)
-        _, low, high, cuts = halved(np.zeros(n, dtype=int), first, first + 1.0, surely)
+        _, low, high, cuts = halved(np.zeros(n, dtype=int), first, first + 1.0, surely, MOST_WITHIN)
         if not cuts.any():
             return [piece]
         cell = ((low + high) / 2.0).astype(int)

@@ -45,6 +45,8 @@ class OpenMatrix:
         cut_off: How many tracks, otherwise free, were refused for a free move: by which one, and
             the pair of bodies that blocks it.
         reached: Largest number of columns that a search passed.
+
+    What is known to collide is shared between the matrices of a problem.
     """
 
     nodes: NodeMatrix
@@ -54,6 +56,7 @@ class OpenMatrix:
     causes: Counter[tuple[int, str]] = field(default_factory=Counter)
     cut_off: Counter[tuple[FreeMove, Blocker]] = field(default_factory=Counter)
     reached: int = 0
+    _collides: dict[tuple[int, int], dict[int, bool]] = field(default_factory=dict)
     _swept: set[int] = field(default_factory=set)
     _sorted: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
@@ -93,11 +96,14 @@ class OpenMatrix:
             return
         self._swept.add(column)
         rows = np.flatnonzero(self.free[column])
-        # a full turn of the wrist brings the same bodies to the same places
-        _, first, turn = np.unique(
-            self.nodes.position_index[rows], return_index=True, return_inverse=True
-        )
-        hit = scene.collides(self.nodes.q[column, rows[first]])[turn]
+        positions = self.nodes.position_index[rows]
+        # full turns bring the same bodies to the same places, in this matrix and in others
+        known = self._collides.setdefault((self.nodes.ik_branch, column), {})
+        asked, first = np.unique(positions, return_index=True)
+        new = np.array([position not in known for position in asked.tolist()], dtype=bool)
+        hits = scene.collides(self.nodes.q[column, rows[first[new]]])
+        known.update(zip(asked[new].tolist(), hits.tolist(), strict=True))
+        hit = np.array([known[position] for position in positions.tolist()], dtype=bool)
         self.free[column, rows[hit]] = False
         self.causes[column, cause] += int(hit.sum())
 
@@ -111,7 +117,9 @@ class OpenMatrix:
 def open_matrices(problem: GrindingProblem) -> list[OpenMatrix]:
     """Return every matrix of a problem, nothing blocked yet but nodes that cut into the wheel."""
     matrices = []
+    collides: dict[tuple[int, int], dict[int, bool]] = {}
     for nodes in problem.field.matrices:
         free = problem.free_nodes(nodes)
-        matrices.append(OpenMatrix(nodes, problem.ladder(nodes, free), free))
+        ladder = problem.ladder(nodes, free)
+        matrices.append(OpenMatrix(nodes, ladder, free, _collides=collides))
     return matrices

@@ -7,23 +7,24 @@ smoothest motion is sought, until nothing can be smaller than the best by more t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opl.geometry.frames import Array
 from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.box_track import BoxTracks
-from opl.planning.columns import ColumnWalls, Sweep
+from opl.planning.columns import ColumnWalls
 from opl.planning.costs import CostWeights
-from opl.planning.families import Families, few_columns, grown
+from opl.planning.crossings import Crossings
+from opl.planning.families import Families, Placement, alike, few_columns, grown
 from opl.planning.holders import Holder, holders
 from opl.planning.images import Images, seams_of
 from opl.planning.obstructed import Obstructions
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulges, Row
+from opl.planning.work import Work
 from opl.search.box import JointBox
 from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
@@ -34,8 +35,9 @@ MISSED = 0.05  # of the widening: what a box may miss a cutter point by and stil
 RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for next
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
 SWEEP_MISSED = 0.2  # of the widening: what it may miss a contact position by between them
-PLACE_DIGITS = 5  # of places, in cutter points
-PLACES_OF_WORK = 4  # that cost as much to look at as a subproblem
+EARLY_SHARE = 0.3  # of the work: motions in boxes that are not proven to be the least
+FIRST_WORK = 300  # units that may be spent on those at once
+CLEARLY_LESS = 0.005  # of the best: what a motion in such a box should be better by
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
 
@@ -49,7 +51,7 @@ class OptimalSettings:
             smoother track.
         max_contact_change: Largest change of t between neighbouring columns in belt units.
         costs: What a track is charged for inside the box.
-        max_subproblems: How much is tried: subproblems, and places held against a box.
+        max_subproblems: How much is tried, in units of work.
     """
 
     widen: float
@@ -90,13 +92,14 @@ class OptimalSearch:
         self.plan = fallback
         self._largest = largest
         self._proven = self._least_hope = 0.0
-        self._spent = self._given_up = 0
+        self._given_up = 0
+        self._early = 0.0  # work on early motions
         gap = PROOF_SHARE * settings.widen
         self.proof = BoxProof(self._walls.images.of, self._walls.finer, largest, gap)
         self._places: set[float] = set()
-        self._rows: list[tuple[Array, float, bool]] = []
-        self._passed: set[tuple[float, float, float]] = set()
-        self._columns = np.arange(len(problem.points), dtype=float)
+        self._work = Work(problem.scene.collision, self._walls, self._families, self._tracks)
+        self._work.begin_again(self.proof)
+        self._crossings = Crossings(self._sampler, points)
         self._hope(self._families.smallest_grown())
         first = [0.0, float(len(points) // 2), float(len(points) - 1)]
         self._add(list(dict.fromkeys(first + self._families.unreached())))
@@ -110,7 +113,7 @@ class OptimalSearch:
     @property
     def work_share(self) -> float:
         """How much of the work allowed is done."""
-        return (self._spent + self.proof.subproblems) / self._settings.max_subproblems
+        return self._work.done / self._settings.max_subproblems
 
     @property
     def open_because(self) -> str | None:
@@ -144,39 +147,66 @@ class OptimalSearch:
             return
         box = JointBox(candidate.low, candidate.high)
         share = MISSED * self._settings.widen if candidate.settled else CLEARLY_MISSED
-        reference, allowed = self.proof.walls[0].pass_index, share * self.proof.threshold
-        placements, missed = self._families.hold(box, reference, self._places, allowed)
+        allowed = share * self.proof.threshold
+        placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
         missed = missed[:MOST_ADDED]
         if not candidate.settled:
-            if not self._sampler.collisions:
-                self._hope(self._families.grown(box, placements))
+            if not self._sampler.collisions and placements:
+                self._look_for_more(box, placements)
             if missed:
+                self.proof.show_soon()
                 self._add(missed)
                 self.proof.put_back()
             else:
                 self.proof.split()
             return
-        columns = None
-        if len({(one.family, float(one.flip[0][4])) for one in placements}) == 1:
-            self._spent += len(self._columns) // PLACES_OF_WORK
-            columns = self._sampler.columns(box, placements, self._columns)
-            rows = self._sampler.rows(self._rows, columns)
-            inner = grown(columns.q, columns.free, box)
-            for row in rows:
-                inner = row.grown(inner) if inner is not None and row.must else inner
+        looked_at = None
+        if alike(placements):
+            looked_at = self._look(box, placements)
+            columns, _, inner = looked_at
             self._hope(inner)
-            missed = missed or self._missed(columns, box)
+            allowed = MISSED * self._settings.widen * self.proof.threshold
+            missed = missed or columns.missed(box, self._places, allowed)[:MOST_ADDED]
         if missed:
             self._add(missed)
             self.proof.put_back()
             return
-        if columns is not None and inner is not None and self._try(columns, rows, inner):
+        if looked_at is not None and self._try(*looked_at):
             self.proof.put_back()
         elif candidate.bound < self.proof.closing and not self._sampler.collisions:
             self._mind_collisions()
         elif candidate.bound < self.proof.closing:
             self._given_up += 1
             self.proof.give_up()
+
+    def _look(
+        self, box: JointBox, placements: Sequence[Placement]
+    ) -> tuple[Columns, list[Row], JointBox | None]:
+        """Return places and rows sampled near a box, and the box grown for them."""
+        columns = self._sampler.columns(box, placements, self._crossings.places)
+        rows = self._sampler.rows(self._crossings.rows, columns)
+        inner = grown(columns.q, columns.free, box)
+        for row in rows:
+            inner = row.grown(inner) if inner is not None and row.must else inner
+        return columns, rows, inner
+
+    def _look_for_more(self, box: JointBox, placements: Sequence[Placement]) -> None:
+        """Grow a box that is not settled until it holds all; look for a motion in it, if small."""
+        larger, threshold = self._families.grown(box, placements), self.proof.threshold
+        self._hope(larger)
+        if self.proof.threshold < threshold:
+            self.proof.show_soon()
+        before = self._work.done
+        least = self._value * (1.0 - CLEARLY_LESS)
+        if larger is None or larger.size > least or not alike(placements):
+            return
+        if self._early < FIRST_WORK + EARLY_SHARE * before:
+            columns, _, inner = self._look(larger, placements)
+            if inner is not None:
+                self._keep(
+                    self._tracks.plan(columns, (), inner, self._room(inner), lambda _: False)
+                )
+            self._early += self._work.done - before
 
     def _hope(self, box: JointBox | None) -> None:
         """Look only for what is as good as a motion in a box would be."""
@@ -200,77 +230,44 @@ class OptimalSearch:
     def _begin_again(self, threshold: float, least_hope: float) -> None:
         """Begin the proof again: boxes up to a larger size are of interest."""
         self._proven = self.lower_bound
-        self._spent += self.proof.subproblems
         self._least_hope = least_hope
         walls = self.proof.walls
         gap = PROOF_SHARE * self._settings.widen
         self.proof = BoxProof(self._walls.images.of, self._walls.finer, threshold, gap)
+        self._work.begin_again(self.proof)
         for wall in walls:
             self.proof.add(wall)
-
-    def _missed(self, columns: Columns, box: JointBox) -> list[float]:
-        """Return the places that a box misses most, looked at closely."""
-        missing = columns.missing(box)
-        missing[np.isin(columns.places, list(self._places))] = 0.0
-        worst = np.argsort(-missing, kind="stable")[:MOST_ADDED]
-        allowed = MISSED * self._settings.widen * self.proof.threshold
-        return [float(columns.places[k]) for k in worst if missing[k] > allowed]
 
     def _add(self, places: list[float]) -> None:
         for wall in self._walls.walls(places):
             self.proof.add(wall)
             self._places.add(wall.place)
 
-    def _learn(self, columns: Columns, box: JointBox, room: float, bulges: Bulges) -> bool:
-        """Take in where a track leaves a box between places; return whether that is new.
-
-        A contact position that motions in the box must pass, and nowhere can, becomes a wall. One
-        that they can pass somewhere is passed there: those places are looked at.
-        """
-        more, walls = [bulges.places], []
-        last = len(self._points) - 1
-        known = len(self._rows)
-        for place, t, upwards in bulges.sweeps:
-            before, after = columns.around(box, place, t, upwards)
-            must = before is not None and after is not None
-            index = self._points.pass_index
-            first = np.floor(place) if before is None else before
-            end = min(np.floor(place) + 1.0, last) if after is None else after
-            if index[int(first)] != index[int(end)]:
-                continue
-            key = float(first), float(end), round(t, 1)
-            if key in self._passed:
-                continue
-            self._passed.add(key)
-            row = self._sampler.row(key[0], key[1], t, must, columns, box)
-            if must and row.missing(box) > SWEEP_MISSED * self._settings.widen * box.size:
-                walls.append(Sweep(key[0], key[1], t, upwards))
-                continue
-            self._rows.append((row.places, t, must))
-            for begin, stop in row.inside(box.widened(room / 2.0)):
-                if not ((self._columns >= begin) & (self._columns <= stop)).any():
-                    more.append(np.array([(begin + stop) / 2.0]))
-        for wall in self._walls.sweeps(walls) if walls else ():
-            self.proof.add(wall)
-        before = len(self._columns)
-        self._columns = np.union1d(self._columns, np.round(np.concatenate(more), PLACE_DIGITS))
-        return len(self._columns) > before or len(self._rows) > known or bool(walls)
-
-    def _try(self, columns: Columns, rows: list[Row], box: JointBox) -> bool:
+    def _try(self, columns: Columns, rows: list[Row], box: JointBox | None) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
-        learnt = False
-        room = ROOM_SHARE * self._settings.widen * box.size
+        if box is None:
+            return False
+        learnt, room = False, self._room(box)
 
         def learn(bulges: Bulges) -> bool:
             nonlocal learnt
-            learnt = self._learn(columns, box, room, bulges)
+            allowed = SWEEP_MISSED * self._settings.widen * box.size
+            learnt, walls = self._crossings.learn(columns, box, room, allowed, bulges)
+            for wall in self._walls.sweeps(walls) if walls else ():
+                self.proof.add(wall)
             return learnt
 
-        found = self._tracks.plan(columns, rows, box, room, learn)
+        self._keep(self._tracks.plan(columns, rows, box, room, learn))
+        return learnt
+
+    def _room(self, box: JointBox) -> float:
+        return ROOM_SHARE * self._settings.widen * box.size
+
+    def _keep(self, found: Plan | None) -> None:
+        """Keep a motion that is better than the best."""
         if found is not None and found.path.joint_range_sum < self._value:
             self.plan = found
             self.proof.threshold = min(self.proof.threshold, self._value)
-        return learnt
 
 
 def plan_optimal(

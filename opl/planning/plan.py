@@ -17,7 +17,7 @@ from opl.planning.holders import Holder
 from opl.planning.open_matrix import OpenMatrix, Track
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import no_path
-from opl.planning.track_check import Free, check_track
+from opl.planning.track_check import Collides, Free, check_track
 
 
 @dataclass(frozen=True)
@@ -78,12 +78,16 @@ class Found:
 
 @dataclass(frozen=True)
 class Exhausted:
-    """No proposal is left, and none was free."""
+    """No proposal is left, and none was free; so many motions were checked."""
+
+    checks: int
 
 
 @dataclass(frozen=True)
 class OutOfBudget:
     """A search ended before it came to an end: as many motions as allowed were checked."""
+
+    checks: int
 
 
 SearchOutcome = Found | Exhausted | OutOfBudget
@@ -105,16 +109,24 @@ def propose_and_check(
         checks: How many motions were checked before.
         most_checks: How many to check at the most, those before included; None for no limit.
     """
+    collided: dict[tuple[int, bytes], Collides] = {}
     for track in proposals:
         matrix = matrices[track.matrix]
+        # full turns bring the same bodies to the same places
+        same = matrix.nodes.ik_branch, matrix.nodes.t_along(track.rows).tobytes()
+        if same in collided:
+            block(problem, matrix, track.rows, collided[same])
+            continue
         checks += 1
         found = check_track(problem, matrix.nodes, track.rows)
         if isinstance(found, Free):
             return Found(Plan(found.path, found.motion, checks))
         block(problem, matrix, track.rows, found)
+        if isinstance(found, Collides):
+            collided[same] = found
         if checks == most_checks:
-            return OutOfBudget()
-    return Exhausted()
+            return OutOfBudget(checks)
+    return Exhausted(checks)
 
 
 def first_free(

@@ -84,7 +84,7 @@ def plan_weighted(
             if found < value:
                 best, value = outcome.plan, found
         else:
-            checks += len(proposals)
+            checks = outcome.checks
             for entry in sweeps[index].entries([widening]):
                 heapq.heappush(queue, entry)
     known = ObjectiveValue(value, min(lower_bound, value))

@@ -44,7 +44,7 @@ def verdict(report: Report, job: Job, marks: Container[str]) -> str:
         found = {
             "Why not": bullets(report.reasons, reasons),
             "What would help": bullets(_help(report)),
-            "Tried in vain": bullets(report.tried_in_vain),
+            "Tried, does not help": bullets(report.tried_in_vain),
         }
     columns = {
         **found,

@@ -6,8 +6,7 @@ import numpy as np
 from numba import njit
 
 from opl.search.outside import nearest_on_chord
-from opl.search.relaxation import ROUND_OFF
-from opl.search.walls import UNKNOWN
+from opl.search.relaxation import ROUND_OFF, pressed
 
 MOST_ROUNDS = 12  # of cutting spans off; more would cut little
 STILL = 1e-6  # [rad] a core that grows by less in a round has stopped growing
@@ -100,65 +99,63 @@ def tighten(cells, spans, pass_index, n_keys, low, high, closing, sizes):  # typ
     return n
 
 
-@njit("float64(float64[:,::1],int64,float64[:,::1],float64[::1],float64[::1])", cache=True)
+@njit("float64(float64[:,::1],int64,float64[::1],float64[::1],float64[::1])", cache=True)
 def _pressed(cells, cell, prices, low, high):  # type: ignore[no-untyped-def]
     """Return how far a cell presses the faces of a core outwards at the least, at their prices."""
     start, end = 0.0, 0.0
-    for j in range(6):
-        up, down = prices[j, 0], prices[j, 1]
-        out = up * (cells[cell, 12 + j] - high[j]) + down * (low[j] - cells[cell, 18 + j])
-        start += out + (up - down) * cells[cell, j]
-        end += out + (up - down) * cells[cell, 6 + j]
+    for f in range(12):
+        if prices[f] > 0.0:
+            start += prices[f] * pressed(cells, cell, 0, f, low, high)
+            end += prices[f] * pressed(cells, cell, 1, f, low, high)
     return min(start, end)
 
 
 @njit(
-    "float64(float64[:,::1],int64[:,::1],float64[:,:,::1],float64[::1],float64[::1],float64)",
+    "int64(float64[:,::1],int64[:,::1],int64,float64[:,::1],float64[::1],float64[::1],float64)",
     cache=True,
 )
-def trim(cells, spans, prices, low, high, closing):  # type: ignore[no-untyped-def]
-    """Cut cells off the ends of spans that no box below a size can hold; return a bound in [rad].
+def trim(cells, spans, n_walls, prices, low, high, left):  # type: ignore[no-untyped-def]
+    """Cut cells off the ends of spans that no box below a size can hold; return how many are left.
 
     At the prices of a linear program each wall adds to the bound what its cheapest cell does, and
-    whoever takes another cell of it pays the difference. Infinite if a wall has no cell left.
+    whoever takes another cell of it pays the difference. 0 if a wall has no cell left.
 
     Args:
         cells: The table of `Cells`.
-        spans: One of each wall, shape (k, 5); they become shorter.
-        prices: As of `least_box`.
+        spans: Sorted by their walls; those left become shorter and are moved to the front.
+        n_walls: How many walls.
+        prices: As of `least_box`, shape (n_walls, 12).
         low: The lower faces of the box are not above these, in [rad], shape (6,).
         high: The upper faces are not below these.
-        closing: The size in [rad].
+        left: From the bound at these prices to the size, in [rad].
     """
-    k = len(spans)
-    least = np.full(k, np.inf)
-    total = 0.0
-    for j in range(6):
-        total += high[j] - low[j]
-    for w in range(k):
-        for cell in range(spans[w, 3], spans[w, 4]):
-            least[w] = min(least[w], _pressed(cells, cell, prices[w], low, high))
-        total += least[w]
-    for w in range(k):
-        most = closing - (total - least[w]) + ROUND_OFF
-        first, end = spans[w, 3], spans[w, 4]
-        while first < end and _pressed(cells, first, prices[w], low, high) >= most:
-            first += 1
-        while first < end and _pressed(cells, end - 1, prices[w], low, high) >= most:
-            end -= 1
-        if first == end:
-            return np.inf
-        spans[w, 3], spans[w, 4] = first, end
-    return total - ROUND_OFF
+    n, k = 0, 0
+    for wall in range(n_walls):
+        start, least, before = k, np.inf, n
+        while k < len(spans) and spans[k, 0] == wall:
+            for cell in range(spans[k, 3], spans[k, 4]):
+                least = min(least, _pressed(cells, cell, prices[wall], low, high))
+            k += 1
+        most = least + left + ROUND_OFF
+        for i in range(start, k):
+            first, end = spans[i, 3], spans[i, 4]
+            while first < end and _pressed(cells, first, prices[wall], low, high) >= most:
+                first += 1
+            while first < end and _pressed(cells, end - 1, prices[wall], low, high) >= most:
+                end -= 1
+            if first < end:
+                spans[n] = spans[i]
+                spans[n, 3], spans[n, 4] = first, end
+                n += 1
+        if n == before:
+            return 0
+    return n
 
 
 @njit("float64(float64[:,::1],int64,int64,float64[::1],float64[::1])", cache=True)
 def distance(cells, first, end, low, high):  # type: ignore[no-untyped-def]
-    """Return by how much a box misses the chords of a span, in [rad]; 0 if a pad is not known."""
+    """Return by how much a box misses the chords of a span, in [rad]."""
     best = np.inf
     for cell in range(first, end):
-        for j in range(6):
-            if cells[cell, 18 + j] >= UNKNOWN:
-                return 0.0
         best, _ = nearest_on_chord(cells[cell, :6], cells[cell, 6:12], low, high, best)
     return best

@@ -15,6 +15,7 @@ from opl.search.walls import Image, Piece, Wall
 
 COLUMNS = 26  # start 0:6, end 6:12, pad_low 12:18, pad_high 18:24, places 24 and 25
 WALL, KEY, SOURCE, FIRST, END = range(5)  # columns of a span
+Key = tuple[int, tuple[int, ...]]  # a family, and the key of its image
 
 
 class Cells:
@@ -42,7 +43,7 @@ class Cells:
         self.pass_index = np.empty(0, dtype=np.int64)
         self.table = np.empty((1024, COLUMNS))
         self._used = 0
-        self._keys: dict[tuple[int, tuple[int, ...]], int] = {}
+        self._keys: dict[Key, int] = {}
         self._sources: list[tuple[Piece, int]] = []  # piece and number of its image
         self._first: list[int] = []  # cell of each source, -1 for those not in the table yet
         self._of_wall: list[tuple[np.ndarray, Array, Array]] = []  # sources and boxes around them
@@ -67,6 +68,15 @@ class Cells:
         self._of_wall.append((sources, np.reshape(low, (-1, 6)), np.reshape(high, (-1, 6))))
         self.walls.append(wall)
         self.pass_index = np.append(self.pass_index, wall.pass_index)
+
+    def keys_of(self, spans: np.ndarray) -> dict[int, list[Key]]:
+        """Return the families and images of spans, by their pass, as all its walls have them."""
+        names = list(self._keys)
+        both = np.unique(np.stack([self.pass_index[spans[:, WALL]], spans[:, KEY]]), axis=1)
+        found: dict[int, list[Key]] = {}
+        for index, key in both.T.tolist():
+            found.setdefault(index, []).append(names[key])
+        return found
 
     def spans_of(self, wall: int, low: Array, high: Array, closing: float) -> np.ndarray:
         """Return the spans of a wall that boxes below a size can hold, the core given."""

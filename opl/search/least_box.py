@@ -1,9 +1,9 @@
 """The least box that holds a point of every wall, by branch and bound over intervals of few walls.
 
 A subproblem allows each wall some spans, runs of cells of a piece. What every box below the
-threshold must hold anyway, the core, cuts spans off; a linear program over the walls with one span
-left bounds the size of the box. What the bound loses to the bend of a span is told by the prices of
-the linear program: there the subproblem is split. Walls are added while the proof goes on.
+threshold must hold anyway, the core, cuts spans off; a linear program over the convex hulls of what
+is left of the walls bounds the size of the box. The box found meets some walls in their hulls only:
+the one that it misses most is split. Walls are added while the proof goes on.
 """
 
 from __future__ import annotations
@@ -16,37 +16,35 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.bounding import distance, tighten, trim
-from opl.search.cells import END, FIRST, WALL, Cells
+from opl.search.cells import END, FIRST, WALL, Cells, Key
 from opl.search.relaxation import least_box
 from opl.search.walls import Image, Piece, Wall
 
 SETTLED = 0.1  # of the gap wanted: what the bend of the spans may lose where none is split further
-MOST_TRIMS = 6  # of spans, before one is split
+MOST_TRIMS = 3  # of spans, before one is split
+NUMBERS_OF_A_CELL = 200  # worked on to cut off what no box can hold
+MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
+SMALLEST = 1e-6  # along a wall: a cell that is not cut further
 TRIMMED = 0.9  # of the cells: more left, and trimming goes on no longer
-PROBE_EVERY = 16  # subproblems: how often a box is shown that is not settled
+FEWEST_UNSEEN = 8  # subproblems split before a box is shown that is not settled
+MOST_UNSEEN = 256  # that many where those shown before told nothing new
 
 
 @dataclass(frozen=True)
 class Relaxation:
-    """The least box of the walls that have one span left.
+    """The least box over the convex hulls of the walls.
 
     Attributes:
-        alone: Those walls, shape (k,).
         low: Lower faces of the box found, shape (6,).
         high: Upper faces.
-        x: Where on each span, 0 to 1, shape (k,).
-        cost: How much larger it could be if a span had no pads, or what the box misses of it
-            without them, in [rad], shape (k,).
-        prices: How hard each span presses on each upper face of the box, and on each lower one,
-            from 0 to 1, shape (k, 6, 2).
+        place: Where along each wall it meets the hull, shape (k,).
+        lost: How much more a wall would press had its cells no pads, in [rad], shape (k,).
     """
 
-    alone: np.ndarray
     low: Array
     high: Array
-    x: Array
-    cost: Array
-    prices: Array
+    place: Array
+    lost: Array
 
 
 @dataclass(order=True)
@@ -79,15 +77,15 @@ class Candidate:
         bound: Of its subproblem in [rad].
         low: Lower faces in [rad], shape (6,).
         high: Upper faces.
-        held_by: For each wall, how hard it presses on the box.
         settled: Whether nothing is gained by splitting its subproblem further.
+        keys: The families and images that each pass with walls has left, by pass.
     """
 
     bound: float
     low: Array
     high: Array
-    held_by: dict[int, Array]
     settled: bool
+    keys: dict[int, list[Key]]
 
 
 class BoxProof:
@@ -112,7 +110,9 @@ class BoxProof:
         self.threshold = threshold
         self.stuck = np.inf  # least bound of what could not be split
         self.subproblems = 0
-        self._count = 0
+        self.work = 0.0  # how many numbers were worked on, about
+        self._count = self._unseen = 0
+        self._show_after = FEWEST_UNSEEN
         self._open: list[Subproblem] = []
         nothing = np.empty((0, 5), dtype=np.int64)
         self._push(0.0, nothing, 0, np.full(6, np.inf), np.full(6, -np.inf))
@@ -160,20 +160,37 @@ class BoxProof:
                 return None
         self._kept, self._branch = node, self._where_to_split(node)
         settled = self._branch is None
-        if not settled and self.subproblems % PROBE_EVERY:
+        if node.n_walls < len(self.walls):
+            self.put_back() if settled else self.split()
+            return None
+        self._unseen += 1
+        if not settled and self._unseen < self._show_after:
             self.split()
             return None
+        self._unseen, self._show_after = 0, min(2 * self._show_after, MOST_UNSEEN)
         found = node.found
         assert found is not None
-        alone = found.alone.tolist()
-        held_by = {k: found.prices[i] for i, k in enumerate(alone) if found.prices[i].any()}
-        return Candidate(node.bound, found.low, found.high, held_by, settled)
+        return Candidate(
+            node.bound, found.low, found.high, settled, self._cells.keys_of(node.spans)
+        )
 
-    @property
-    def kept_spans(self) -> list[tuple[int, Array]]:
-        """The wall and the cells of each span of the last candidate, as in the table of `Cells`."""
-        spans = self._kept.spans[:, [WALL, FIRST, END]].tolist()
-        return [(wall, self._cells.table[first:end]) for wall, first, end in spans]
+    def pressing(self) -> Array:
+        """Return how hard each wall presses on the faces of the last candidate's box.
+
+        On the upper face of each joint less on its lower one, from -1 to 1, shape (n_walls, 6).
+        """
+        node = self._kept
+        assert node.found is not None
+        # against a core turned inside out, so that no face is held by it
+        n, low, high = node.n_walls, node.found.high, node.found.low
+        box, place, lost, prices = np.empty((2, 6)), np.empty(n), np.empty(n), np.empty((n, 12))
+        size = float((low - high).sum())
+        least_box(self._cells.table, node.spans, n, low, high, size, box, place, lost, prices)
+        return np.asarray(prices[:, :6] - prices[:, 6:])
+
+    def show_soon(self) -> None:
+        """Show boxes that are not settled more often again: the last one told something new."""
+        self._show_after = FEWEST_UNSEEN
 
     def split(self) -> None:
         """Split the subproblem of the last candidate."""
@@ -195,60 +212,77 @@ class BoxProof:
     def _bound(self, node: Subproblem) -> bool:
         """Bound a subproblem; return whether it is still of interest."""
         cells, closing, n_walls = self._cells, self.closing, len(self.walls)
+        if len(node.spans) != 1 and node.n_walls <= 1:
+            n_walls = 1  # one span of the first wall tells which images of the others matter
         new = [
             cells.spans_of(wall, node.low, node.high, closing)
             for wall in range(node.n_walls, n_walls)
         ]
         spans = np.concatenate([node.spans, *new])
-        low, high, sizes = node.low.copy(), node.high.copy(), np.empty(n_walls)
-        box, table = np.empty((2, 6)), cells.table
+        low, high, table = node.low.copy(), node.high.copy(), cells.table
+        sizes, place, lost = (np.empty(n_walls) for _ in range(3))
+        box, prices = np.empty((2, 6)), np.empty((n_walls, 12))
         for _ in range(MOST_TRIMS):
-            arguments = spans, cells.pass_index, cells.n_keys, low, high, closing, sizes
-            left = tighten(table, *arguments)
-            if left == 0:
+            self.work += NUMBERS_OF_A_CELL * float((spans[:, END] - spans[:, FIRST]).sum())
+            passes = cells.pass_index[:n_walls], cells.n_keys
+            spans = spans[: tighten(table, spans, *passes, low, high, closing, sizes)]
+            if not len(spans):
                 return False
-            spans = spans[:left]
-            alone = np.flatnonzero(np.bincount(spans[:, WALL], minlength=n_walls) == 1)
-            at = np.isin(spans[:, WALL], alone)
-            only, k = spans[at], len(alone)
-            x, lost, missed, prices = np.empty(k), np.empty(k), np.empty(k), np.empty((k, 6, 2))
-            filled = box[0], box[1], x, lost, missed, prices
-            bound = least_box(table, only, low, high, *filled)
-            before = (only[:, END] - only[:, FIRST]).sum()
-            bound = max(bound, trim(table, only, prices, low, high, closing), float(sizes.max()))
-            node.bound = max(node.bound, bound)
+            few = spans[self._few_cells(spans)]
+            bound, numbers = least_box(
+                table, few, n_walls, low, high, closing, box, place, lost, prices
+            )
+            self.work += numbers
+            node.bound = max(node.bound, bound, float(sizes.max()))
             if node.bound >= closing:
                 return False
-            spans[at] = only
-            if (only[:, END] - only[:, FIRST]).sum() > TRIMMED * before:
+            before = (spans[:, END] - spans[:, FIRST]).sum()
+            spans = spans[: trim(table, spans, n_walls, prices, low, high, closing - bound)]
+            if not len(spans):
+                return False
+            if (spans[:, END] - spans[:, FIRST]).sum() > TRIMMED * before:
                 break
         node.spans, node.n_walls, node.low, node.high = spans, n_walls, low, high
-        node.found = Relaxation(alone, box[0], box[1], x, np.maximum(lost, missed), prices)
+        node.found = Relaxation(box[0], box[1], place, lost)
         return True
 
+    def _few_cells(self, spans: np.ndarray) -> np.ndarray:
+        """Return which spans are of walls with so few cells left that they are worth a price."""
+        cells = np.bincount(spans[:, WALL], weights=spans[:, END] - spans[:, FIRST])
+        return np.asarray(cells[spans[:, WALL]] <= MOST_PRICED)
+
     def _where_to_split(self, node: Subproblem) -> tuple[int, float] | None:
-        """Return the wall to be split, and where along its span; None if that gains nothing."""
-        found, walls = node.found, node.spans[:, WALL]
+        """Return the wall to be split, and where along it; None if that gains nothing."""
+        found, walls, table = node.found, node.spans[:, WALL], self._cells.table
         assert found is not None
         if np.count_nonzero(walls == 0) > 1:
-            return 0, 0.5
-        score, at = np.full(node.n_walls, np.inf), np.full(node.n_walls, 0.5)
+            return 0, float(found.place[0])
+        missed, lost = np.full(node.n_walls, np.inf), found.lost.copy()
         for wall, (first, end) in zip(walls.tolist(), node.spans[:, FIRST:].tolist(), strict=True):
-            away = distance(self._cells.table, first, end, found.low, found.high)
-            score[wall] = min(score[wall], away)
-        # where the chords lie, and what their pads cost
-        score[found.alone] = np.maximum(score[found.alone], found.cost)
-        at[found.alone] = found.x
+            if end == first + 1 and table[first, 25] - table[first, 24] < SMALLEST:
+                missed[wall] = lost[wall] = 0.0
+            away = distance(table, first, end, found.low, found.high)
+            missed[wall] = min(missed[wall], away)
+        score = np.maximum(missed, lost)
         wall = int(np.argmax(score))
         if score[wall] > SETTLED * self._gap * self.threshold:
-            return wall, float(at[wall])
+            return wall, float(found.place[wall])
         return None
 
-    def _split(self, node: Subproblem, wall: int, x: float) -> None:
+    def _split(self, node: Subproblem, wall: int, place: float) -> None:
         before, end = np.searchsorted(node.spans[:, WALL], [wall, wall + 1])
         own = node.spans[before:end]
-        halves = [own[k : k + 1] for k in range(len(own))]
-        if len(own) == 1:
+        if len(own) > 1:
+            # the nearest, and all others
+            table, box = self._cells.table, node.found
+            assert box is not None
+            away = [
+                distance(table, first, end, box.low, box.high)
+                for first, end in own[:, FIRST:].tolist()
+            ]
+            k = int(np.argmin(away))
+            halves = [own[k : k + 1], np.delete(own, k, axis=0)]
+        else:
             if own[0, END] == own[0, FIRST] + 1:
                 own = self._cells.finer(own[0])
             halves = [own]
@@ -256,10 +290,8 @@ class BoxProof:
                 return
         if len(own) == 1:
             at = self._cells.table[own[0, FIRST] : own[0, END], 24]
-            stop = self._cells.table[own[0, END] - 1, 25]
             n, least = len(at), max(len(at) // 8, 1)
-            place = int(np.searchsorted(at, at[0] + x * (stop - at[0])))
-            middle = own[0, FIRST] + min(max(place, least), n - least)
+            middle = own[0, FIRST] + min(max(int(np.searchsorted(at, place)), least), n - least)
             halves = [own.copy(), own.copy()]
             halves[0][0, END] = halves[1][0, FIRST] = middle
         for half in halves:

@@ -1,11 +1,11 @@
-"""The least box that holds a point of each of some spans, by linear programming.
+"""The least box that meets the convex hull of each of some walls, by linear programming.
 
-A span is relaxed to a segment, start + along * x + [pad_low, pad_high] for some 0 <= x <= 1; its
-error falls with the square of the span. How far each face of the box must move out of the core, and
-where on its segment each point lies, are the variables; that every face lies beyond every point are
-the constraints. The dual of this starts from prices of nothing, and a simplex method in a small
-table raises them. The bound does not rest on the method: from any prices a lower bound follows, and
-it is computed anew from those found.
+Whatever price a wall is paid for pressing on each face of the box, all prices of a face together at
+most 1: no box is smaller than the core and what every wall presses out at the least, at the cell of
+it that presses least. The best prices make the least box over convex hulls. They are found by a
+linear program over few points of each wall; the point that presses least at its prices joins them,
+until none is left that presses less. The bound does not rest on how the prices were found: it is
+computed anew from them, over all cells.
 """
 
 from __future__ import annotations
@@ -14,156 +14,247 @@ import numpy as np
 from numba import njit
 
 ROUND_OFF = 1e-9  # [rad] of the sums that make a bound
-MOST_PIVOTS = 2000
+MOST_PIVOTS = 400  # for one set of points
+MOST_ROUNDS = 24  # of adding points
+MOST_POINTS = 96  # added in all
 ENTERS = 1e-10  # [rad] gain below which a price is not raised
 PIVOT = 1e-9  # smallest that is divided by
+ENOUGH = 0.1  # of what is left to be closed: how near to the best prices are good enough
+CLOSE = 1e-5  # [rad] what points still left out may be worth together
 
 
-@njit(
-    "void(float64[::1],float64[::1],int64[::1],int64[::1],int64,float64[::1],float64[::1],"
-    "float64[::1])",
-    cache=True,
-)
-def _raise_prices(reach, slope, wall, face, n_walls, price, out, x):  # type: ignore[no-untyped-def]
-    """Maximise reach . y - sum(z), the y of a face together at most 1, -slope . y <= z.
+@njit("float64(float64[:,::1],int64,int64,int64,float64[::1],float64[::1])", cache=True)
+def pressed(cells, cell, end, face, low, high):  # type: ignore[no-untyped-def]
+    """Return how far one end of a cell, 0 or 1, presses a face of a core outwards at the least.
 
-    Args:
-        reach: Of each constraint in [rad], shape (n,).
-        slope: In [rad], shape (n,).
-        wall: Its segment, shape (n,).
-        face: Its face, 0 to 11, shape (n,).
-        n_walls: How many segments.
-        price: Filled with y, shape (n,).
-        out: Filled with how far each face moves out, shape (12,).
-        x: Filled with the place on each segment, shape (n_walls,).
+    Faces 0 to 5 are the upper ones, 6 to 11 the lower ones.
     """
-    n = len(reach)
-    n_rows = 12 + n_walls
-    n_columns = n + n_walls + n_rows  # prices, z, slacks
-    table = np.zeros((n_rows + 1, n_columns + 1))
-    basis = np.empty(n_rows, dtype=np.int64)
-    for j in range(n):
-        table[face[j], j] = 1.0
-        table[12 + wall[j], j] = -slope[j]
-        table[n_rows, j] = reach[j]
-    for w in range(n_walls):
-        table[12 + w, n + w] = -1.0
-        table[n_rows, n + w] = -1.0
-    for row in range(n_rows):
-        table[row, n + n_walls + row] = 1.0
-        basis[row] = n + n_walls + row
-        # a little more than 0, different for each, so that no step is for nothing
-        table[row, n_columns] = 1.0 if row < 12 else 1e-9 * (1.0 + (row * 7 % 13) / 13.0)
-    for _ in range(MOST_PIVOTS):
-        enter, best = -1, ENTERS
+    if face < 6:
+        return cells[cell, 6 * end + face] + cells[cell, 12 + face] - high[face]
+    j = face - 6
+    return low[j] - cells[cell, 6 * end + j] - cells[cell, 18 + j]
+
+
+@njit("int64(float64[:,::1],int64[::1],int64,int64,boolean)", cache=True)
+def _pivot(table, basis, n_rows, n_columns, dual):  # type: ignore[no-untyped-def]
+    """Bring a table of the simplex method to its optimum; return how many steps that took.
+
+    Its first row is the objective, what each variable gains, its first column the right-hand side.
+    The dual method begins where no variable gains but some rows are not kept, the primal one the
+    other way about.
+    """
+    for step in range(MOST_PIVOTS):
+        enter, leave = -1, -1
+        if dual:
+            worst = -1e-12
+            for row in range(n_rows):
+                if table[row + 1, 0] < worst:
+                    leave, worst = row + 1, table[row + 1, 0]
+            if leave < 0:
+                return step
+            least = np.inf
+            for j in range(1, n_columns):
+                if table[leave, j] < -PIVOT:
+                    ratio = table[0, j] / table[leave, j]
+                    if ratio < least:
+                        enter, least = j, ratio
+            if enter < 0:
+                return step
+        else:
+            best = ENTERS
+            for j in range(1, n_columns):
+                if table[0, j] > best:
+                    enter, best = j, table[0, j]
+            if enter < 0:
+                return step
+            least = np.inf
+            for row in range(n_rows):
+                if table[row + 1, enter] > PIVOT:
+                    ratio = table[row + 1, 0] / table[row + 1, enter]
+                    if ratio < least:
+                        leave, least = row + 1, ratio
+            if leave < 0:
+                return step
+        divisor = table[leave, enter]
         for j in range(n_columns):
-            if table[n_rows, j] > best:
-                enter, best = j, table[n_rows, j]
-        if enter < 0:
-            break
-        leave, least = -1, np.inf
-        for row in range(n_rows):
-            if table[row, enter] > PIVOT:
-                ratio = table[row, n_columns] / table[row, enter]
-                if ratio < least:
-                    leave, least = row, ratio
-        if leave < 0:
-            break
-        table[leave] /= table[leave, enter]
+            table[leave, j] /= divisor
         for row in range(n_rows + 1):
-            if row != leave and table[row, enter] != 0.0:
-                table[row] -= table[row, enter] * table[leave]
-        basis[leave] = enter
-    price[:] = 0.0
-    for row in range(n_rows):
-        if basis[row] < n:
-            price[basis[row]] = max(table[row, n_columns], 0.0)
-    for row in range(12):
-        out[row] = max(-table[n_rows, n + n_walls + row], 0.0)
-    for w in range(n_walls):
-        x[w] = min(max(-table[n_rows, n + n_walls + 12 + w], 0.0), 1.0)
+            factor = table[row, enter]
+            if row != leave and factor != 0.0:
+                for j in range(n_columns):
+                    table[row, j] -= factor * table[leave, j]
+        basis[leave - 1] = enter
+    return MOST_PIVOTS
 
 
 @njit(
-    "float64(float64[:,::1],int64[:,::1],float64[::1],float64[::1],float64[::1],float64[::1],"
-    "float64[::1],float64[::1],float64[::1],float64[:,:,::1])",
+    "UniTuple(float64,2)(float64[:,::1],int64[:,::1],int64,float64[::1],float64[::1],float64,"
+    "float64[:,::1],"
+    "float64[::1],float64[::1],float64[:,::1])",
     cache=True,
 )
-def least_box(cells, spans, low, high, box_low, box_high, x, lost, missed, prices):  # type: ignore[no-untyped-def]
-    """Return a bound on the box that holds a core and a point of each of some spans, in [rad].
+def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, prices):  # type: ignore[no-untyped-def]
+    """Return a bound on the box that holds a core and a point of each wall, in [rad].
+
+    And how many numbers were worked on, about.
 
     Args:
         cells: The table of `Cells`.
-        spans: One of each wall, shape (k, 5).
+        spans: What is left of walls, sorted by their walls, shape (n, 5). Walls without any are
+            left out.
+        n_walls: How many walls.
         low: The lower faces are not above these, in [rad], shape (6,).
         high: The upper faces are not below these.
-        box_low: Filled with the lower faces of the box found.
-        box_high: Filled with the upper ones.
-        x: Filled with where on each segment the box holds it, 0 to 1, shape (k,).
-        lost: Filled with how much larger the box could be if a segment had no pads, in [rad].
-        missed: Filled with by how much the box misses each segment without its pads, in [rad].
-        prices: Filled with how hard each segment presses on each upper face of the box, and on
-            each lower one, from 0 to 1, shape (k, 6, 2).
+        closing: A larger bound than this is of no interest, in [rad].
+        box: Filled with lower and upper faces of the box found, shape (2, 6).
+        place: Filled with where along each wall the box meets its hull, shape (n_walls,).
+        lost: Filled with how much more each wall would press had its cells no pads, in [rad].
+        prices: Filled with how hard each wall presses on each upper face of the box, and on each
+            lower one, from 0 to 1, shape (n_walls, 12).
     """
-    k = len(spans)
-    along, pad_low, pad_high = np.empty((k, 6)), np.empty((k, 6)), np.empty((k, 6))
-    reach, slope = np.empty((k, 12)), np.empty((k, 12))
-    n = 0
-    for w in range(k):
-        first, end = spans[w, 3], spans[w, 4]
-        place, length = cells[first, 24], cells[end - 1, 25] - cells[first, 24]
-        for j in range(6):
-            start = cells[first, j]
-            step = cells[end - 1, 6 + j] - start
-            below, above = np.inf, -np.inf
-            # within a cell both chords are straight: they are farthest apart at its ends
-            for cell in range(first, end):
-                a = cells[cell, j] - start - step * ((cells[cell, 24] - place) / length)
-                b = cells[cell, 6 + j] - start - step * ((cells[cell, 25] - place) / length)
-                below = min(below, min(a, b) + cells[cell, 12 + j])
-                above = max(above, max(a, b) + cells[cell, 18 + j])
-            along[w, j], pad_low[w, j], pad_high[w, j] = step, below, above
-            # upper faces 0 to 5, lower ones mirrored 6 to 11: out >= reach + slope * x
-            reach[w, j], slope[w, j] = start + below - high[j], step
-            reach[w, 6 + j], slope[w, 6 + j] = low[j] - start - above, -step
-            n += int(reach[w, j] + max(step, 0.0) > 0.0)
-            n += int(reach[w, 6 + j] + max(-step, 0.0) > 0.0)
-    wall, face = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
-    of_reach, of_slope, price = np.empty(n), np.empty(n), np.empty(n)
-    n = 0
-    for w in range(k):
-        for f in range(12):
-            if reach[w, f] + max(slope[w, f], 0.0) > 0.0:
-                wall[n], face[n] = w, f
-                of_reach[n], of_slope[n] = reach[w, f], slope[w, f]
-                n += 1
-    out = np.zeros(12)
-    x[:] = 0.5
-    if n:
-        _raise_prices(of_reach, of_slope, wall, face, k, price, out, x)
-    total = np.zeros(12)
-    for i in range(n):
-        total[face[i]] += price[i]
-    prices[:] = 0.0
-    bound = 0.0
-    for i in range(n):
-        prices[wall[i], face[i] % 6, face[i] // 6] = price[i] / max(total[face[i]], 1.0)
-    out[:] = 0.0
-    for w in range(k):
-        lost[w], tilt = 0.0, 0.0
-        for f in range(12):
-            p = prices[w, f % 6, f // 6]
-            bound += p * reach[w, f]
-            tilt += p * slope[w, f]
-            lost[w] += p * (pad_high[w, f - 6] if f >= 6 else -pad_low[w, f])
-            out[f] = max(out[f], reach[w, f] + slope[w, f] * x[w])
-        bound += min(tilt, 0.0)  # the least over every place on the segment
+    core = 0.0
+    place[:] = 0.0
     for j in range(6):
-        bound += high[j] - low[j]
-        box_low[j], box_high[j] = low[j] - out[6 + j], high[j] + out[j]
-    for w in range(k):
-        missed[w] = 0.0
-        for j in range(6):
-            point = cells[spans[w, 3], j] + along[w, j] * x[w]
-            missed[w] += max(point - box_high[j], 0.0) + max(box_low[j] - point, 0.0)
-    return bound - ROUND_OFF
+        core += high[j] - low[j]
+    begin, end = np.zeros(n_walls, dtype=np.int64), np.zeros(n_walls, dtype=np.int64)
+    n_cells = 0
+    for k in range(len(spans) - 1, -1, -1):
+        n_cells += spans[k, 4] - spans[k, 3]
+        begin[spans[k, 0]] = k
+        end[spans[k, 0]] = max(end[spans[k, 0]], k + 1)
+    # the point of each wall that is nearest to the core, and the faces it can press on at all
+    first, most = np.zeros((n_walls, 12)), np.full((n_walls, 12), -np.inf)
+    for w in range(n_walls):
+        nearest = np.inf
+        for k in range(begin[w], end[w]):
+            for cell in range(spans[k, 3], spans[k, 4]):
+                for side in range(2):
+                    away = 0.0
+                    for f in range(12):
+                        out = pressed(cells, cell, side, f, low, high)
+                        most[w, f] = max(most[w, f], out)
+                        away += max(out, 0.0)
+                    if away < nearest:
+                        nearest, place[w] = away, cells[cell, 24 + side]
+                        for f in range(12):
+                            first[w, f] = pressed(cells, cell, side, f, low, high)
+    n = 0
+    wall_of, face_of = (
+        np.empty(12 * n_walls, dtype=np.int64),
+        np.empty(12 * n_walls, dtype=np.int64),
+    )
+    for w in range(n_walls):
+        for f in range(12):
+            if most[w, f] > 0.0:
+                wall_of[n], face_of[n] = w, f
+                n += 1
+    # variables: a price for each of these, how much less than its first point a wall presses,
+    # and slacks; rows: the objective, the faces, and points that press less than the first
+    faces, points = 1 + n + n_walls, 13 + n + n_walls  # first slack of either
+    table = np.zeros((13 + MOST_POINTS, points + MOST_POINTS))
+    basis = np.empty(12 + MOST_POINTS, dtype=np.int64)
+    for i in range(n):
+        table[0, 1 + i] = first[wall_of[i], face_of[i]]
+        table[1 + face_of[i], 1 + i] = 1.0
+    for w in range(n_walls):
+        table[0, 1 + n + w] = -1.0
+    for f in range(12):
+        table[1 + f, faces + f] = 1.0
+        table[1 + f, 0] = 1.0 + 1e-9 * f  # no step is for nothing
+        basis[f] = faces + f
+    point_wall = np.empty(MOST_POINTS, dtype=np.int64)
+    point_place = np.empty(MOST_POINTS)
+    now = np.empty((n_walls, 12))
+    press, press_cell = np.zeros(n_walls), np.zeros(n_walls, dtype=np.int64)
+    n_points, bound = 0, -np.inf
+    prices[:] = 0.0
+    lost[:] = 0.0
+    work = float(_pivot(table, basis, 12, points, False) * 13 * points)
+    for _ in range(MOST_ROUNDS):
+        now[:] = 0.0
+        short = np.zeros(n_walls)
+        for row in range(12 + n_points):
+            value, i = max(table[row + 1, 0], 0.0), basis[row] - 1
+            if i < n:
+                now[wall_of[i], face_of[i]] = value
+            elif i < n + n_walls:
+                short[i - n] = value
+        for f in range(12):
+            total = 0.0
+            for w in range(n_walls):
+                total += now[w, f]
+            if total > 1.0:
+                for w in range(n_walls):
+                    now[w, f] /= total
+        least, hoped, added = core, core, 0
+        for w in range(n_walls):
+            known, priced = -short[w], False
+            for f in range(12):
+                known += now[w, f] * first[w, f]
+                priced = priced or now[w, f] > 0.0
+            hoped += known
+            press[w] = 0.0
+            if not priced:
+                continue
+            best, at, at_side = np.inf, -1, 0
+            for k in range(begin[w], end[w]):
+                for cell in range(spans[k, 3], spans[k, 4]):
+                    for side in range(2):
+                        out = 0.0
+                        for f in range(12):
+                            if now[w, f] > 0.0:
+                                out += now[w, f] * pressed(cells, cell, side, f, low, high)
+                        if out < best:
+                            best, at, at_side = out, cell, side
+            press[w], press_cell[w] = best, at
+            least += best
+            if best < known - CLOSE / n_walls and n_points < MOST_POINTS:
+                # this point presses less than those known: z >= y (first - this)
+                row = 13 + n_points
+                for i in range(n):
+                    if wall_of[i] == w:
+                        f = face_of[i]
+                        out = pressed(cells, at, at_side, f, low, high)
+                        table[row, 1 + i] = first[w, f] - out
+                table[row, 1 + n + w] = -1.0
+                table[row, points + n_points] = 1.0
+                table[row, 0] = 1e-12 * (1.0 + n_points)
+                basis[12 + n_points] = points + n_points
+                point_wall[n_points], point_place[n_points] = w, cells[at, 24 + at_side]
+                for other in range(12 + n_points):
+                    factor = table[row, basis[other]]
+                    if factor != 0.0:
+                        for j in range(points + n_points):
+                            table[row, j] -= factor * table[other + 1, j]
+                n_points += 1
+                added += 1
+        if least > bound:
+            bound = least
+            prices[:] = now
+            for w in range(n_walls):
+                lost[w] = 0.0
+                for f in range(12):
+                    if now[w, f] > 0.0:
+                        cell = press_cell[w]
+                        pad = -cells[cell, 12 + f] if f < 6 else cells[cell, 12 + f]
+                        lost[w] += now[w, f] * pad
+        # closed, or as near to the best as matters to what is closed
+        if added == 0 or bound >= closing or hoped - bound < ENOUGH * (closing - hoped):
+            break
+        n_rows, n_columns = 12 + n_points, points + n_points
+        steps = _pivot(table, basis, n_rows, n_columns, True)
+        steps += _pivot(table, basis, n_rows, n_columns, False)
+        work += float((steps + added) * n_rows * n_columns + 24 * n_cells)
+    for j in range(6):
+        box[1, j] = high[j] + max(-table[0, faces + j], 0.0)
+        box[0, j] = low[j] - max(-table[0, faces + 6 + j], 0.0)
+    left = np.ones(n_walls)
+    along = np.zeros(n_walls)
+    for i in range(n_points):
+        share = max(-table[0, points + i], 0.0)
+        share = min(share, left[point_wall[i]])
+        left[point_wall[i]] -= share
+        along[point_wall[i]] += share * point_place[i]
+    for w in range(n_walls):
+        place[w] = along[w] + left[w] * place[w]
+    return bound - ROUND_OFF, work + 100.0 * n_cells

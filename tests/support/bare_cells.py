@@ -90,11 +90,13 @@ class Ghosts:
         self._q = np.atleast_2d(q)
         self._radius = radius
         self._haunted = haunted
+        self.queries = 0
 
     def anew(self):
         return self._haunted.anew()
 
     def collides(self, q):
+        self.queries += len(q)
         away = np.linalg.norm(np.asarray(q)[:, None] - self._q, axis=-1)
         return (away < self._radius).any(axis=1)
 

@@ -1,0 +1,63 @@
+"""How much of the work allowed a proof has done: counted, so that it is the same on any machine.
+
+A unit is what takes about a millisecond.
+"""
+
+from __future__ import annotations
+
+from opl.cell.collision import CollisionScene
+from opl.planning.box_track import BoxTracks
+from opl.planning.columns import ColumnWalls
+from opl.planning.families import Families
+from opl.search.least_box import BoxProof
+
+# what makes a unit, or how many units one makes
+QUERIES = 50  # configurations asked about for collisions
+NUMBERS = 1e6  # worked on in linear programs
+SUBPROBLEMS = 4
+WORK_OF_A_WALL = 50.0
+WORK_OF_A_CHECK = 1.0  # for each of the places of a motion
+
+
+def work_of_proof(proof: BoxProof) -> float:
+    """Return what was done in branch and bound, in units of work."""
+    return proof.subproblems / SUBPROBLEMS + proof.work / NUMBERS
+
+
+class Work:
+    """What was done, from when this was made.
+
+    Args:
+        collision: The scene.
+        walls: Made so far.
+        families: Held against boxes.
+        tracks: Sampled and checked.
+
+    Attributes:
+        proof: The proof that is worked on.
+    """
+
+    def __init__(
+        self, collision: CollisionScene, walls: ColumnWalls, families: Families, tracks: BoxTracks
+    ) -> None:
+        self._collision, self._walls = collision, walls
+        self._families, self._tracks = families, tracks
+        self._before = -self._counted()
+        self.proof: BoxProof | None = None
+
+    @property
+    def done(self) -> float:
+        """All of it, in units."""
+        proof = 0.0 if self.proof is None else work_of_proof(self.proof)
+        return self._before + self._counted() + proof
+
+    def begin_again(self, proof: BoxProof) -> None:
+        """Go on with another proof."""
+        self._before += 0.0 if self.proof is None else work_of_proof(self.proof)
+        self.proof = proof
+
+    def _counted(self) -> float:
+        asked = (self._collision.queries + self._tracks.queries) / QUERIES
+        made = self._walls.made * WORK_OF_A_WALL
+        checked = self._tracks.places_checked * WORK_OF_A_CHECK
+        return asked + made + checked + self._families.work + self._tracks.sampler.work
