@@ -6,6 +6,7 @@ import os
 from itertools import groupby
 from typing import Any
 
+import FreeCADGui
 from pivy import coin
 
 from . import drawing
@@ -83,9 +84,10 @@ class JobView(_View):
 
     def doubleClicked(self, view: Any) -> bool:
         """Open the panel of the job."""
-        from .panel import open_panel
-
-        open_panel(view.Object)
+        FreeCADGui.activateWorkbench("OplWorkbench")  # which knows the command
+        FreeCADGui.Selection.clearSelection()
+        FreeCADGui.Selection.addSelection(view.Object)
+        FreeCADGui.runCommand("Opl_OpenJob")
         return True
 
 
