@@ -51,6 +51,10 @@ def variants(label: str, content: Mapping[str, Any]) -> list[dict[str, Any]]:
     for path, values in swept.items():
         if not values:
             raise InputError(f"{label}: {path}", "must be a value, or a list of values to be tried")
+        if len({repr(value) for value in values}) < len(values):
+            raise InputError(
+                f"{label}: {path}", "has a value twice, which makes the same job twice"
+            )
         count *= len(values)
     if count > MOST_VARIANTS:
         raise InputError(label, f"makes {count} jobs, at most {MOST_VARIANTS} are made of a file")

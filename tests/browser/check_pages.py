@@ -247,6 +247,30 @@ def test_what_the_pointer_is_told_is_what_the_files_say(runs, opened):
         assert float(told.split("t ")[-1].split()[0]) == pytest.approx(trace["t"][k], abs=0.02)
 
 
+def test_curves_findings_and_rows_lead_to_their_configuration(runs, opened):
+    run, out = runs["good"]
+    one, found = opened(out / "report.html"), opl.make_report(run).verification
+    motion, times = run.proven.motion.motion, np.cumsum(run.proven.motion.timed.duration)
+    chain = np.array(one.page.evaluate("() => window.opl.page.cell.flange")).reshape(4, 4)
+    robot = run.surfaced.job.cell.robot
+    for mark, place in (("nearest", found.min_clearance_at), ("off", found.max_contact_error_at)):
+        one.page.locator(f'[data-mark="{mark}"]').click()
+        one.frame()
+        wanted = forward_kinematics(robot, np.deg2rad(place.joints_deg))
+        assert np.allclose(one.flange() @ chain, wanted, atol=5e-5)
+        assert set(one.page.evaluate("() => window.opl.view.red")) == set(
+            place.subject.split(" and ")
+        )
+        assert one.page.locator("#view").bounding_box()["y"] < 900
+    one.page.locator('[data-mark="home"]').click()
+    one.frame()
+    assert np.allclose(one.flange() @ chain, forward_kinematics(robot, motion.q[0]), atol=2e-5)
+    panel = one.page.locator("#curves svg").first
+    panel.click(position={"x": panel.bounding_box()["width"] / 2.0, "y": 20.0})
+    shown = one.page.evaluate("() => window.opl.shown")
+    assert shown["time"] == pytest.approx(times[-1] / 2.0, rel=0.01)
+
+
 def test_a_line_of_the_program_leads_to_its_configuration_and_back(runs, opened):
     run, out = runs["good"]
     one = opened(out / "report.html")

@@ -381,14 +381,16 @@ def test_sweeps_that_make_no_sense_are_refused(pretended, tmp_path):
     touch(tmp_path / "empty.yaml", "name: E\nwheel: {radius_mm: []}\n")
     touch(tmp_path / "many.yaml", f"name: M\nwheel: {{a: {[*range(40)]}, b: {[*range(40)]}}}\n")
     touch(tmp_path / "long.yaml", f"name: {'L' * 27}\nwheel: {{radius_mm: [1, 2]}}\n")
+    touch(tmp_path / "twice.yaml", "name: T\nwheel: {radius_mm: [1, 2, 1]}\n")
     touch(tmp_path / "s.yaml", "name: S\nwheel: {radius_mm: [1, 2]}\n")
     touch(tmp_path / "s_1.yaml", "name: S_1\nwheel: {}\n")
-    ended = pretended(["empty", "many", "long", "s", "s_1"], "--json")
+    ended = pretended(["empty", "many", "long", "twice", "s", "s_1"], "--json")
     told = [message for _, status, message in rows_of(ended) if status == "bad input"]
     assert [message.partition(", got")[0] for message in told] == [
         "empty.yaml: wheel.radius_mm: must be a value, or a list of values to be tried",
         "many.yaml: makes 1600 jobs, at most 1000 are made of a file",
         "long.yaml: name: must leave room for the numbers of 2 jobs: 26 characters at the most",
+        "twice.yaml: wheel.radius_mm: has a value twice, which makes the same job twice",
         "s.yaml: name: must be another for each job, S_1 is also that of s_1.yaml",
         "s_1.yaml: name: must be another for each job, S_1 is also that of s.yaml",
     ]

@@ -51,6 +51,8 @@ def serving(store, *options, env=()):
     """Run a service; yields its client when all workers are warm."""
     process, address = started(store, *options, env=env)
     try:
-        yield ready(Client(address))
+        client = ready(Client(address))
+        client.pid = process.pid
+        yield client
     finally:
         assert stopped(process) == 0

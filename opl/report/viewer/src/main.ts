@@ -114,7 +114,7 @@ class Viewer {
 
   // The line of the program that is being played, marked and in sight.
   private tellLine(move: number): void {
-    while (move > 0 && !this.lines.has(move)) move--;
+    while (move < (this.motion?.time.length ?? 0) && !this.lines.has(move)) move++; // a line may lead over several moves
     const line = this.lines.get(move);
     if (line === this.now) return;
     this.now?.row.classList.remove("now");

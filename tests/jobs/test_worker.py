@@ -1,0 +1,51 @@
+"""A worker: a process with limits, which may die without taking anything with it."""
+
+import os
+import signal
+
+import pytest
+
+from opl.store.values import Task
+from opl.work.worker import Limits, Worker, WorkerDied
+from tests.support.jobs import write_job
+
+
+@pytest.fixture
+def task(tmp_path):
+    return Task("run", "job.yaml", "out", home=str(write_job(tmp_path).parent))
+
+
+def on(_stage, _fraction):
+    return True
+
+
+def test_a_job_that_takes_too_long_is_ended(task, tmp_path):
+    worker = Worker(Limits(seconds=0.3))
+    outcome = worker.do(task, on)
+    assert outcome.message == "job.yaml: takes more than the 0.3 s that it may take"
+    assert (outcome.status, outcome.final, worker.pid) == ("error", False, None)
+    assert not (tmp_path / "out").exists() or not list((tmp_path / "out").glob("*/*.JBI"))
+
+
+def test_a_job_that_takes_too_much_memory_is_ended(task):
+    worker = Worker(Limits(memory=300_000_000))
+    outcome = worker.do(task, on)
+    assert outcome.message == "job.yaml: takes more than the 300 MB of memory that it may take"
+    assert not outcome.final
+    worker.end()
+
+
+def test_a_job_is_cancelled_while_it_is_planned_and_one_killed_is_told(task, tmp_path):
+    worker, seen = Worker(Limits()), []
+
+    def until_the_search(stage, _fraction):
+        seen.append(stage)
+        return stage != "search"
+
+    assert worker.do(task, until_the_search) is None
+    assert worker.pid is not None  # it is ready for the next one
+    assert "verification" not in seen
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(WorkerDied):
+        worker.do(task, lambda *_: os.kill(worker.pid, signal.SIGKILL) or True)
+    assert worker.pid is None
