@@ -1,0 +1,35 @@
+"""What `python -m benchmarks` writes, and how it tells what became slower."""
+
+import sys
+
+from benchmarks.measuring import MICRO, SECOND, Row, Timing, timed, timed_process
+from benchmarks.results import FILE, PLOT, write_results
+
+
+def row(name, seconds, unit=SECOND):
+    return Row(name, unit, Timing(seconds, seconds, seconds, seconds))
+
+
+def test_what_became_slower_than_in_the_results_before_is_named(tmp_path):
+    first = [row("a run", 2.0), row("a pose", 3e-6, MICRO), row("another", 1.0)]
+    assert write_results(tmp_path, first, {"a run": {"search": 1.0, "total": 2.0}}, {}) == []
+    text = (tmp_path / FILE).read_text(encoding="utf-8")
+    assert "| a run | 50 |" in text and "| a pose | 3 us |" in text
+    second = [row("a run", 2.2), row("a pose", 6e-6, MICRO), row("new", 9.0)]
+    slower = write_results(tmp_path, second, {}, {100: second[0].ours, 300: second[2].ours})
+    assert slower == ["slower than before: a pose, 2.00 times"]
+    assert slower[0] in (tmp_path / FILE).read_text(encoding="utf-8")
+    assert (tmp_path / PLOT).read_text(encoding="utf-8").startswith("<?xml")
+
+
+def test_a_process_that_fails_or_takes_too_long_has_no_time():
+    assert timed_process([sys.executable, "-c", "import sys; sys.exit(3)"], 1, 60.0) is None
+    assert timed_process([sys.executable, "-c", "import time; time.sleep(60)"], 1, 0.2) is None
+    found = timed_process([sys.executable, "-c", "x = bytearray(80_000_000)"], 1, 60.0)
+    assert found.least <= found.median <= found.most and found.memory > 80_000_000
+
+
+def test_a_time_is_that_of_one_of_what_is_counted():
+    calls = []
+    found = timed(lambda: calls.append(sum(range(20_000))), 3, count=10)
+    assert len(calls) == 4 and found.least <= found.median <= found.most
