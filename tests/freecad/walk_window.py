@@ -109,8 +109,12 @@ def walk():
     look("viewIsometric")
     picture("reopened")
 
-    # a part that cannot be ground there: the reason, and where it is
-    job.ContactFrame = job_object.placement(given["too_far"])
+    # a post where the part has to be when it is ground: the reason, and where it is
+    post = again.addObject("Part::Box", "Post")
+    post.Length, post.Width, post.Height = 60.0, 60.0, 400.0
+    post.Placement.Base = FreeCAD.Vector(770.0, 205.0, 120.0)
+    again.recompute()
+    job.Obstacles = [post]
     desk.refresh()
     told["changed"] = desk.said.text()
     desk.run.click()

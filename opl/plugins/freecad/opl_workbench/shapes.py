@@ -33,6 +33,14 @@ def placed_shape(obj: Any) -> Any:
     return placed
 
 
+def shape_figures(shape: Any) -> list[str]:
+    """Return figures that tell whether a shape was changed; those of a saved one are the same."""
+    return [
+        " ".join(f"{value:.6g}" for value in (face.Area, *face.CenterOfMass, face.Length))
+        for face in shape.Faces
+    ]
+
+
 def step_file(shape: Any, names: Sequence[str]) -> tuple[bytes, list[int]]:
     """Return a shape as STEP file, and the numbers there of faces, counted from 1.
 
