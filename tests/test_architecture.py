@@ -60,7 +60,13 @@ HOMES = {
     "uvicorn": {"service"},
     "distributed": {"work/cluster"},
     "sqlite3": {"store"},
-    "numba": {"cell/wheel_distance", "cell/separating", "search"},
+    "numba": {
+        "cell/wheel_distance",
+        "cell/separating",
+        "search",
+        "motion/fewest",
+        "motion/line_error",
+    },
 }
 
 # rooms that run inside of other programs, with Python's own library and what the host has

@@ -44,8 +44,8 @@ def figures_of_path(
 
     `motion` is the whole motion that the path is part of.
     """
-    timing = time_motion(motion, points, process, robot)
-    seconds = timing.timed.duration[motion.grinding].sum()
+    timed = time_motion(motion, points, process, robot).timed
+    seconds = timed.duration[timed.motion.grinding].sum()
     return Figures(path.joint_ranges, path.joint_travel, path.contact_travel, float(seconds))
 
 

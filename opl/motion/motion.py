@@ -8,7 +8,7 @@ its moves take, and a `VerifiedMotion` how near it comes to anything.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from functools import cached_property
 from itertools import groupby, pairwise
@@ -67,6 +67,8 @@ class Motion:
             wheel.
         pass_index: The pass that a configuration grinds, or leads to or from, shape (n,); -1 at
             home.
+        written: Which configurations a program names, shape (n,); the others lie on the joint lines
+            between those. All of them unless said otherwise.
     """
 
     q: Array
@@ -74,8 +76,11 @@ class Motion:
     contact_position: Array
     cutter_point: Array
     pass_index: NDArray[np.int64]
+    written: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
 
     def __post_init__(self) -> None:
+        if not len(self.written):
+            object.__setattr__(self, "written", np.ones(len(self.q), dtype=bool))
         _keep_copies(self, len(self.q))
 
     def __len__(self) -> int:
@@ -96,6 +101,7 @@ class Motion:
             np.concatenate([part.contact_position for part in parts]),
             np.concatenate([part.cutter_point for part in parts]),
             np.concatenate([part.pass_index for part in parts]),
+            np.concatenate([part.written for part in parts]),
         )
 
     def take(self, rows: Sequence[int] | NDArray[np.intp]) -> Motion:
@@ -106,6 +112,7 @@ class Motion:
             self.contact_position[rows],
             self.cutter_point[rows],
             self.pass_index[rows],
+            self.written[rows],
         )
 
     def with_inserted(self, before: Sequence[int] | NDArray[np.intp], q: Array) -> Motion:
@@ -115,6 +122,11 @@ class Motion:
         """
         source = np.insert(np.arange(len(self)), before, before)
         return replace(self.take(source), q=np.insert(self.q, before, q, axis=0))
+
+    @property
+    def positions(self) -> NDArray[np.intp]:
+        """Indices of the configurations that a program names."""
+        return np.flatnonzero(self.written)
 
     def renumbered(self, cutter_point: Array) -> Motion:
         """Return the motion with other numbers of its cutter points, shape (n,); NaN off the wheel.
@@ -224,6 +236,23 @@ class TimedMotion:
         """Time of all moves in [s]."""
         return float(self.duration.sum())
 
+    @classmethod
+    def passing(cls, motion: Motion, duration: Array) -> TimedMotion:
+        """Return a motion with times, given those of the moves to its written configurations.
+
+        A controller moves evenly from one of these to the next, so what lies between gets its share
+        of the time by where it lies; `duration` is in [s], of shape (written,).
+        """
+        at, positions = np.cumsum(duration), motion.positions
+        before = np.cumsum(motion.written) - 1
+        after = np.minimum(before + 1, len(positions) - 1)
+        start = motion.q[positions[before]]
+        line = motion.q[positions[after]] - start
+        length = np.square(line).sum(axis=1)
+        share = ((motion.q - start) * line).sum(axis=1) / np.where(length > 0.0, length, 1.0)
+        time = at[before] + np.where(motion.written, 0.0, share * duration[after])
+        return cls(motion, np.maximum(np.diff(time, prepend=0.0), 0.0))
+
     def take(self, rows: Sequence[int] | NDArray[np.intp]) -> TimedMotion:
         """Return some configurations, by ascending indices; the times between them are summed."""
         return TimedMotion(
@@ -258,13 +287,13 @@ class VerifiedMotion:
 
 def _keep_copies(value: Any, count: int) -> None:
     """Check the lengths of the fields of a dataclass and make its arrays read-only copies."""
-    for field in fields(value):
-        items = getattr(value, field.name)
+    for one in fields(value):
+        items = getattr(value, one.name)
         if not isinstance(items, (np.ndarray, tuple)):
             continue
         if len(items) != count:
-            raise ValueError(f"{field.name} has {len(items)} items for {count} configurations")
+            raise ValueError(f"{one.name} has {len(items)} items for {count} configurations")
         if isinstance(items, np.ndarray):
             copy = items.copy()
             copy.setflags(write=False)
-            object.__setattr__(value, field.name, copy)
+            object.__setattr__(value, one.name, copy)

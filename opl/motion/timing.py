@@ -51,7 +51,7 @@ class Timing:
     """A motion with its times, and what sets them.
 
     Attributes:
-        timed: The motion with the time of every move.
+        timed: The written configurations with the time of every move.
         surface_distance: What the ground point moves along the surface in [m], shape (n,); NaN
             where the move does not stay on the wheel.
         cause: Why it is slower than the feed on each move, n items.
@@ -76,26 +76,28 @@ def time_motion(
     moves fast over the wheel. The moves onto the wheel and off it run at the feed, the others of
     approach and retract at theirs; on free moves the joint that takes longest runs at its share of
     its largest speed. Where a joint cannot follow, moves take as long as it needs. From approach to
-    retract the robot does not rest, and the speed changes gradually (`opl.motion.gradual`).
+    retract the robot does not rest, and the speed changes gradually (`opl.motion.gradual`). A move
+    through configurations that are not written takes their times together.
 
     Raises:
         UnsafeError: If the time law does not keep the limits it was given.
     """
+    distances, least = on_wheel(motion, points, process)
+    surface_distance, least = _between(motion, distances), _between(motion, least)
+    motion = motion.take(motion.positions)
     grinding = motion.grinding
+    surface_distance[~grinding] = np.nan
     turned = np.abs(np.diff(motion.q, axis=0, prepend=motion.q[:1]))
     fastest = (turned / robot.max_speed).max(axis=1)
-    arc = np.interp(motion.cutter_point, np.arange(len(points)), points.arc_length)
-    surface_distance = np.where(grinding, np.abs(np.diff(arc, prepend=np.nan)), np.nan)
-    over_wheel = np.abs(np.diff(motion.contact_position, prepend=np.nan)) / process.contact_speed
     # the part is only moved on a lead, so every point of it moves as the flange does
     p_flange = forward_kinematics(robot, motion.q)[:, :3, 3]
     moved = np.linalg.norm(np.diff(p_flange, axis=0, prepend=p_flange[:1]), axis=1)
     distance = np.where(grinding, surface_distance, moved)
     # pivoting alone may leave the ground point next to no speed
-    pivoting = over_wheel * LEAST_COUNTED * process.feed > distance
+    pivoting = least * LEAST_COUNTED * process.feed > distance
     speed_counts = ~(grinding & pivoting)
     wanted = np.maximum(fastest / process.air_speed, np.where(motion.free, SHORTEST_FREE, 0.0))
-    wanted[grinding] = np.maximum(surface_distance / process.feed, over_wheel)[grinding]
+    wanted[grinding] = least[grinding]
 
     duration = np.maximum(wanted, fastest)
     duration[0] = 0.0
@@ -182,6 +184,25 @@ def air_seconds(motion: Motion, robot: Robot, process: ProcessSettings) -> float
     turned = np.abs(np.diff(motion.q, axis=0, prepend=motion.q[:1]))
     fastest = (turned / robot.max_speed).max(axis=1)
     return float(fastest[motion.free].sum()) / process.air_speed
+
+
+def on_wheel(motion: Motion, points: CutterPoints, process: ProcessSettings) -> tuple[Array, Array]:
+    """Return what moves do on the wheel: way along the surface in [m], least time in [s].
+
+    The least time is that at the feed, or at the largest speed of the contact over the wheel; both
+    are 0 where a move is not on the wheel all along, shape (n,).
+    """
+    arc = np.interp(motion.cutter_point, np.arange(len(points)), points.arc_length)
+    distance = np.abs(np.diff(arc, prepend=np.nan))
+    over = np.abs(np.diff(motion.contact_position, prepend=np.nan)) / process.contact_speed
+    least = np.maximum(distance / process.feed, over)
+    grinding = motion.grinding
+    return np.where(grinding, distance, 0.0), np.where(grinding, least, 0.0)
+
+
+def _between(motion: Motion, amounts: Array) -> Array:
+    """Return what moves from written to written configuration pass, shape (written,)."""
+    return np.diff(np.cumsum(amounts)[motion.positions], prepend=0.0)
 
 
 def followed(q: Array, times: Array, robot: Robot) -> Array:

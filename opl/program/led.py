@@ -2,7 +2,8 @@
 
 A controller that knows stationary tools moves the held part so that the standing tool point runs
 straight over it; the speed of a move is then that of the tool point over the part. With the tool
-point on the wheel that is the surface feed wherever the contact stays where it is on the wheel.
+point in the middle of the wheel that is the surface feed where the part is ground there; elsewhere
+it differs by what the part turns and the contact moves meanwhile. The time is always that wanted.
 """
 
 from __future__ import annotations

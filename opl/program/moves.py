@@ -212,9 +212,10 @@ def plan_moves(
 ) -> Program:
     """Turn a verified motion into moves.
 
-    A configuration that repeats the one before needs no move; its time goes to the move that
-    follows, which so gets slower, never faster. The robot stops at home, where it enters and leaves
-    the wheel, where a phase ends, and at sharp corners off the wheel; it never stops within a pass.
+    Configurations that are not written lie on the moves between those that are. One that repeats
+    the one before needs no move; its time goes to the move that follows, which so gets slower,
+    never faster. The robot stops at home, where it enters and leaves the wheel, where a phase ends,
+    and at sharp corners off the wheel; it never stops within a pass.
 
     Args:
         verified: What the program shall do.
@@ -230,10 +231,12 @@ def plan_moves(
     """
     if not isinstance(verified, VerifiedMotion):
         raise TypeError(f"a program is made of a VerifiedMotion, got {type(verified).__name__}")
-    kept = _distinct_configurations(verified.motion.q)
-    motion = _without_repeats(verified.motion, kept)
-    speeds = _speeds(verified.timed, kept, np.asarray(max_speed), joint_names)
-    times = verified.timed.take(kept).duration.tolist()
+    positions = verified.motion.positions
+    timed = verified.timed.take(positions)
+    kept = _distinct_configurations(timed.motion.q)
+    motion = _without_repeats(timed.motion, kept)
+    speeds = _speeds(timed, kept, np.asarray(max_speed), joint_names)
+    times = timed.take(kept).duration.tolist()
     stops, on_wheel = stops_at(motion), motion.on_wheel
     done_there = actions_at(motion, actions)
     moves = []
@@ -247,7 +250,7 @@ def plan_moves(
                 speed=float(speeds[m]),
                 exact_stop=stops[m],
                 on_wheel=bool(on_wheel[m]),
-                motion_index=int(configuration),
+                motion_index=int(positions[configuration]),
                 duration=times[m] if m else None,
                 kind=Purpose.of(phase),
                 ground_pass=pass_here if phase is Phase.GRINDING else None,

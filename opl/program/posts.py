@@ -34,6 +34,9 @@ GROUP = "opl.posts"
 # How far the time of a pass may be from the wanted one, as a fraction of it: the pressure of the
 # part on the belt is set for the feed.
 PASS_TIME_TOLERANCE = 0.02
+# Periods of interpolation in a move, at least: a controller plays it in whole ones, and half of one
+# more or less is then within 5 % of its time.
+PERIODS_OF_A_MOVE = 10
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,8 @@ class Post:
         motion: How moves on the wheel are written unless the job says so.
         knows_stationary_tools: Whether straight moves lead the part past a tool that stands.
         reader: Reads its programs back; None where they are written and not read back.
+        period: From one interpolated configuration to the next in [s]; 0 where nothing is known of
+            it. No controller was asked: each says beside the number where it is from.
     """
 
     title: str
@@ -112,6 +117,12 @@ class Post:
     motion: MotionForm = MotionForm.JOINT
     knows_stationary_tools: bool = False
     reader: Reader | None = None
+    period: float = 0.0
+
+    @property
+    def shortest_move(self) -> float:
+        """Least time of a move while grinding in [s], so that the controller keeps it."""
+        return PERIODS_OF_A_MOVE * self.period
 
 
 def known_posts() -> list[str]:

@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
@@ -83,13 +81,11 @@ def prove(
         job.process.approach_length,
         job.process.approach_turn,
         job.process.approach_run,
+        job.process.feed,
     )
     motion = playback.q, playback.duration, playback.stations
     found = recognise(job.cell, points, *motion, rule)
     replayed = replay(job.cell, points, found.timed, search.max_contact_error, progress)
-    # the written configurations; of one that grinds several cutter points, the first of its rows:
-    # the time to the others goes to the move that follows
-    rows = np.searchsorted(found.source, playback.stations, side="left")
     astray = {"order", "contact"} & {one.kind for one in (*replayed.findings, *found.findings)}
     shift = common_shift(job.cell, points, *motion, rule) if astray else None
     findings = (
@@ -97,7 +93,7 @@ def prove(
         *([shift] if shift is not None else []),
         *replayed.findings,
         *found.findings,
-        *written_findings(job, points, found.timed.take(rows), playback, reader),
+        *written_findings(job, points, found.timed.motion, playback, reader),
         *name_findings(job, reading.name),
     )
     moves = len(playback.moves)

@@ -20,6 +20,7 @@ from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion, TimedMotion, VerifiedMotion
+from opl.planning.positions import PositionRule
 from opl.program.moves import SAME_CONFIGURATION, Program
 from opl.program.played import Playback
 from opl.program.posts import find_post
@@ -76,6 +77,16 @@ def in_file_digits(motion: Motion, job: Job) -> Motion:
     return replace(motion, q=reader.rounded(motion.q, job.cell.robot, job.program))
 
 
+def position_rule(job: Job) -> PositionRule:
+    """Return what the written positions of a job have to keep."""
+    search = job.search
+    return PositionRule(
+        search.max_contact_error,
+        search.max_contact_error - search.interpolation.max_contact_error,
+        find_post(job.program.controller).shortest_move,
+    )
+
+
 def read_back(
     job: Job,
     points: CutterPoints,
@@ -89,7 +100,7 @@ def read_back(
     Args:
         job: The job.
         points: Its cutter points.
-        planned: The motion before its configurations were rounded.
+        planned: The motion before its configurations were rounded and chosen.
         verified: What was proven.
         program: The moves that were to be written.
         texts: All files of the run.
@@ -104,7 +115,8 @@ def read_back(
     }
     reading = reader.read(files, job.cell.robot, job.program)
     playback, findings = reading.playback, reading.findings
-    rounding = _apart(job, planned.q, verified.motion.q)
+    positions = verified.motion.positions
+    rounding = _apart(job, planned.q[positions], verified.motion.q[positions])
     if playback is None:
         return FileProof(tuple(files), 0, rounding, 0.0, False, findings)
     kept = _without_repeats(playback)
@@ -120,11 +132,12 @@ def read_back(
     if other_paths:
         findings = (*findings, *prove(job, points, files).findings)
     else:
-        written = TimedMotion(verified.motion.take(configurations), kept.duration)
+        named = np.isin(np.arange(len(verified.motion)), configurations)
+        motion = replace(verified.motion, written=named)
         findings = (
             *findings,
-            *limit_findings(job.cell, written),
-            *written_findings(job, points, written, kept, reader),
+            *limit_findings(job.cell, TimedMotion(motion.take(configurations), kept.duration)),
+            *written_findings(job, points, motion, kept, reader),
             *name_findings(job, reading.name),
         )
     apart = _apart(job, q, proven) if difference > EXACT else 0.0

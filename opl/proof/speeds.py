@@ -15,7 +15,7 @@ import numpy as np
 
 from opl.findings import Finding, Level
 from opl.motion.motion import Motion, MoveKind, Phase, TimedMotion
-from opl.motion.timing import Timing
+from opl.motion.timing import Cause, Timing
 from opl.program.moves import SAME_CONFIGURATION
 from opl.program.played import Playback, ReadMove, SpeedUnit
 from opl.program.posts import PASS_TIME_TOLERANCE
@@ -27,6 +27,9 @@ BETWEEN = 2.5e-4  # [m] the same between two, where places are recognised less w
 # What a move may be off where joints or the contact's way over the wheel limit it, and off the
 # wheel: faster, and slower; times of moves too short to be written go to the next one.
 LIMITED = 1.3
+# The same where nothing but a slow neighbour does: how slow that is depends on places between two
+# cutter points, and on a short move they may be off by as much as it is long.
+BY_NEIGHBOUR = LIMITED**2
 FASTER = 1.05
 SLOWER = 1.5
 
@@ -80,7 +83,8 @@ def _ahead(
         lead += takes * (1.0 + AHEAD) * feed - distance
         early, lead = -lead, min(max(lead, -allowed), allowed)
         by_feed = wanted * feed <= distance * (1.0 + AHEAD)
-        too_fast = not by_feed and takes + digit < min(aims) / LIMITED
+        limit = BY_NEIGHBOUR if requested.cause[k] is Cause.NEIGHBOUR else LIMITED
+        too_fast = not by_feed and takes + digit < min(aims) / limit
         too_slow = takes > max(aims) * LIMITED + digit + BETWEEN / feed
         if too_fast or too_slow or (early > allowed and wanted > FASTER * takes):
             yield _finding(written, playback, k, wanted, "the feed")

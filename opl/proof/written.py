@@ -25,19 +25,21 @@ ROUND_OFF = 1e-9  # of a number that was read from a file, as a fraction
 
 
 def written_findings(
-    job: Job, points: CutterPoints, written: TimedMotion, playback: Playback, reader: Reader
+    job: Job, points: CutterPoints, motion: Motion, playback: Playback, reader: Reader
 ) -> list[Finding]:
     """Return what is wrong with speeds, stops, events, and the configurations at both ends.
 
     Args:
         job: What is requested.
         points: Its cutter points.
-        written: The written configurations with their labels and written times, one for each move.
-        playback: The moves they are from.
+        motion: What the program does, with its meaning, and where a move of it ends.
+        playback: The moves.
         reader: Of the language they are written in.
     """
-    motion = written.motion
     requested = time_motion(motion, points, job.process, job.cell.robot)
+    motion = requested.timed.motion
+    at = np.cumsum(playback.duration)[playback.stations]
+    written = TimedMotion(motion, np.diff(at, prepend=0.0))
     return [
         *_first_moves(job, playback, reader),
         *speed_findings(written, requested, playback, job.process.feed),

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 _VIEWER = Path(__file__).parent / "viewer"
-MOST_ON_PAPER = 12  # rows of a table, or lines of a list; the style leaves out as many
+MOST_ON_PAPER = 9  # rows of a table, or lines of a list; the style leaves out as many
 _POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
 
 

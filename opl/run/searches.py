@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
+from opl.errors import NoPathError
 from opl.job.search import Method, Objective, Search
 from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.motion.short_ways import shortened
@@ -22,6 +23,7 @@ from opl.run.values import Prepared
 
 # of motions from the paper's start node, which are searched for comparison only
 MOST_CHECKS = 20
+MOST_LATER_CHECKS = 200  # where the proof found no motion either
 MOST_FIRST_CHECKS = 40  # of motions of the recursive search, before the proof begins without it
 
 
@@ -64,6 +66,13 @@ def search_path(
             best = plan_optimal(problem, search.optimal, None, report)
             if best is not None:
                 return FoundPaths(_finished(search, problem, best, nameable), best)
+            first = try_recursive(problem, search.start, MOST_LATER_CHECKS)
+            if isinstance(first, OutOfBudget):
+                raise NoPathError(
+                    f"no path found: the {first.checks} best motions of the recursive search are "
+                    "not free, and the work allowed for the proof was done before one was; more "
+                    "work, or more room around the robot, may help"
+                )
     recursive = first.plan if isinstance(first, Found) else plan_recursive(problem, search.start)
     plan = recursive
     if search.method is Method.OPTIMAL:

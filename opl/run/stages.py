@@ -7,12 +7,16 @@ from opl.files.beside import Beside
 from opl.job.load import Job
 from opl.job.refusals import dwell_refusal, keys_named
 from opl.motion.feed import slow_stretches
+from opl.motion.motion import TimedMotion
 from opl.motion.timing import Timing, time_motion
 from opl.planning.borders import Nameable
 from opl.planning.plan import Plan
+from opl.planning.positions import with_fewest_positions
+from opl.planning.speed_steps import with_speed_steps
 from opl.planning.survey import survey_nodes
 from opl.program.posts import find_post
-from opl.proof.read_back import in_file_digits, read_back
+from opl.program.settings import MotionForm
+from opl.proof.read_back import in_file_digits, position_rule, read_back
 from opl.run.exporting import draw_charts, job_date, render_program
 from opl.run.page_data import nearest_along
 from opl.run.preparing import prepare
@@ -77,12 +81,17 @@ def _plan(surfaced: Surfaced, watch: Watch) -> Planned | Refused:
     with watch.stage(Stage.COMPARISON):
         compared = compare(prepared, found)
     with watch.stage(Stage.MOTION):
+        exact = with_speed_steps(found.plan.motion, surfaced.points, job.process, job.cell.robot)
         # what is proven is what the digits of the program can say
-        motion = in_file_digits(found.plan.motion, job)
+        motion = in_file_digits(exact, job)
+        if job.program.motion is MotionForm.JOINT:
+            scene, rule = prepared.problem.scene, position_rule(job)
+            motion = with_fewest_positions(scene, surfaced.points, motion, job.process, rule)
         timing = time_motion(motion, surfaced.points, job.process, job.cell.robot)
         slow = slow_stretches(timing, job.process)
+    timed = TimedMotion.passing(motion, timing.timed.duration)
     pictured = Beside(lambda: _pictured(prepared, found.plan, timing))
-    planned = Planned(prepared, found.plan, compared, timing, slow, pictured)
+    planned = Planned(prepared, found.plan, compared, exact, timed, timing, slow, pictured)
     refusal = dwell_refusal(slow, job.process)
     return planned if refusal is None else Refused(planned, refusal, (), watch.seconds)
 
@@ -118,7 +127,7 @@ def verify_motion(planned: Planned, watch: Watch | None = None) -> Proven | Refu
         verification = replay(
             job.cell,
             surfaced.points,
-            planned.timing.timed,
+            planned.timed,
             job.search.max_contact_error,
             progress,
         )
@@ -140,11 +149,11 @@ def write_program(proven: Proven, watch: Watch | None = None) -> Run:
         Cancelled: If the run was cancelled.
     """
     watch = watch or Watch()
-    surfaced, plan = proven.surfaced, proven.planned.plan
+    surfaced, exact = proven.surfaced, proven.planned.exact
     with watch.stage(Stage.EXPORT), keys_named(surfaced.job.source):
         program, files = render_program(proven)
     with watch.stage(Stage.READ_BACK):
-        found = read_back(surfaced.job, surfaced.points, plan.motion, proven.motion, program, files)
+        found = read_back(surfaced.job, surfaced.points, exact, proven.motion, program, files)
     if found is not None and not found.proven:
         return Refused(proven, found, (), watch.seconds)
     with watch.stage(Stage.EXPORT):

@@ -23,7 +23,7 @@ from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.feed import SlowStretch
 from opl.motion.figures import Figures
-from opl.motion.motion import VerifiedMotion
+from opl.motion.motion import Motion, TimedMotion, VerifiedMotion
 from opl.motion.timing import Timing
 from opl.planning.fixed_contact import FixedContact
 from opl.planning.plan import Plan
@@ -107,7 +107,10 @@ class Planned:
         plan: The path, and its motion as planned.
         compared: The figures of this path and of those that it is compared with, by what they are:
             ``fixed``, ``paper_start``, ``recursive``, ``optimal``; those that exist.
-        timing: The motion in the digits of the program, its times, and what sets them.
+        exact: The motion through all configurations that were looked at, in no digits.
+        timed: The motion through the fewest positions that do, in the digits of the program, with
+            its times.
+        timing: What is written of it, move by move, and what sets the times.
         slow: Where the ground point is slower than the feed.
         pictured: What pictures show of it, worked out when it is first asked for, or beside.
     """
@@ -115,6 +118,8 @@ class Planned:
     prepared: Prepared
     plan: Plan
     compared: Mapping[str, Figures]
+    exact: Motion
+    timed: TimedMotion
     timing: Timing
     slow: tuple[SlowStretch, ...]
     pictured: Beside[Pictured]

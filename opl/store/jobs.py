@@ -22,14 +22,14 @@ from opl.store.owners import is_gone, this_process
 from opl.store.values import FileRecord, Outcome, State, StoredJob, Task
 
 LEASE = 30.0  # [s] that a job stays with an owner who says nothing
-MOST_ATTEMPTS = 3  # of a job whose worker dies
-VERSION = 1
+MOST_DEATHS = 3  # of workers, before their job fails
+VERSION = 2
 _TABLE = """
 CREATE TABLE jobs (
     id TEXT PRIMARY KEY, target TEXT NOT NULL UNIQUE, name TEXT NOT NULL, task TEXT NOT NULL,
     state TEXT NOT NULL, stage TEXT NOT NULL, fraction REAL NOT NULL, cancelling INTEGER NOT NULL,
     attempts INTEGER NOT NULL, outcome TEXT, created REAL NOT NULL, started REAL, ended REAL,
-    owner TEXT, lease REAL
+    owner TEXT, lease REAL, deaths INTEGER NOT NULL
 ) WITHOUT ROWID
 """
 _INDEX = "CREATE INDEX jobs_by_state ON jobs (state, created)"
@@ -88,7 +88,7 @@ class Store:
                 file.execute("DELETE FROM jobs WHERE target = ?", [target])
             file.execute(
                 "INSERT INTO jobs VALUES (?, ?, ?, ?, 'queued', '', 0, 0, 0, NULL, ?, NULL, NULL, "
-                "NULL, NULL)",
+                "NULL, NULL, 0)",
                 [id_, target, name, json.dumps(asdict(task)), time.time()],
             )
             return self._job(file, id_)
@@ -114,10 +114,7 @@ class Store:
     # what is worked on
 
     def claim(self, id_: str | None = None) -> StoredJob | None:
-        """Take a queued job to work on it: the one asked for, else the oldest; None without one.
-
-        A job that nobody brought to an end in `MOST_ATTEMPTS` attempts fails here.
-        """
+        """Take a queued job to work on it: the one asked for, else the oldest; None without one."""
         with self._file.changing() as file:
             self._free_lost(file)
             which, values = ("AND id = ?", [id_]) if id_ is not None else ("", [])
@@ -160,9 +157,17 @@ class Store:
                 [state.value, text, time.time(), id_, self._owner],
             )
 
-    def give_back(self, id_: str) -> None:
-        """Put a job of this process back into the queue; it fails if it was begun too often."""
+    def give_back(self, id_: str, died: bool) -> None:
+        """Put a job of this process back into the queue.
+
+        Args:
+            id_: The job.
+            died: Whether its worker died of it: it fails when `MOST_DEATHS` have. Not where all
+                that is at work was stopped.
+        """
         with self._file.changing() as file:
+            if died:
+                file.execute("UPDATE jobs SET deaths = deaths + 1 WHERE id = ?", [id_])
             self._requeue(file, id_)
 
     # what is there
@@ -222,15 +227,15 @@ class Store:
         now = time.time()
         running = "SELECT id, owner, lease FROM jobs WHERE state = 'running'"
         for id_, owner, lease in file.execute(running).fetchall():
-            if lease < now or (owner != self._owner and is_gone(owner)):
+            if owner != self._owner and (lease < now or is_gone(owner)):
                 self._requeue(file, id_)
 
     def _requeue(self, file: sqlite3.Connection, id_: str) -> None:
-        died = Outcome("error", 1, f"its worker process died, {MOST_ATTEMPTS} times", final=False)
+        died = Outcome("error", 1, f"its worker process died, {MOST_DEATHS} times", final=False)
         file.execute(
             "UPDATE jobs SET state = 'failed', outcome = ?, ended = ?, owner = NULL "
-            "WHERE id = ? AND state = 'running' AND attempts >= ?",
-            [json.dumps(asdict(died)), time.time(), id_, MOST_ATTEMPTS],
+            "WHERE id = ? AND state = 'running' AND deaths >= ?",
+            [json.dumps(asdict(died)), time.time(), id_, MOST_DEATHS],
         )
         file.execute(
             "UPDATE jobs SET state = CASE cancelling WHEN 1 THEN 'cancelled' ELSE 'queued' END, "

@@ -2,31 +2,73 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
+from opl.geometry.frames import Array, rotation_angle
+from opl.geometry.toolpath import CutterPoints
+from opl.geometry.wheel import MM_PER_M
 from opl.verification.contact import Touches
 
 MISSED = 100.0  # what a cutter point that is left out costs; all else costs a few units in a pass
 TWICE = 2.0  # what a configuration that grinds the next cutter point too costs
+ELSEWHERE = 10.0  # what a pass that begins or ends at no written position costs at either end
+PASSED = 0.3  # what a cutter point costs that is ground on the way and not where one is written
+TOO_SOON = 2.0  # what a second costs by which a cutter point is reached sooner than at the feed
 PER_POSITION = 0.01  # cost of a change of t by one belt unit
 STEP_SLACK = 0.1  # belt units that t may change beyond the rule: rounding
 HORIZON = 4096  # touches looked back at
 
 
+@dataclass(frozen=True, eq=False)
+class Course:
+    """The cutter points in order; N items each.
+
+    Attributes:
+        pass_index: Pass of each.
+        seconds: When each is reached at the feed, from the start of its pass, in [s].
+        turned: How far the surface has gone on and turned until there, in belt units: by as much t
+            may change although the part hardly moves.
+    """
+
+    pass_index: NDArray[np.int64]
+    seconds: Array
+    turned: Array
+
+    @classmethod
+    def of(cls, points: CutterPoints, feed: float) -> Course:
+        """Return the course of cutter points at a feed in [m/s]."""
+        Ts = points.Ts_workpiece_cutter
+        apart = MM_PER_M * np.linalg.norm(np.diff(Ts[:, :3, 3], axis=0), axis=1)
+        turned = apart + np.rad2deg(rotation_angle(Ts[:-1], Ts[1:]))
+        sums = np.concatenate([[0.0], np.cumsum(turned)])
+        return cls(points.pass_index, points.arc_length / feed, sums)
+
+
 def align(
-    touches: Touches, pass_index: NDArray[np.int64], tolerance: float, max_contact_step: float
+    touches: Touches,
+    course: Course,
+    tolerance: float,
+    max_contact_step: float,
+    written: NDArray[np.bool_],
+    time: Array,
 ) -> NDArray[np.intp]:
     """Choose touches that grind as many cutter points as can be, once and in order.
 
-    Of several choices the one is taken that lies nearest to the contact model and moves least over
-    the wheel: a flat part of a surface touches the flat of the wheel in many places at once.
+    Of several choices the one is taken that lies nearest to the contact model, keeps to the feed
+    and moves least over the wheel: a flat part of a surface touches the flat of the wheel in many
+    places at once.
 
     Args:
         touches: Candidates.
-        pass_index: Pass of each cutter point, shape (N,).
-        tolerance: Largest distance of a touch from the contact model in [m].
-        max_contact_step: Largest change of t between neighbouring configurations of a pass.
+        course: The cutter points.
+        tolerance: Distance from the contact model in [m] that counts for one unit.
+        max_contact_step: Largest change of t between neighbouring configurations of a pass, beyond
+            what the surface turns.
+        written: Which touches are at a position that is written, shape (k,).
+        time: When each touch is, in [s], shape (k,).
 
     Returns:
         Indices of the chosen touches in order.
@@ -35,7 +77,10 @@ def align(
     if not n:
         return np.empty(0, dtype=np.intp)
     configuration, point, t = touches.configuration, touches.point, touches.contact_position
-    own = touches.distance / tolerance
+    pass_index, at_feed = course.pass_index, course.seconds
+    at_end = (np.diff(pass_index, prepend=-1) != 0) | (np.diff(pass_index, append=-1) != 0)
+    own = touches.distance / tolerance + np.where(written, 0.0, PASSED)
+    own = own + np.where(at_end[point] & ~written, ELSEWHERE, 0.0)
     best = own + MISSED * point  # as the first one that is ground
     came_from = np.full(n, -1)
     for m in range(1, n):
@@ -46,8 +91,11 @@ def align(
         change = np.where(same_pass, np.abs(t[m] - t[before]), 0.0)
         cost = best[before] + own[m] + MISSED * skipped + PER_POSITION * change
         cost = cost + np.where(apart == 0, TWICE, 0.0)
+        sooner = at_feed[point[m]] - at_feed[point[before]] - (time[m] - time[before])
+        cost = cost + TOO_SOON * np.where(same_pass, np.maximum(sooner, 0.0), 0.0)
         # on the flat one configuration may grind two cutter points at different t
-        too_far = (apart > 0) & (change > max_contact_step * apart + STEP_SLACK)
+        turned = course.turned[point[m]] - course.turned[point[before]]
+        too_far = (apart > 0) & (change > max_contact_step * apart + turned + STEP_SLACK)
         cost[(skipped < 0) | too_far | ((apart == 0) & ~same_pass)] = np.inf
         cheapest = int(cost.argmin())
         if cost[cheapest] < best[m]:

@@ -25,6 +25,7 @@ from opl.cell.robot import forward_kinematics
 from opl.cell.workcell import WorkCell
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, inverse, pose, transform
+from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import ContactWheel
 from opl.verification.contact import contact_positions
@@ -32,7 +33,7 @@ from opl.verification.kinematic_checks import missing_points
 from opl.verification.recognise import Rule, recognise
 
 FARTHEST = 1.5e-3  # [m] that contacts are looked for away from the contact model
-STEP = 2e-3  # [m] that the part moves from one sample to the next
+STEP = 2e-3  # [m] that no cutter point moves farther from one sample to the next
 LEVER = 0.05  # [m] from the ground point; weighs angles against distances
 SLOPE = np.deg2rad(6.0)  # that frames may be turned apart to be compared
 USUAL = 5e-5  # [m]: what is left over and much larger counts less
@@ -164,8 +165,8 @@ def _near(cell: WorkCell, points: CutterPoints, q: Array) -> _Near:
     T_contact0_base = inverse(wheel.T_base_contact0)
     Ts = T_contact0_base @ forward_kinematics(cell.robot, q) @ cell.T_flange_workpiece
     p_workpiece = Ts_workpiece_cutter[:, :3, 3]
-    centre = transform(Ts, p_workpiece.mean(axis=0))
-    moved = np.linalg.norm(np.diff(centre, axis=0), axis=1)
+    corners = transform(Ts[:, None], box_corners(p_workpiece))
+    moved = np.linalg.norm(np.diff(corners, axis=0), axis=-1).max(axis=1)
     away = [np.abs(wheel.signed_distance(transform(T, p_workpiece))).min() for T in Ts]
     close = np.minimum(away[:-1], away[1:]) <= 2.0 * moved + FARTHEST
     found = []

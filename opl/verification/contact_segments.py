@@ -20,11 +20,10 @@ from numpy.typing import NDArray
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import ContactWheel
-from opl.verification.contact import Touches, contact_positions, misfit
+from opl.verification.contact import LEVER, Touches, contact_positions, misfit
 
 TRIED = 48  # places tried first between two neighbouring cutter points
 ROUNDS = 4  # of refining, each to a quarter
-LEVER = 0.05  # [m] from the ground point; weighs angles against distances
 # [m] that one belt unit away from an even change of t counts for, move by move: on a flat part of
 # the surface there is nothing else to choose places by
 UNEVEN = 1e-5

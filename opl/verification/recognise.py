@@ -1,5 +1,6 @@
 """What a robot grinds, recognised from its configurations alone, without knowing its passes.
 
+Moves are sampled near the wheel, since most cutter points are passed and not stopped at.
 Configurations and cutter points are aligned like two texts: both keep their order, a configuration
 may lie between two cutter points or off the wheel, and a cutter point that no configuration brings
 to the wheel is left out, which costs much. Between two cutter points the frame changes evenly;
@@ -18,14 +19,19 @@ from opl.findings import Finding, Level
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion, MoveKind, TimedMotion
-from opl.verification.align import align
-from opl.verification.contact import ALIGNED, find_touches
+from opl.verification.align import Course, align
+from opl.verification.contact import find_touches
 from opl.verification.contact_segments import ContactSegment, ContactSegments
+from opl.verification.passing import Samples, sample
 from opl.verification.world import World
 
-# [m] that a configuration may be off the contact model at the cutter point it grinds: what the
-# digits of a position leave. Farther off it is between cutter points.
+# [m] that a configuration which is written at a cutter point may be off the contact model there:
+# what the digits of a position leave. Of several that grind a point the nearest is taken by this
 AT_POINT = 5e-5
+# belt units that t changes by at the most between two samples: the part moves 1 mm and turns 0.5
+# degrees
+SAMPLE_STEP = 1.5
+ALIGNED = np.deg2rad(0.1)  # that it may be turned there
 ASIDE = 2e-4  # [m] that a configuration of an approach may be beside its way
 FARTHER = 1e-3  # [m] than the approach is long that still is approach
 
@@ -43,6 +49,7 @@ class Rule:
             are arcs that begin and end along the belt, y of the contact frame.
         approach_run: How far the part moves on along the pass at the most while it lifts off, on a
             quarter of a circle, in [m].
+        feed: Speed of the ground point along the surface in [m/s], where it is not slower.
     """
 
     max_contact_error: float
@@ -50,6 +57,7 @@ class Rule:
     approach_length: float
     approach_turn: float
     approach_run: float
+    feed: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +65,11 @@ class Recognition:
     """A motion with its meaning.
 
     Attributes:
-        timed: The configurations, labelled; one that grinds several cutter points at once is
-            repeated, the move to itself taking no time.
-        source: Index of each of them in the configurations that were given, shape (n,).
+        timed: The configurations, labelled, and those at which a move passes a cutter point, which
+            are not written; one that grinds several cutter points at once is repeated, the move to
+            itself taking no time.
+        source: Index of each of them in the configurations that were given, of those passed that of
+            the end of the move, shape (n,).
         findings: Configurations between two cutter points that are off the contact model.
     """
 
@@ -83,28 +93,34 @@ def recognise(
         points: The cutter points that may be ground.
         q: Joint positions in [rad], joined by linear joint interpolation, shape (n, 6).
         duration: Time of the move that ends at each configuration in [s], shape (n,).
-        stations: Indices of the configurations at which a cutter point may be ground, in order.
+        stations: Indices of the configurations that are written, in order.
         rule: What a motion over the wheel has to keep.
     """
+    allowed = rule.max_contact_error
     with World(cell) as world:
-        Ts_base_workpiece = np.array([world.move_to(configuration) for configuration in q])
-    Ts_contact0_workpiece = inverse(cell.wheel.T_base_contact0) @ Ts_base_workpiece
-    tolerance = min(AT_POINT, rule.max_contact_error)
-    touches = find_touches(cell.wheel, points, Ts_contact0_workpiece[stations], tolerance)
-    ground = align(touches, points.pass_index, tolerance, rule.max_contact_step)
-    touches = replace(touches, configuration=stations[touches.configuration])
-    segments = ContactSegments(cell.wheel, points, Ts_contact0_workpiece, duration, touches)
-    ground = segments.settled(ground, rule.max_contact_error)
-    labels = _Labels(segments, rule)
+        samples = sample(world, cell.wheel, points, cell.part.vertices, q, duration, allowed)
+    # of the configurations of a straight move only the last is written, and all lie near together
+    Ts, near = samples.Ts_contact0_workpiece, samples.near
+    touches = find_touches(cell.wheel, points, Ts[near], allowed)
+    step = max(rule.max_contact_step, SAMPLE_STEP)
+    touches = replace(touches, configuration=near[touches.configuration])
+    written = np.isin(touches.configuration, samples.given[stations])
+    time = np.cumsum(samples.duration)[touches.configuration]
+    ground = align(touches, Course.of(points, rule.feed), AT_POINT, step, written, time)
+    segments = ContactSegments(cell.wheel, points, Ts, samples.duration, touches)
+    ground = segments.settled(ground, allowed)
+    labels = _Labels(segments, rule, samples.given)
     labels.grind(ground)
-    return labels.recognition(q, duration)
+    return labels.recognition(samples, stations)
 
 
 class _Labels:
     """What each configuration is, being found out."""
 
-    def __init__(self, segments: ContactSegments, rule: Rule) -> None:
+    def __init__(self, segments: ContactSegments, rule: Rule, given: NDArray[np.intp]) -> None:
         n = len(segments.duration)
+        # a lead ends where a move ends, not at a sample that lies on its way as well
+        self._given = np.isin(np.arange(n), given)
         self._segments = segments
         self._rule = rule
         self._kind = [MoveKind.HOME] * n
@@ -131,30 +147,36 @@ class _Labels:
             self._fill_in(segment, int(pass_index[m]))
         self._label_free_moves(*self._label_leads(configuration, point, t, pass_index))
 
-    def recognition(self, q: Array, duration: Array) -> Recognition:
-        """Return the labelled motion."""
+    def recognition(self, samples: Samples, stations: NDArray[np.intp]) -> Recognition:
+        """Return the labelled motion: the given configurations, and where points are passed."""
         also = np.array(self._also).reshape(-1, 3)
         at = also[:, 0].astype(np.intp)
-        source = np.insert(np.arange(len(q)), at + 1, at)
+        row = np.insert(np.arange(len(samples.q)), at + 1, at)
+        is_ground = np.array([kind is MoveKind.GRIND for kind in self._kind])
+        written = np.zeros(len(samples.q), dtype=bool)
+        written[samples.given[stations]] = True
         motion = Motion(
-            q=q[source],
-            kind=tuple(self._kind[k] for k in source),
+            q=samples.q[row],
+            kind=tuple(self._kind[k] for k in row),
             contact_position=np.insert(self._t, at + 1, also[:, 2]),
             cutter_point=np.insert(self._place, at + 1, also[:, 1]),
-            pass_index=self._pass[source],
+            pass_index=self._pass[row],
+            # of one that is repeated the first is written
+            written=written[row] & (np.diff(row, prepend=-1) != 0),
         )
         findings = tuple(
             Finding(
                 Level.ERROR,
                 "contact",
-                motion.place(int(np.searchsorted(source, k))),
+                motion.place(int(np.searchsorted(row, k))),
                 f"{1e3 * amount:.3f} mm off the contact model before the next cutter point, "
                 f"{1e3 * self._rule.max_contact_error:g} mm allowed",
             )
             for k, amount in self._astray
         )
-        timed = TimedMotion(motion, np.insert(duration, at + 1, 0.0))
-        return Recognition(timed, source, findings)
+        timed = TimedMotion(motion, np.insert(samples.duration, at + 1, 0.0))
+        kept = np.flatnonzero(np.isin(row, samples.given) | is_ground[row])
+        return Recognition(timed.take(kept), samples.source[row[kept]], findings)
 
     def _mark(self, k: int, kind: MoveKind, pass_index: int, t: float, place: float) -> None:
         self._kind[k], self._pass[k] = kind, pass_index
@@ -198,6 +220,9 @@ class _Labels:
         farthest, found = 0.0, []
         j = int(k) + side
         while 0 <= j < len(self._kind) and self._kind[j] is MoveKind.HOME:
+            if not self._given[j]:
+                j += side
+                continue
             T_contact0_workpiece = self._segments.Ts_contact0_workpiece[j]
             T_contact_cutter = T_contact_contact0 @ T_contact0_workpiece @ T_workpiece_cutter
             along, aside = self._along_lead(T_contact_cutter[:3, 3], side, direction)

@@ -149,6 +149,7 @@ class _Run:
         self._allowed_error = max_contact_error
         self._pairs = world.pairs()
         self._needed = np.array([pair.clearance for pair in self._pairs])
+        self._counts = np.array([pair.counts for pair in self._pairs], dtype=bool)
         # how far a turn of each joint by 1 rad can bring each pair together, in [m]
         joints = range(len(motion.q[0]))
         moved = [[pair.moved_by(joint) for joint in joints] for pair in self._pairs]
@@ -193,9 +194,11 @@ class _Run:
         hit = False
         # near pairs are measured at every pose, so that the smallest clearance is found too; the
         # nearest first: it leaves the least to measure of the others
-        for k in self._apart.argsort(kind="stable"):
+        most = np.maximum(self._needed, np.where(self._counts, self.clearance[move], 0.0))
+        near = np.flatnonzero(self._apart <= most)
+        for k in near[self._apart[near].argsort(kind="stable")].tolist():
             pair = self._pairs[k]
-            wanted = max(pair.clearance, self.clearance[move] if pair.counts else 0.0)
+            wanted = max(pair.clearance, self.clearance[move] if self._counts[k] else 0.0)
             if self._apart[k] > wanted:
                 continue
             within = wanted + AHEAD
@@ -203,7 +206,7 @@ class _Run:
             distance -= pair.rounding
             self._apart[k] = min(distance, within)
             names = f"{pair.first.name} and {pair.second.name}"
-            if pair.counts:
+            if self._counts[k]:
                 self.clearance[move] = min(self.clearance[move], distance)
                 self.nearest.note(distance, names, move, q)
             if distance < pair.clearance or distance <= 0.0:

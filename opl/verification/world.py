@@ -77,7 +77,10 @@ class World:
     def __init__(self, cell: WorkCell) -> None:
         self._cell = cell
         self._client = start()
-        self._closest_points = self._client.getClosestPoints  # the client looks names up each time
+        # the client looks names up each time
+        self._closest_points = self._client.getClosestPoints
+        self._turn_joint = self._client.resetJointState
+        self._place = self._client.resetBasePositionAndOrientation
         # else a file is taken for an earlier one of its name
         self._client.setPhysicsEngineParameter(enableFileCaching=0)
         self._robot = self._client.loadURDF(
@@ -154,11 +157,11 @@ class World:
         """Pose robot, part and fixture; return T_base_workpiece as PyBullet sees it, (4, 4)."""
         client = self._client
         for joint, value in zip(self._joints, q, strict=True):
-            client.resetJointState(self._robot, joint, value)
+            self._turn_joint(self._robot, joint, value)
         state = client.getLinkState(self._robot, self._flange, computeForwardKinematics=True)
         placed = [client.multiplyTransforms(*state[4:6], *at_flange) for _, at_flange in self._held]
         for (held, _), at in zip(self._held, placed, strict=True):
-            client.resetBasePositionAndOrientation(held.body, *at)
+            self._place(held.body, *at)
         position, quaternion = self._part_at = placed[0]
         R = np.array(client.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
         self._T_base_workpiece = pose(R, np.array(position))
@@ -176,12 +179,12 @@ class World:
         was measured.
         """
         bounds = self._patches.least_distances(self._drum, self._T_base_workpiece)
-        place, nearest = self._client.resetBasePositionAndOrientation, np.inf
+        nearest = np.inf
         for k in bounds.argsort():
             if bounds[k] - 2.0 * MARGIN > min(nearest, within):
                 break
             patch = self._shown[k]
-            place(patch.body, *self._part_at)
+            self._place(patch.body, *self._part_at)
             nearest = min(nearest, self.distance(patch, self._wheel, min(nearest, within)))
         return nearest
 

@@ -217,4 +217,4 @@ def _delivered(task: Task, outcome: Outcome, files: Mapping[str, bytes]) -> Outc
             written = put_files(claim, files)
             return replace(outcome, folder=os.path.join(task.out, name), files=note_files(written))
     except InputError as error:
-        return Outcome("bad input", error.exit_status, str(error))
+        return Outcome("bad input", error.exit_status, str(error), final=False)

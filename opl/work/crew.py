@@ -120,7 +120,7 @@ class Crew:
         try:
             outcome = doer.do(job.task, beat)
         except WorkerDied:
-            self._store.give_back(job.id)
+            self._store.give_back(job.id, died=not self._stop.is_set())
             if not self._stop.is_set():
                 tell("worker died", job=job.id, name=job.name)
                 if (found := self._store.get(job.id)) is None or found.state is State.FAILED:
@@ -132,7 +132,7 @@ class Crew:
             message = f"{type(error).__name__}: {error} (a bug of opl)"
             outcome = Outcome("error", BUG, message, final=False)
         if self._stop.is_set() and outcome is None:
-            self._store.give_back(job.id)
+            self._store.give_back(job.id, died=False)
             return
         self._store.finish(job.id, outcome)
         status = "cancelled" if outcome is None else outcome.status

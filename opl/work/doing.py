@@ -6,7 +6,8 @@ import math
 import os
 import resource
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,10 @@ def do(task: Task, tell: Tell) -> Outcome | None:
             return _KINDS[task.kind](task, watch)
     except Cancelled:
         return None
+    except _FolderError as error:
+        refusal = error.__cause__
+        assert isinstance(refusal, InputError)
+        return Outcome("bad input", refusal.exit_status, str(refusal), final=False)
     except OplError as error:
         status = "bad input" if isinstance(error, InputError) else "error"
         return Outcome(status, error.exit_status, str(error))
@@ -86,13 +91,27 @@ def do(task: Task, tell: Tell) -> Outcome | None:
         return Outcome("error", 1, message, final=False)
 
 
+class _FolderError(Exception):
+    """What the folder is refused for, which is not the job's fault."""
+
+
+@contextmanager
+def _of_the_folder() -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        raise _FolderError from error
+
+
 def _run(task: Task, watch: Watch) -> Outcome:
     job = _job(task)
     folder = Path(task.out) / job.name
-    with claim_folder(folder, job.name) as claim:
+    with ExitStack() as stack:
+        with _of_the_folder():
+            claim = stack.enter_context(claim_folder(folder, job.name))
         run = run_job(job, watch)
-        written = deliver(run, claim)
-        files = note_files(written)
+        with _of_the_folder():
+            files = note_files(deliver(run, claim))
     return Outcome(
         run.status,
         run.error.exit_status if isinstance(run, Refused) else 0,

@@ -18,6 +18,7 @@ from opl.planning.multi_start import Start, plan_recursive, try_recursive
 from opl.planning.plan import Exhausted, Found, OutOfBudget
 from opl.planning.reasons import explain, unreachable_points
 from opl.planning.survey import NodeState, survey_nodes
+from opl.run import searches
 from tests.support.bare_cells import Ghosts, with_obstacle
 from tests.support.brute_force import printed_recursion
 from tests.support.fcl_scene import FclScene
@@ -193,6 +194,16 @@ def test_a_search_ends_with_a_plan_or_without_proposals_or_with_its_budget_spent
     shut = with_scene(problem, collision=Ghosts(np.zeros(6), radius=100.0))
     assert isinstance(try_recursive(shut, Start.NEAREST, most_checks=1), OutOfBudget)
     assert isinstance(try_recursive(shut, Start.NEAREST, most_checks=1000), Exhausted)
+
+
+def test_a_search_that_finds_nothing_in_its_work_says_so_and_ends(monkeypatch):
+    monkeypatch.setattr(searches, "MOST_FIRST_CHECKS", 1)
+    monkeypatch.setattr(searches, "MOST_LATER_CHECKS", 2)
+    job = small_job()
+    optimal = replace(job.search.optimal, max_subproblems=1)
+    shut = with_scene(one_row_problem(), collision=Ghosts(np.zeros(6), radius=100.0))
+    with pytest.raises(NoPathError, match="the 2 best motions of the recursive search are not"):
+        searches.search_path(replace(job.search, optimal=optimal), shut)
 
 
 def test_another_scene_finds_free_moves_of_its_own():

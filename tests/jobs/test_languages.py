@@ -4,11 +4,13 @@ A short row of the V part, on an arm of the language's maker and from a home nea
 in INFORM jobs are in test_verify.py and test_faults.py.
 """
 
+import csv
 import json
 import re
 import shutil
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
 from opl.geometry.toolpath import CutterPoints
@@ -16,6 +18,7 @@ from opl.job.load import Job, load_job
 from opl.program.posts import find_post
 from opl.proof.prove import prove
 from opl.run.surfacing import cut_surface
+from tests.support.corners import needed
 from tests.support.example_post import install_example_post
 from tests.support.jobs import GONE, opl, write_job
 
@@ -128,9 +131,7 @@ class Written:
         points: The cutter points.
         file: The program, with result.json beside it.
         text: What stands in it.
-        move: Number of the move that grinds a cutter point in the middle, counted from 0.
-        next_move: Number of the move that grinds the next cutter point.
-        point: The cutter point in the middle.
+        move: Number of the move of the pass that is needed most, counted from 0.
     """
 
     language: Language
@@ -140,8 +141,6 @@ class Written:
     file: object
     text: str
     move: int
-    next_move: int
-    point: int
 
     def spans(self, pattern, text=None):
         """Return where the first group of a pattern stands, all of them in order."""
@@ -159,7 +158,7 @@ class Written:
         return text[:start] + target + text[end:]
 
     def with_line(self, line):
-        """Return the text with a line after the move that grinds the point in the middle."""
+        """Return the text with a line after the move in the middle."""
         end = self.moves(self.text)[self.move].end()
         return self.text[:end] + self.language.line.format(line) + self.text[end:]
 
@@ -196,15 +195,17 @@ def written(request, tmp_path_factory):
     assert ended.status == 0, ended.err
     file = home / "out" / (job.name + find_post(request.param).reader.suffix)
     points = cut_surface(job).points
-    point = len(points) // 2
     lines = (home / "out" / f"{job.name}.csv").read_text().splitlines()
-    labels = [line.split(",")[1] for line in lines[1:]]
+    rows = [row for row in csv.DictReader(lines) if row["speed"]]
+    labels = [float(row["cutter_point"] or "nan") for row in rows]
     text = file.read_bytes().decode("ascii")
     result = json.loads((home / "out" / "result.json").read_text())
     assert result["program"]["read_back"] is True
-    assert len(labels) == result["program"]["moves"]  # each row of the table has a move
-    move, following = (labels.index(f"{k:.4f}") for k in (point, point + 1))
-    return Written(language, request.param, job, points, file, text, move, following, point)
+    assert len(labels) == result["program"]["moves"]
+    names = job.cell.robot.joint_names
+    q = np.array([[float(row[f"{name}_deg"]) for name in names] for row in rows])
+    move = needed(q, np.flatnonzero(~np.isnan(labels))[2:-2])
+    return Written(language, request.param, job, points, file, text, move)
 
 
 def refuses(proof, *words):
@@ -240,9 +241,7 @@ def test_one_digit_is_found(written):
     target = written.target(written.move)
     at = target.index(".") + (2 if written.controller == "URSCRIPT" else 1)
     text = written.with_target(written.move, digit_changed(target, at, 5))
-    proof = written.proof(text)
-    assert refuses(proof, f"order at cutter point {written.point}:")
-    assert refuses(proof, "contact at pass 1, cutter point")
+    assert refuses(written.proof(text), "contact at pass 1, cutter point")
 
 
 def test_the_last_digit_is_found_beside_the_result_of_the_run(written, tmp_path):
@@ -260,16 +259,17 @@ def test_the_last_digit_is_found_beside_the_result_of_the_run(written, tmp_path)
 
 
 def test_two_points_exchanged_are_found(written):
-    here, there = written.move, written.next_move
+    here, there = written.move, written.move + 1
     text = written.with_target(here, written.target(there))
     proof = written.proof(written.with_target(there, written.target(here), text))
-    assert refuses(proof, "order at cutter point")
+    assert refuses(proof, "contact at pass 1, cutter point")
 
 
 def test_a_dropped_point_is_found(written):
     found = written.moves(written.text)[written.move]
     proof = written.proof(written.text[: found.start()] + written.text[found.end() :])
-    assert refuses(proof, f"order at cutter point {written.point}:")
+    # half a millimetre is allowed in this job: where the line past it is nearer, its time tells
+    assert refuses(proof, "at pass 1, cutter point")
 
 
 def test_a_move_at_full_speed_is_found(written):
@@ -278,7 +278,7 @@ def test_a_move_at_full_speed_is_found(written):
     start, end = written.spans(written.language.speed)[number]
     text = written.text[:start] + written.language.fast + written.text[end:]
     proof = written.proof(text)
-    assert refuses(proof, f"speed at pass 1, cutter point {written.point}", "times the feed")
+    assert refuses(proof, "speed at pass 1, cutter point", "times the feed")
 
 
 def test_another_tool_is_found(written):
@@ -293,7 +293,7 @@ def test_a_fast_first_move_a_missing_stop_and_a_wait_on_the_wheel_are_found(writ
     proof = written.proof(text)
     assert refuses(proof, "speed at", "line", "a program begins with")
     assert refuses(proof, "level at", "at most, got")
-    assert refuses(proof, f"wait at pass 1, cutter point {written.point}", "stands still")
+    assert refuses(proof, "wait at pass 1, cutter point", "stands still")
 
 
 def test_what_nobody_can_follow_is_found(written):

@@ -173,11 +173,10 @@ def test_a_belt_that_dwells_too_long_leaves_the_plan_and_no_program(job):
 
 def test_a_replay_with_findings_is_reported_without_a_program(watched, monkeypatch):
     planned = watched[0].proven.planned
-    timed = planned.timing.timed
+    timed = planned.timed
     q = timed.motion.q.copy()
     q[len(q) // 2] += np.deg2rad(5.0)
     timed = replace(timed, motion=replace(timed.motion, q=q))
-    timing = replace(planned.timing, timed=timed)
-    run = opl.verify_motion(replace(planned, timing=timing))
+    run = opl.verify_motion(replace(planned, timed=timed))
     report = refused(run, "unsafe", opl.Planned, Verification)
     assert report.verification.file is None and run.error.exit_status == 4

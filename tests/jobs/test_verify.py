@@ -16,6 +16,7 @@ import yaml
 
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
+from opl.geometry.frames import transform
 from opl.job.load import load_job
 from opl.program.inform.parse import decode, read_jobs
 from opl.program.inform.playback import play_jobs
@@ -25,6 +26,7 @@ from opl.program.pulses import PulseScale
 from opl.proof.digest import digests_in, read_result
 from opl.run import stages
 from opl.run.stages import run_job
+from opl.run.surfacing import cut_surface
 from tests.support.jobs import V_SHAPE, opl, write_job, write_robot
 
 # two rows of the V, few contact positions, long steps, and a home near the wheel
@@ -69,14 +71,16 @@ def _tidy_up():
 
 @cache
 def columns():
-    """Return the table of the short program: one row a configuration."""
+    """Return the table of the short program: one row a written configuration."""
     lines = (planned() / "out" / "V_SHAPE.csv").read_text().splitlines()
-    return [dict(zip(lines[0].split(","), line.split(","), strict=True)) for line in lines[1:]]
+    rows = [dict(zip(lines[0].split(","), line.split(","), strict=True)) for line in lines[1:]]
+    return [row for row in rows if row["speed"]]
 
 
 def ground(n):
-    """Return the number of the configuration that grinds a cutter point."""
-    return next(k for k, row in enumerate(columns()) if row["cutter_point"] == f"{n:.4f}")
+    """Return the number of the first written configuration from a cutter point on."""
+    places = [float(row["cutter_point"] or "nan") for row in columns()]
+    return next(k for k, place in enumerate(places) if place >= n)
 
 
 class Text:
@@ -163,6 +167,30 @@ def test_proven_and_written_configurations_are_one():
     assert np.abs(counted - written).max() < 0.1  # the table's own four digits
 
 
+def test_no_exact_stop_of_the_written_file_is_on_the_belt():
+    home = planned(short=False)
+    job, text = load_job(home / "job.yaml"), (home / "out" / "V_SHAPE.JBI").read_text()
+    points, cell = cut_surface(job).points, job.cell
+    scale = PulseScale.of(cell.robot)
+    pulses = {int(k): v.split(",") for k, v in re.findall(r"^C(\d+)=(.*)$", text, re.MULTILINE)}
+    moves = re.findall(r"^MOVJ C(\d+) .*PL=(\d)", text, re.MULTILINE)
+    assert len(moves) == len(pulses)
+    touching = {}
+    for place, (number, _) in enumerate(moves):
+        q = scale.to_angles(np.array(pulses[int(number)], dtype=float))
+        T_base_workpiece = forward_kinematics(cell.robot, q) @ cell.T_flange_workpiece
+        p_base = transform(T_base_workpiece, points.Ts_workpiece_cutter[:, :3, 3])
+        p_contact0 = transform(np.linalg.inv(cell.wheel.T_base_contact0), p_base)
+        away = np.abs(cell.wheel.signed_distance(p_contact0))
+        if away.min() < 2e-4:
+            touching.setdefault(int(points.pass_index[away.argmin()]), []).append(place)
+    assert sorted(touching) == [0, 1]
+    stops = [place for place, (_, level) in enumerate(moves) if level == "0"]
+    assert len(stops) > 4
+    for contacts in touching.values():
+        assert not [place for place in stops if contacts[0] <= place <= contacts[-1]]
+
+
 # the file tampered with
 
 
@@ -198,7 +226,7 @@ def test_one_pulse_count_changed_by_200_is_found(tmp_path, joint):
     pulses = text.pulses(number)
     pulses[joint] += 200
     ended = verify(tmp_path, text.put(number, pulses))
-    assert refuses(ended, "order at cutter point 20")
+    assert refuses(ended, "order at cutter point")
     assert refuses(ended, "contact at pass 1")
 
 
@@ -217,7 +245,7 @@ def test_a_swapped_branch_in_the_middle_is_found(tmp_path):
 
 def test_two_points_exchanged_are_found(tmp_path):
     text = Text()
-    one, other = ground(20), ground(21)
+    one, other = ground(20), ground(20) + 1
     first, second = text.pulses(one), text.pulses(other)
     ended = verify(tmp_path, text.put(one, second).put(other, first))
     assert refuses(ended, "order at cutter point")
@@ -231,7 +259,7 @@ def test_a_deleted_point_is_found(tmp_path):
         text.text = text.text.replace(f"C{later:05d}", f"C{later - 1:05d}")
     text.replace(rf"NPOS {last + 1},", f"NPOS {last},")
     ended = verify(tmp_path, text)
-    assert refuses(ended, "order at cutter point 20")
+    assert refuses(ended, "order at cutter point")
     assert "file at" not in ended.err
 
 
@@ -245,7 +273,7 @@ def test_full_speed_on_the_wheel_is_found(tmp_path):
 def test_standing_still_on_the_wheel_is_found(tmp_path, line):
     text = Text().replace(rf"(MOVJ C{ground(20):05d} .*\r\n)", rf"\1{line}\r\n")
     ended = verify(tmp_path, text)
-    assert refuses(ended, "wait at pass 1, cutter point 20", "stands still on the wheel", line)
+    assert refuses(ended, "wait at pass 1, cutter point", "stands still on the wheel", line)
 
 
 def test_a_fast_first_move_and_rounded_corners_are_found(tmp_path):
@@ -288,7 +316,9 @@ def test_a_shifted_wheel_is_found(tmp_path):
     assert "seems" not in ended.out + ended.err  # too far for a shift to be told
     rows[0][3] -= 1.8
     ended = verify(tmp_path, Text(), {"wheel.T_base_contact0_mm": rows})
-    assert refuses(ended, "the wheel seems 0.20 mm", "than planned")
+    # between written positions the contact is off by up to the allowed 0.1 mm, and so a little here
+    told = re.search(r"the wheel seems (0\.\d\d) mm farther away than planned", ended.err)
+    assert ended.status == 4 and abs(float(told[1]) - 0.2) <= 0.02
 
 
 def test_a_part_two_millimetres_too_big_is_found(tmp_path):

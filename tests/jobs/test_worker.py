@@ -6,6 +6,7 @@ import signal
 import pytest
 
 from opl.store.values import Task
+from opl.work import doing
 from opl.work.worker import Limits, Worker, WorkerDied
 from tests.support.jobs import write_job
 
@@ -49,3 +50,12 @@ def test_a_job_is_cancelled_while_it_is_planned_and_one_killed_is_told(task, tmp
     with pytest.raises(WorkerDied):
         worker.do(task, lambda *_: os.kill(worker.pid, signal.SIGKILL) or True)
     assert worker.pid is None
+
+
+def test_a_folder_of_somebody_else_is_no_fault_of_the_job(task, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out" / "V_SHAPE").mkdir(parents=True)
+    (tmp_path / "out" / "V_SHAPE" / "result.json").write_text('{"job": "OTHER"}')
+    outcome = doing.do(task, on)
+    assert outcome.message.startswith("out/V_SHAPE: belongs to job OTHER")
+    assert (outcome.status, outcome.exit_status, outcome.final) == ("bad input", 2, False)

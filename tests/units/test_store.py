@@ -9,7 +9,7 @@ from opl.errors import InputError
 from opl.files.confining import confine_to, require_inside
 from opl.files.names import checked_name
 from opl.job.files import files_of_job
-from opl.store.jobs import MOST_ATTEMPTS, Store
+from opl.store.jobs import MOST_DEATHS, Store
 from opl.store.made import changed_files, note_files
 from opl.store.values import FileRecord, Outcome, State, Task
 from tests.support.jobs import write_job, write_robot
@@ -105,11 +105,19 @@ def test_a_lease_that_is_not_renewed_ends(store, monkeypatch):
 
 def test_a_job_that_kills_its_workers_fails_in_the_end(store):
     store.submit("1", "A", "", TASK)
-    for _ in range(MOST_ATTEMPTS):
+    for _ in range(MOST_DEATHS):
         assert store.claim() is not None
-        store.give_back("1")
+        store.give_back("1", died=True)
     assert store.claim() is None
     assert store.get("1").outcome.message == "its worker process died, 3 times"
+
+
+def test_a_job_is_not_to_blame_for_those_who_were_stopped(store):
+    store.submit("1", "A", "", TASK)
+    for _ in range(2 * MOST_DEATHS):
+        assert store.claim() is not None
+        store.give_back("1", died=False)
+    assert store.claim().attempts == 2 * MOST_DEATHS + 1
 
 
 def test_cancelling(store):
@@ -130,7 +138,7 @@ def test_a_cancelled_job_whose_worker_dies_stays_cancelled(store):
     store.submit("1", "A", "", TASK)
     store.claim()
     store.cancel("1")
-    store.give_back("1")
+    store.give_back("1", died=True)
     assert store.get("1").state is State.CANCELLED
 
 

@@ -17,4 +17,6 @@ POST = Post(
     DIALECT.template,
     VARIABLES,
     reader=listing_reader(DIALECT.suffix, parse, tool_name, rounded, lambda robot: START, CORNERS),
+    # R-30iA and R-30iB round every segment up to whole 8 ms, one ITP (public notes)
+    period=0.008,
 )

@@ -175,6 +175,8 @@ def post_of(profile: ControllerProfile) -> Post:
         VARIABLES,
         counts_pulses=True,
         reader=reader,
+        # DX200: the interface page of a simulator; assumed for the other generations
+        period=0.004,
     )
 
 

@@ -22,4 +22,6 @@ POST = Post(
     reader=listing_reader(
         DIALECT.suffix, parse, tool_name, rounded_degrees(DECIMALS), lambda robot: START, CORNERS
     ),
+    # sensor interfaces of KRC2 and KRC4 run at 12 ms (public pages of RSI); assumed for moves
+    period=0.012,
 )

@@ -28,4 +28,6 @@ POST = Post(
         CORNERS,
         declaration_faults,
     ),
+    # externally guided motion of IRC5 takes positions every 4 ms (its manual); assumed for moves
+    period=0.004,
 )

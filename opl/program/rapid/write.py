@@ -1,10 +1,10 @@
 """Writing RAPID modules.
 
 Joint moves carry their time (argument T), so no speed is rounded. Straight ones lead the part past
-a stationary tool at the wheel, at a speed that is the surface feed where the contact stays where it
-is. Signals are named ``do12`` and ``di3`` for the numbers of the job, tools other than tool0
-``tool3``: the names must exist on the controller. What the part weighs, and what stands still, the
-module declares.
+a stationary tool in the middle of the wheel, at a speed that is the surface feed where the part is
+ground there. Signals are named ``do12`` and ``di3`` for the numbers of the job, tools other than
+tool0 ``tool3``: the names must exist on the controller. What the part weighs, and what stands
+still, the module declares.
 """
 
 from __future__ import annotations

@@ -18,4 +18,6 @@ POST = Post(
     reader=listing_reader(
         DIALECT.suffix, parse, tool_name, rounded_radians(DECIMALS), start_speed, CORNERS
     ),
+    # CB3 takes set points at 125 Hz, e-Series at 500 Hz (public manuals); the slower one assumed
+    period=0.008,
 )

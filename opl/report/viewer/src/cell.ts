@@ -192,7 +192,8 @@ export class CellView {
 
   private cut(wheel: Wheel): Plane {
     const contact = matrix(wheel.T_base_contact0);
-    const through = this.dot.visible ? this.dot.position : new Vector3().setFromMatrixPosition(contact);
+    const through = new Vector3().setFromMatrixPosition(contact);
+    if (this.dot.visible) through.lerp(this.dot.position, 0.98); // a hair inside, where the point is at the edge of the wheel
     return new Plane().setFromNormalAndCoplanarPoint(new Vector3().setFromMatrixColumn(contact, 0).negate(), through);
   }
 

@@ -1,0 +1,169 @@
+"""The fewest configurations of a run whose joint lines lead as they should: exactly, not greedily.
+
+Whether a line may join two configurations is no matter of how far they are apart: a longer one may
+do where a shorter one does not. So every pair is looked at, and of all chains of lines that lead
+from the first configuration to the last the shortest is found by dynamic programming over lines,
+since what a rounded corner may be depends on both of its lines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from opl.motion.gradual import LEAST_COUNTED
+from opl.motion.line_error import Run, Screws, rounded_off, straight_off
+
+_SHORT = 1 << 20  # what a line shorter in time than the controller follows counts for, in lines
+_NEVER = 1 << 60  # what no chain is as dear as
+
+
+@dataclass(frozen=True)
+class ChainRule:
+    """What a chain of joint lines has to keep besides its contact.
+
+    Attributes:
+        shortest: Least time of a line in [s]; one that cannot but be shorter counts for many.
+        ratio: Largest ratio of the speeds of neighbouring lines, as `opl.motion.gradual` has them;
+            where neighbours in the run differ by more, their lines may.
+        cut: Share of a line that may be cut off where a corner is rounded, at either end; 0 for
+            exact corners.
+    """
+
+    shortest: float
+    ratio: float = np.inf
+    cut: float = 0.0
+
+
+def fewest(
+    screws: Screws, run: Run, rule: ChainRule, blocked: frozenset[tuple[int, int]] = frozenset()
+) -> NDArray[np.intp] | None:
+    """Return the fewest configurations that do, in order, the first and the last among them.
+
+    Of several such chains the one with the least largest error is taken, as a fraction of what is
+    allowed; of equal ones always the same.
+
+    Args:
+        screws: The arm.
+        run: The run, two configurations at least.
+        rule: What the chain has to keep.
+        blocked: Lines that may not be taken, by the indices of their ends.
+
+    Returns:
+        Indices in the run; None if no chain keeps the rule.
+    """
+    barred = np.array(sorted(blocked), dtype=np.int64).reshape(-1, 2)
+    arm = screws.axes, screws.T_base_flange
+    chain = _chain(*arm, *run.arrays, rule.shortest, rule.ratio, rule.cut, barred)  # type: ignore[call-arg]
+    return chain.astype(np.intp) if len(chain) else None
+
+
+@njit(cache=True)
+def _lines(axes, T0, q, places, targets, freedom, room, allowed, pace, barred):  # type: ignore[no-untyped-def]
+    """Return the lines that keep their contact by where they end: starts, first ones, errors."""
+    n = len(q)
+    T, work = np.empty((3, 4)), np.empty((3, 6))
+    starts, errors = np.empty(4 * n, np.int64), np.empty(4 * n)
+    first = np.zeros(n + 1, np.int64)
+    suspects = np.full(n, -1)
+    count = 0
+    for j in range(1, n):
+        first[j] = count
+        for i in range(j):
+            error, suspects[i] = straight_off(
+                axes,
+                T0,
+                q,
+                places,
+                targets,
+                freedom,
+                room,
+                allowed,
+                pace,
+                i,
+                j,
+                suspects[i],
+                T,
+                work,
+            )
+            if error > 1.0:
+                continue
+            refused = False
+            for b in range(len(barred)):
+                refused |= barred[b, 0] == i and barred[b, 1] == j
+            if refused:
+                continue
+            if count == len(starts):
+                starts = np.concatenate((starts, np.empty(count, np.int64)))
+                errors = np.concatenate((errors, np.empty(count)))
+            starts[count], errors[count] = i, error
+            count += 1
+    first[n] = count
+    return starts[:count], first, errors[:count]
+
+
+@njit(cache=True)
+def _even(pace, i, j, k, ratio):  # type: ignore[no-untyped-def]
+    """Return whether the speeds of the lines from i to j and on to k are near enough."""
+    if k == i + 2:
+        return True
+    before, after = pace[j] - pace[i], pace[k] - pace[j]
+    if LEAST_COUNTED * before[1] > before[2] or LEAST_COUNTED * after[1] > after[2]:
+        return True
+    one, other = max(before[2] / before[0], LEAST_COUNTED), max(after[2] / after[0], LEAST_COUNTED)
+    return max(one / other, other / one) <= ratio * (1.0 + 1e-9)
+
+
+@njit(cache=True)
+def _chain(  # type: ignore[no-untyped-def]
+    axes, T0, q, places, targets, freedom, room, allowed, pace, shortest, ratio, cut, barred
+):
+    """Return the best chain; empty if there is none. A line is charged for with all before it."""
+    starts, first, errors = _lines(
+        axes, T0, q, places, targets, freedom, room, allowed, pace, barred
+    )
+    n, m = len(q), len(starts)
+    cost, largest, before = np.empty(m, np.int64), np.empty(m), np.full(m, -1, np.int64)
+    order = np.arange(m)  # the lines that end at a configuration, the best first
+    for k in range(1, n):
+        for line in range(first[k], first[k + 1]):
+            j = starts[line]
+            own = 1 if pace[k, 0] - pace[j, 0] >= shortest else _SHORT
+            cost[line], largest[line] = (own, errors[line]) if j == 0 else (_NEVER, np.inf)
+            for ahead in order[first[j] : first[j + 1]]:
+                if cost[ahead] == _NEVER:
+                    break
+                corner = 0.0
+                if not _even(pace, starts[ahead], j, k, ratio):
+                    continue
+                if cut > 0.0:
+                    corner = rounded_off(
+                        axes, T0, q, places, targets, freedom, room, allowed,
+                        starts[ahead], j, k, cut,
+                    )  # fmt: skip
+                if corner <= 1.0:
+                    cost[line] = cost[ahead] + own
+                    largest[line] = max(largest[ahead], errors[line])
+                    before[line] = ahead
+                    break
+        for place in range(first[k] + 1, first[k + 1]):
+            line = order[place]
+            while place > first[k]:
+                other = order[place - 1]
+                if cost[other] < cost[line] or (
+                    cost[other] == cost[line] and largest[other] <= largest[line]
+                ):
+                    break
+                order[place] = other
+                place -= 1
+            order[place] = line
+    if first[n] == first[n - 1] or cost[order[first[n - 1]]] == _NEVER:
+        return np.empty(0, np.int64)
+    line, chain = order[first[n - 1]], [n - 1]
+    while line >= 0:
+        chain.append(starts[line])
+        line = before[line]
+    return np.array(chain[::-1])

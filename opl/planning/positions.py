@@ -1,0 +1,156 @@
+"""Which configurations of a motion are written: as few as keep the contact, the rest lies between.
+
+A search needs nodes close together; a controller does better with few positions and long moves. On
+each pass the fewest are taken whose joint lines keep the contact error at every place between, and
+touch nothing. Places that are not written stay in the motion, moved onto the lines: what is proven
+is what the written positions make of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opl.cell.workcell import WorkCell
+from opl.errors import UnsafeError
+from opl.geometry.frames import Array
+from opl.geometry.toolpath import CutterPoints
+from opl.geometry.wheel import MM_PER_M, ContactWheel
+from opl.motion.collision_check import colliding_moves
+from opl.motion.fewest import ChainRule, fewest
+from opl.motion.gradual import PLANNED_RATIO
+from opl.motion.line_error import LEVER, ROLLS, SLIDES, Run, line_errors, screws_of
+from opl.motion.motion import Motion
+from opl.motion.process_settings import ProcessSettings
+from opl.motion.timing import on_wheel, time_motion
+from opl.planning.scene import PlanningScene
+
+# Part of the allowed contact error that is used: between the places that are looked at, and in the
+# proof, which looks at others, a little more is found.
+USED = 0.95
+# Speeds of neighbouring lines may differ by two steps of `opl.motion.gradual`, and the faster one
+# is slowed then: a position for every step would cost more than the time it saves.
+STEPS_AT_ONCE = PLANNED_RATIO**2
+
+
+@dataclass(frozen=True)
+class PositionRule:
+    """What the written positions have to keep.
+
+    Attributes:
+        max_contact_error: Largest distance of a ground point from the wheel's surface in [m].
+        max_chord_error: What of it is spent on the surface between two cutter points, in the middle
+            of which it is largest, in [m].
+        shortest: Least time of a move on the wheel that the controller follows, in [s].
+    """
+
+    max_contact_error: float
+    max_chord_error: float
+    shortest: float
+
+    def allowed(self, place: Array) -> Array:
+        """Return how far off a line may be at fractional cutter points in [m], shape (n,)."""
+        fraction = place % 1.0
+        on_chord = self.max_chord_error * 4.0 * fraction * (1.0 - fraction)
+        return np.asarray(USED * (self.max_contact_error - on_chord))
+
+
+def with_fewest_positions(
+    scene: PlanningScene,
+    points: CutterPoints,
+    motion: Motion,
+    process: ProcessSettings,
+    rule: PositionRule,
+) -> Motion:
+    """Return a motion with the fewest written positions on the wheel, the others on their lines.
+
+    Args:
+        scene: The cell.
+        points: The cutter points.
+        motion: The motion, its configurations in the digits of the program.
+        process: How fast it is ground.
+        rule: What the positions have to keep.
+
+    Raises:
+        UnsafeError: If there are none on some pass: only where the motion itself breaks the rule.
+    """
+    screws = screws_of(scene.cell.robot)
+    blocked: dict[int, frozenset[tuple[int, int]]] = {}
+    chosen: dict[int, NDArray[np.intp]] = {}
+    runs = dict(on_wheel_runs(scene.cell, points, motion, process, rule))
+    stale = list(runs)
+    while stale:
+        for first in stale:
+            run, chain = runs[first], ChainRule(rule.shortest, STEPS_AT_ONCE)
+            found = fewest(screws, run, chain, blocked.get(first, frozenset()))
+            if found is None:
+                index = motion.pass_index[first] + 1
+                raise UnsafeError(f"pass {index}: no positions keep the contact error")
+            chosen[first] = first + found
+        written = np.array(motion.written)
+        for first, run in runs.items():
+            written[first : first + len(run.q)] = False
+            written[chosen[first]] = True
+        thinned = replace(motion, written=written)
+        stale = []
+        for first, last in _colliding_lines(scene, thinned):
+            of = max(start for start in runs if start <= first)
+            line = first - of, last - of
+            if last - first > 1 and line not in blocked.get(of, frozenset()):
+                blocked[of] = blocked.get(of, frozenset()) | {line}
+                stale.append(of)
+    q = motion.q.copy()
+    for first, run in runs.items():
+        for start, end in zip(chosen[first][:-1], chosen[first][1:], strict=True):
+            shares, _ = line_errors(screws, run, start - first, end - first)
+            q[start + 1 : end] = q[start] + shares[:, None] * (q[end] - q[start])
+    return replace(thinned, q=q)
+
+
+def on_wheel_runs(
+    cell: WorkCell,
+    points: CutterPoints,
+    motion: Motion,
+    process: ProcessSettings,
+    rule: PositionRule,
+) -> Iterator[tuple[int, Run]]:
+    """Yield what is on the wheel of each pass, with the index of its first configuration."""
+    timed = time_motion(motion, points, process, cell.robot).timed
+    distance, least = on_wheel(motion, points, process)
+    pace = np.cumsum([timed.duration, least, distance / process.feed], axis=1).T
+    for index in range(points.n_passes):
+        rows = np.flatnonzero(motion.on_wheel & (motion.pass_index == index))
+        place, t = motion.cutter_point[rows], motion.contact_position[rows]
+        run = Run(
+            motion.q[rows],
+            cell.T_flange_workpiece @ points.frames_at(place),
+            cell.wheel.T_base_contact(t),
+            *_freedom(cell.wheel, t),
+            rule.allowed(place),
+            pace[rows] - pace[rows[0]],
+        )
+        yield int(rows[0]), run
+
+
+def _freedom(wheel: ContactWheel, t: Array) -> tuple[NDArray[np.int64], Array]:
+    """Return what the contact may do at contact positions, and how far either way."""
+    flat, last = wheel.flat_end, wheel.last_position
+    rolls = np.abs(t) > flat
+    sliding = np.stack([t - flat, t + flat], axis=1) / MM_PER_M
+    first, beyond = np.where(t > 0.0, flat, -last), np.where(t > 0.0, last, -flat)
+    rolling = np.deg2rad(np.stack([first - t, beyond - t], axis=1)) * LEVER
+    return np.where(rolls, ROLLS, SLIDES), np.where(rolls[:, None], rolling, sliding)
+
+
+def _colliding_lines(scene: PlanningScene, motion: Motion) -> Sequence[tuple[int, int]]:
+    """Return the lines on the wheel that hit something, by the indices of their ends."""
+    written = motion.take(motion.positions)
+    faults = colliding_moves(scene.cell, scene.collision, scene.part, written)
+    return [
+        (int(motion.positions[fault.move - 1]), int(motion.positions[fault.move]))
+        for fault in faults
+        if written.grinding[fault.move]
+    ]

@@ -1,0 +1,167 @@
+"""Where on its way from one written configuration to the next a part may be ground.
+
+A cutter point need not be ground where a position is written: mostly a move passes it. Moves near
+the wheel are cut into samples, and between two of them a configuration is put in wherever a cutter
+point comes nearest to the contact model. What is found there is measured there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opl.geometry.frames import Array, transform
+from opl.geometry.mesh import box_corners
+from opl.geometry.toolpath import CutterPoints
+from opl.geometry.wheel import ContactWheel
+from opl.verification.contact import LEVER, contact_positions
+from opl.verification.world import World
+
+STEP = 1e-3  # [m] that no corner of the part's box moves farther from one sample to the next
+TURN = np.deg2rad(0.5)  # that no joint turns farther
+APART = 0.01  # of a sample: what is nearer to its ends is taken for them
+NEAR = 2.0  # times what is allowed: what a configuration that is put in is hoped to be off at most
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Configurations of moves, those that were given among them.
+
+    Attributes:
+        q: Joint positions in [rad], shape (n, 6).
+        duration: Time of the move that ends at each in [s], shape (n,).
+        Ts_contact0_workpiece: Where the part is at each, shape (n, 4, 4).
+        source: The given configuration that the move ends at, as an index, shape (n,).
+        given: Indices of those that were given, in order.
+        near: Indices of those at which something may be ground, in order.
+    """
+
+    q: Array
+    duration: Array
+    Ts_contact0_workpiece: Array
+    source: NDArray[np.intp]
+    given: NDArray[np.intp]
+    near: NDArray[np.intp]
+
+
+def sample(
+    world: World,
+    wheel: ContactWheel,
+    points: CutterPoints,
+    part_vertices: Array,
+    q: Array,
+    duration: Array,
+    allowed: float,
+) -> Samples:
+    """Sample moves where they may grind.
+
+    Args:
+        world: Knows where the part is.
+        wheel: The wheel.
+        points: The cutter points that may be ground.
+        part_vertices: Of the held part in [m], shape (k, 3).
+        q: Joint positions in [rad], joined by linear joint interpolation, shape (n, 6).
+        duration: Time of the move that ends at each configuration in [s], shape (n,).
+        allowed: Farthest that a ground point may be from the contact model in [m].
+    """
+    Ts = _places(world, wheel, q)
+    corners = box_corners(part_vertices)
+    at_corners = transform(Ts[:, None], corners)
+    moved = np.linalg.norm(np.diff(at_corners, axis=0), axis=-1).max(axis=1, initial=0.0)
+    p_contact0 = points.Ts_workpiece_cutter[:, :3, 3]
+    away = np.array([np.abs(wheel.signed_distance(transform(T, p_contact0))).min() for T in Ts])
+    reach = 1.5 * moved + STEP  # what turns on its way is somewhat longer on it
+    close = (away[:-1] <= reach) | (away[1:] <= reach)
+    turned = np.abs(np.diff(q, axis=0)).max(axis=1)
+    counts = np.where(close, np.maximum(np.ceil(np.maximum(moved / STEP, turned / TURN)), 1), 1)
+    move = np.repeat(np.arange(1, len(q)), counts.astype(int))
+    step = np.arange(len(move)) - np.searchsorted(move, move) + 1
+    at = np.concatenate([[0.0], move - 1 + step / counts[move - 1]])  # whole where given
+    at, Ts = _with(world, wheel, q, np.arange(len(q)).astype(float), Ts, at)
+    put_in = _passed(wheel, points, Ts, at, np.flatnonzero(close), allowed)
+    at, Ts = _with(world, wheel, q, at, Ts, np.union1d(at, put_in))
+    source = np.ceil(at).astype(np.intp)
+    share = np.diff(at, prepend=0.0)
+    ends = np.concatenate([[False], close])
+    near = ends[source] | (at == source) & np.concatenate([close, [False]])[source]
+    return Samples(
+        _on_lines(q, at),
+        share * duration[source],
+        Ts,
+        source,
+        np.flatnonzero(at == source),
+        np.flatnonzero(near),
+    )
+
+
+def _places(world: World, wheel: ContactWheel, q: Array) -> Array:
+    Ts_base_workpiece = np.array([world.move_to(one) for one in q]).reshape(-1, 4, 4)
+    return np.linalg.solve(wheel.T_base_contact0, Ts_base_workpiece)
+
+
+def _on_lines(q: Array, at: Array) -> Array:
+    """Return the configurations at fractional indices; at whole ones they are those given."""
+    before = np.minimum(at.astype(int), len(q) - 1)
+    after = np.minimum(before + 1, len(q) - 1)
+    return np.asarray(q[before] + (at - before)[:, None] * (q[after] - q[before]))
+
+
+def _with(
+    world: World, wheel: ContactWheel, q: Array, known: Array, Ts: Array, at: Array
+) -> tuple[Array, Array]:
+    """Return fractional indices and where the part is there; for the known ones that is known."""
+    found = np.empty((len(at), 4, 4))
+    old = np.isin(at, known)
+    found[old] = Ts[np.searchsorted(known, at[old])]
+    found[~old] = _places(world, wheel, _on_lines(q, at[~old]))
+    return at, found
+
+
+def _passed(
+    wheel: ContactWheel,
+    points: CutterPoints,
+    Ts_contact0_workpiece: Array,
+    at: Array,
+    close: NDArray[np.intp],
+    allowed: float,
+) -> Array:
+    """Return where between two samples cutter points come nearest to the contact model.
+
+    Not where one keeps to it from sample to sample: a flat part of a surface on the flat.
+    """
+    found = [np.empty(0)]
+    p_workpiece = points.Ts_workpiece_cutter[:, :3, 3]
+    for k in np.flatnonzero(np.isin(np.ceil(at[1:]).astype(int) - 1, close)):
+        start, end = Ts_contact0_workpiece[k : k + 2]
+        off = np.abs(wheel.signed_distance(transform(start, p_workpiece)))
+        around = np.flatnonzero(off <= STEP + NEAR * allowed)
+        Ts = points.Ts_workpiece_cutter[around]
+        middle = (start @ Ts + end @ Ts) / 2.0
+        t = contact_positions(wheel, middle)
+        Ts_contact0_contact = wheel.T_contact0_contact(t)
+        free = np.where(np.abs(t) > wheel.flat_end, 4, 0)
+        first, last = (_off(Ts_contact0_contact, T @ Ts) for T in (start, end))
+        for one in (first, last):
+            one[np.arange(len(around)), free] = 0.0
+        way = last - first
+        length = np.square(way).sum(axis=1)
+        share = -(first * way).sum(axis=1) / np.where(length > 0.0, length, 1.0)
+        nearest = np.linalg.norm(first + share[:, None] * way, axis=1)
+        kept = np.maximum(np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1)) <= allowed
+        good = (share > APART) & (share < 1.0 - APART) & (nearest <= NEAR * allowed) & ~kept
+        found.append(at[k] + share[good] * (at[k + 1] - at[k]))
+    return np.concatenate(found)
+
+
+def _off(Ts_contact0_contact: Array, Ts_contact0_cutter: Array) -> Array:
+    """Return how far frames are from contact frames, seen from those: [m], shape (n, 6).
+
+    Angles count along `LEVER`.
+    """
+    R = Ts_contact0_contact[:, :3, :3]
+    apart = Ts_contact0_cutter[:, :3, 3] - Ts_contact0_contact[:, :3, 3]
+    turn = 0.5 * np.cross(R, Ts_contact0_cutter[:, :3, :3], axis=1).sum(axis=2)
+    both = np.stack([apart, LEVER * turn], axis=1)
+    return np.asarray(np.einsum("nji,nkj->nki", R, both).reshape(-1, 6))
