@@ -14,7 +14,7 @@ import traceback
 import FreeCAD
 import FreeCADGui
 import Part
-from PySide import QtCore
+from PySide import QtCore, QtGui
 
 given = json.loads(os.environ["OPL_WALK"])
 told = {}
@@ -108,6 +108,14 @@ def walk():
     told["again"] = [job.Status, desk.said.text()]
     look("viewIsometric")
     picture("reopened")
+    column = desk.form
+    while not isinstance(column, QtGui.QScrollArea):
+        column = column.parentWidget()
+    told["width"] = [desk.form.width(), column.viewport().width()]
+    for tab in range(4):
+        desk.tabs.setCurrentIndex(tab)
+        picture(f"tab_{tab}")
+    desk.tabs.setCurrentIndex(0)
 
     # a post where the part has to be when it is ground: the reason, and where it is
     post = again.addObject("Part::Box", "Post")
@@ -122,6 +130,9 @@ def walk():
     told["refused"] = [job.Status, job.Message, panel.marked(job)]
     look("viewIsometric")
     picture("reason")
+    post.ViewObject.Visibility = False
+    look("viewIsometric")
+    picture("marks")
 
     desk.run.click()
     waited(lambda: desk.running)

@@ -35,6 +35,7 @@ OF_CELL_FILE = (
     "MaxBeltPenetration",
 )  # fmt: skip
 LARGEST = 1e6
+NARROW = 50  # [px] a field may be, where FreeCAD's column of tasks is narrow
 
 
 def field(job: Any, name: str) -> Any:
@@ -44,12 +45,14 @@ def field(job: Any, name: str) -> Any:
         return _placement(job, name)
     if kind == "App::PropertyEnumeration":
         box = QtGui.QComboBox()
+        box.setMinimumWidth(NARROW)
         box.addItems(job.getEnumerationsOfProperty(name))
         box.setCurrentText(getattr(job, name))
         box.currentTextChanged.connect(lambda text: setattr(job, name, text))
         return box
     if kind == "App::PropertyInteger":
         box = QtGui.QSpinBox()
+        box.setMinimumWidth(NARROW)
         box.setMaximum(100_000)
         box.setValue(getattr(job, name))
         box.valueChanged.connect(lambda value: setattr(job, name, value))
@@ -64,6 +67,7 @@ def field(job: Any, name: str) -> Any:
 
 def _number(value: float, changed: Any) -> Any:
     box = QtGui.QDoubleSpinBox()
+    box.setMinimumWidth(NARROW)
     box.setRange(-LARGEST, LARGEST)
     box.setDecimals(4)
     box.setButtonSymbols(QtGui.QAbstractSpinBox.NoButtons)

@@ -18,7 +18,13 @@ import FreeCAD
 from .job_object import placement
 from .keeping import kept_text
 
-_PLACE = re.compile(r"cutter points? (\d+)(?:\.\d+)?(?: to (\d+))?")
+# "cutter point 3", "points 5 to 18", "points 0-12, 40 (14 of 99)", "points (3-7, 12)"; the one
+# beyond which there is no path was reached
+_PLACES = re.compile(
+    r"(?<!beyond )cutter points? \(?(\d+(?:\.\d+)?(?:(?: to |-)\d+)?"
+    r"(?:, \d+(?:-\d+)?(?=[,)]| \())*)"
+)
+_RUN = re.compile(r"(\d+)(?:\.\d+)?(?:(?: to |-)(\d+))?")
 
 
 @dataclass(frozen=True)
@@ -43,12 +49,9 @@ def cutter_points(job: Any) -> list[CutterPoint]:
 
 
 def marked(job: Any) -> list[int]:
-    """Return the cutter points, from 0, at which a job failed; none if its reason names none."""
-    found = _PLACE.search(job.Message)
-    if found is None:
-        return []
-    first = int(found[1])
-    return list(range(first, int(found[2] or first) + 1))
+    """Return the cutter points, from 0, that the reason of a failed job names."""
+    runs = [run for found in _PLACES.finditer(job.Message) for run in _RUN.finditer(found[1])]
+    return sorted({k for run in runs for k in range(int(run[1]), int(run[2] or run[1]) + 1)})
 
 
 class Motion:

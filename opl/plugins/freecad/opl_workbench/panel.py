@@ -13,11 +13,11 @@ import FreeCADGui
 from PySide import QtCore, QtGui
 
 from . import running
-from .cell_files import read_cell
+from .cell_files import take_cell
 from .client import RemoteJob, ServiceError
 from .fields import OF_CELL_FILE, TABS, field
 from .found import marked, motion_of
-from .keeping import keep, kept
+from .keeping import kept
 from .motion_object import motion_view_of, show_moment
 from .picked import picked_faces, picked_solids
 from .views import CellView
@@ -36,10 +36,11 @@ class Panel:
         self.form = QtGui.QWidget()
         self.form.setWindowTitle(f"Belt grinding: {job.Label}")
         self.column = QtGui.QVBoxLayout(self.form)
+        self.column.setContentsMargins(0, 0, 0, 0)
         self.fields: dict[str, Any] = {}
         self._add_picking()
+        self._add_running()  # above the fields: what is said is seen without scrolling
         self._add_tabs()
-        self._add_running()
         self.timer = QtCore.QTimer(self.form)
         self.timer.timeout.connect(self.look)
         self.refresh()
@@ -47,56 +48,58 @@ class Panel:
     # what is on it
 
     def _add_picking(self) -> None:
-        self.faces = QtGui.QLabel()
-        self.gripper = QtGui.QLabel()
-        self.cell = QtGui.QLabel()
-        grid = QtGui.QGridLayout()
+        self.faces, self.gripper, self.cell = wrapped(), wrapped(), wrapped()
         rows = (
             ("Take picked faces", self.take_faces, self.faces),
             ("Take picked gripper", self.take_gripper, self.gripper),
             ("Cell file...", self.ask_cell, self.cell),
         )
-        for k, (text, action, label) in enumerate(rows):
-            grid.addWidget(self._button(text, action), k, 0)
-            grid.addWidget(label, k, 1)
-        self.column.addLayout(grid)
+        for text, action, label in rows:
+            self.column.addWidget(self._button(text, action))
+            self.column.addWidget(label)
 
     def _add_tabs(self) -> None:
-        tabs = QtGui.QTabWidget()
+        self.tabs = QtGui.QTabWidget()
         for title, names in TABS:
             page = QtGui.QWidget()
             form = QtGui.QFormLayout(page)
+            form.setContentsMargins(4, 4, 4, 4)
+            form.setRowWrapPolicy(QtGui.QFormLayout.WrapLongRows)
             for name, label in names:
                 self.fields[name] = field(self.job, name)
-                form.addRow(label, self.fields[name])
-            tabs.addTab(page, title)
-        self.column.addWidget(tabs)
+                if isinstance(self.fields[name], (QtGui.QAbstractSpinBox, QtGui.QComboBox)):
+                    form.addRow(label, self.fields[name])
+                else:  # longer than what is left beside its label
+                    form.addRow(QtGui.QLabel(label))
+                    form.addRow(self.fields[name])
+            self.tabs.addTab(page, title)
+        self.column.addWidget(self.tabs)
 
     def _add_running(self) -> None:
-        row = QtGui.QHBoxLayout()
         self.points = self._button("Cutter points", lambda: self.start("points"))
         self.run = self._button("Run", lambda: self.start("run"))
         self.stop = self._button("Cancel", self.cancel)
-        for button in (self.points, self.run, self.stop):
-            row.addWidget(button)
-        self.column.addLayout(row)
+        self._add_buttons(self.points, self.run, self.stop)
         self.progress = QtGui.QProgressBar()
-        self.said = QtGui.QLabel()
-        self.said.setWordWrap(True)
+        self.said = wrapped()
         self.said.setTextInteractionFlags(QtCore.Qt.TextSelectableByMouse)
         self.moment = QtGui.QSlider(QtCore.Qt.Horizontal)
         self.moment.setMaximum(STEPS)
         self.moment.valueChanged.connect(self.moved)
-        self.where = QtGui.QLabel()
+        self.where = wrapped()
         for widget in (self.progress, self.said, self.moment, self.where):
             self.column.addWidget(widget)
-        row = QtGui.QHBoxLayout()
         self.save = self._button("Save programs...", self.ask_folder)
         self.page = self._button("Report", self.open_page)
         self.part = self._button("Show part", lambda: self.show_motion(False))
-        for button in (self.part, self.page, self.save):
-            row.addWidget(button)
-        self.column.addLayout(row)
+        self._add_buttons(self.part, self.page, self.save)
+
+    def _add_buttons(self, *buttons: Any) -> None:
+        """Add buttons, two in a row: the column of tasks is narrow."""
+        grid = QtGui.QGridLayout()
+        for k, button in enumerate(buttons):
+            grid.addWidget(button, k // 2, k % 2)
+        self.column.addLayout(grid)
 
     def _button(self, text: str, action: Any) -> Any:
         button = QtGui.QPushButton(text)
@@ -132,8 +135,7 @@ class Panel:
 
     def take_cell(self, path: str) -> None:
         """Take a cell file, with what it names, into the document."""
-        keep(self.job, "CellKept", read_cell(path) if path else {})
-        self.job.CellFile = path
+        take_cell(self.job, path)
         self.refresh()
 
     def refresh(self) -> None:
@@ -266,6 +268,14 @@ class Panel:
         FreeCADGui.Control.closeDialog()
         FreeCAD.ActiveDocument.recompute()
         return True
+
+
+def wrapped() -> Any:
+    """Return a label that makes the panel longer, not wider."""
+    label = QtGui.QLabel()
+    label.setWordWrap(True)
+    label.setSizePolicy(QtGui.QSizePolicy.Ignored, QtGui.QSizePolicy.Preferred)
+    return label
 
 
 def verdict(job: Any) -> str:

@@ -19,7 +19,7 @@ ROBOT = ((0.90, 0.63, 0.24), (0.82, 0.84, 0.86))  # neighbours differ
 COLOURS = {"wheel": (0.42, 0.36, 0.29), "part": (0.62, 0.71, 0.77)}
 HELD, STANDING = (0.36, 0.40, 0.44), (0.56, 0.63, 0.68)
 LIFT = 0.3  # [mm] of lines above the surface
-MARK_RADIUS, AXES = 1.5, 60.0  # [mm]
+MARK_RADIUS, AXES = 2.0, 60.0  # [mm]
 
 
 class _View:
