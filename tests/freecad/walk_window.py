@@ -134,6 +134,7 @@ def walk():
     look("viewIsometric")
     picture("marks")
 
+    desk.fields["Feed"].setValue(26.0)  # the same job would be answered at once
     desk.run.click()
     waited(lambda: desk.running)
     desk.stop.click()
