@@ -71,7 +71,7 @@ HOMES = {
 
 # rooms that run inside of other programs, with Python's own library and what the host has
 GUESTS = {"plugins"}
-HOSTS = {"FreeCAD", "FreeCADGui", "Part", "PySide2", "pivy"}
+HOSTS = {"FreeCAD", "FreeCADGui", "Part", "PySide", "pivy"}
 
 LONGEST = 300  # lines
 

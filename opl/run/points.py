@@ -9,8 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from opl.cell.drawn_cell import drawn_chain, drawn_solids
 from opl.geometry.frames import roll_pitch_yaw
 from opl.geometry.passes import LaidPasses
+from opl.report.cell_json import cell_json
 from opl.report.part_view import part_view
 from opl.run.other_pages import points_page
 from opl.run.values import Surfaced
@@ -85,6 +87,14 @@ def points_files(surfaced: Surfaced) -> dict[str, str]:
         f"{job.name}_points.svg": picture,
         f"{job.name}_points.html": points_page(surfaced, figures),
     }
+
+
+def cell_file(surfaced: Surfaced) -> dict[str, str]:
+    """Return the cell of a job as JSON, for programs of others that draw it, by file name."""
+    job = surfaced.job
+    cell = job.cell
+    text = cell_json(cell, drawn_chain(cell.robot), drawn_solids(cell), job.process.home)
+    return {f"{job.name}_cell.json": text}
 
 
 def points_table(laid: LaidPasses) -> str:

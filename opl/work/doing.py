@@ -21,7 +21,7 @@ from opl.job.load import Job, load_job
 from opl.run.delivery import deliver
 from opl.run.descriptions import describe_job, face_figures
 from opl.run.job_folder import claim_folder
-from opl.run.points import points_files, report_points
+from opl.run.points import cell_file, points_files, report_points
 from opl.run.programs import prove_program
 from opl.run.result import RESULT, to_json
 from opl.run.stages import run_job
@@ -133,7 +133,8 @@ def _check(task: Task, watch: Watch) -> Outcome:
 
 def _points(task: Task, watch: Watch) -> Outcome:
     surfaced = cut_surface(_job(task), watch)
-    return _delivered(task, vars(report_points(surfaced)), points_files(surfaced))
+    files = {**points_files(surfaced), **cell_file(surfaced)}
+    return _delivered(task, vars(report_points(surfaced)), files)
 
 
 def _verify(task: Task, watch: Watch) -> Outcome:

@@ -10,7 +10,7 @@ import traceback
 
 import FreeCAD
 import Part
-from opl_workbench import job_object, running
+from opl_workbench import cell_files, job_object, job_text, motion_object, running
 from opl_workbench.client import Client
 
 given = json.loads(os.environ["OPL_WALK"])
@@ -54,10 +54,30 @@ def walk():
 
     again = FreeCAD.openDocument(given["document"])
     (job,) = job_object.jobs_of(again)
-    told["reopened"] = [job.Status, job.Figures, sorted(running.kept(job, "RunKept"))]
+    job.touch()
+    again.recompute()
+    sent = {f"job/{name}": content for name, content in job_text.job_files(job).items()}
+    kept = running.kept(job, "RunKept")
+    told["other"] = [name for name, content in sent.items() if kept[name] != content]
+    told["reopened"] = [job.Status, job.Figures, sorted(kept)]
+    motion = motion_object.motion_view_of(job)
+    motion.recompute()
+    told["moments"] = []
+    for part in (0.0, 0.3, 0.5, 1.0):
+        motion_object.show_moment(motion, part * motion.Seconds)
+        a = motion.Part.toMatrix().A
+        pose = [a[4 * k : 4 * k + 4] for k in range(4)]
+        told["moments"].append([motion.Moment, list(motion.Posture), pose, motion.Where])
     job.Pitch = 4.0
     again.recompute()
     told["changed"] = job.Status
+
+    # the same part in the cell of a file; what the file names lies in the document
+    cell_files.take_cell(job, given["cell"])
+    job.Home, job.Robot = [], "no robot"
+    running.show_points(job, client)
+    solids = [found["name"] for found in motion_object.cell_of(job).solids]
+    told["of_cell_file"] = [job.Status, job.Message, solids, sorted(running.kept(job, "CellKept"))]
 
 
 def stem(document, job):

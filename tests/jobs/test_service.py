@@ -110,7 +110,8 @@ def test_check_points_verify_and_faces(service, files, done):
     assert checked.result["robot"] == "mh24" and checked.result["cutter_points"] > 5
     points = service.submit("points", files, wait_s=60)
     assert [file.name for file in points.files] == [
-        "SERVED_points.csv", "SERVED_points.svg", "SERVED_points.html", "figures.json",
+        "SERVED_points.csv", "SERVED_points.svg", "SERVED_points.html", "SERVED_cell.json",
+        "figures.json",
     ]  # fmt: skip
     program = service.fetch(done[-1], "SERVED.JBI")
     with_program = {**files, "SERVED.JBI": program}

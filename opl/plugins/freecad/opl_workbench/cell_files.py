@@ -4,9 +4,22 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
+
+from .keeping import keep
 
 MOST_BYTES = 50_000_000
 CELL = "cell/"  # folder of the cell among the files of a job
+
+
+def take_cell(job: Any, path: str) -> None:
+    """Take a cell file, with what it names, into the document of a job; no path: give it up.
+
+    Raises:
+        ValueError: If the file cannot be read.
+    """
+    keep(job, "CellKept", read_cell(path) if path else {})
+    job.CellFile = path
 
 
 def read_cell(path: str) -> dict[str, bytes]:

@@ -133,6 +133,25 @@ def is_job(obj: Any) -> bool:
 
 
 def placement(rows: Any) -> Any:
-    """Return the placement of a matrix of three or four rows in mm."""
-    matrix = FreeCAD.Matrix(*[float(value) for row in list(rows)[:3] for value in row])
-    return FreeCAD.Placement(matrix)
+    """Return the placement of a matrix of three or four rows in mm.
+
+    Its rotation is the nearest to the matrix, as in opl: a document stores axis and angle, and
+    FreeCAD reads another rotation back if the matrix it was made of was only almost a rotation.
+
+    Raises:
+        ValueError: If the matrix is far from a rotation.
+    """
+    rows = [[float(value) for value in row] for row in list(rows)[:3]]
+    a, b, c = (FreeCAD.Vector(*row[:3]) for row in rows)
+    for _ in range(8):  # Newton's iteration: the mean of a matrix and its inverse transposed
+        volume = a.dot(b.cross(c))
+        if volume < 0.5:
+            raise ValueError("the matrix of a placement is no rotation")
+        part = 0.5 / volume
+        a, b, c = (
+            a * 0.5 + b.cross(c) * part,
+            b * 0.5 + c.cross(a) * part,
+            c * 0.5 + a.cross(b) * part,
+        )
+    turn = FreeCAD.Rotation(FreeCAD.Matrix(*a, 0.0, *b, 0.0, *c, 0.0))
+    return FreeCAD.Placement(FreeCAD.Vector(*(row[3] for row in rows)), turn)

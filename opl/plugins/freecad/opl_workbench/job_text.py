@@ -9,7 +9,7 @@ from typing import Any
 
 from .cell_files import CELL
 from .keeping import kept
-from .shapes import placed_shape, step_file, stl_file
+from .shapes import placed_shape, shape_figures, step_file, stl_file
 
 JOB, SURFACE, MESH = "job.yaml", "part.step", "part.stl"
 
@@ -49,7 +49,7 @@ def job_files(obj: Any) -> dict[str, bytes]:
 def asked_digest(obj: Any) -> str:
     """Return a digest of all that a job asks for; of what it links to, its shapes."""
     linked = [obj.Faces[0] if obj.Faces else None, *obj.Gripper, *obj.Obstacles]
-    shapes = [placed_shape(one).exportBrepToString() for one in linked if hasattr(one, "Shape")]
+    shapes = [shape_figures(placed_shape(one)) for one in linked if hasattr(one, "Shape")]
     names = list(obj.Faces[1]) if obj.Faces else []
     cell = {name: hashlib.sha256(data).hexdigest() for name, data in kept(obj, "CellKept").items()}
     further = dict(obj.FurtherKeys)

@@ -16,6 +16,7 @@ import Part
 
 DEVIATION = 0.02  # [mm] of triangles from the shape
 _DATE = re.compile(rb"'\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d'")
+_COUNT = re.compile(rb"(?<=Open CASCADE STEP translator )(\d+\.\d+) \d+")  # of files written
 _ALIKE = 1e-6  # part by which area and place of a face may change in a file
 
 
@@ -33,6 +34,17 @@ def placed_shape(obj: Any) -> Any:
     return placed
 
 
+def shape_figures(shape: Any) -> list[str]:
+    """Return figures that tell whether a shape was changed; those of a saved one are the same."""
+    return [
+        # what rounding makes of a zero is a zero
+        " ".join(
+            f"{round(value, 8) + 0.0:.9g}" for value in (face.Area, *face.CenterOfMass, face.Length)
+        )
+        for face in shape.Faces
+    ]
+
+
 def step_file(shape: Any, names: Sequence[str]) -> tuple[bytes, list[int]]:
     """Return a shape as STEP file, and the numbers there of faces, counted from 1.
 
@@ -48,7 +60,7 @@ def step_file(shape: Any, names: Sequence[str]) -> tuple[bytes, list[int]]:
         shape.exportStep(path)
         with open(path, "rb") as file:
             # the same part is the same file, whenever it is written
-            content = _DATE.sub(b"'1970-01-01T00:00:00'", file.read())
+            content = _COUNT.sub(rb"\1", _DATE.sub(b"'1970-01-01T00:00:00'", file.read()))
         written = Part.read(path).Faces
     numbers = []
     for name in names:
@@ -69,12 +81,14 @@ def stl_file(shape: Any) -> bytes:
     Raises:
         ValueError: If it cannot be divided into triangles.
     """
-    points, triangles = shape.copy(True, False).tessellate(DEVIATION)
+    saved = Part.Shape()  # as it is when the document is opened again: the same triangles
+    saved.importBrepFromString(shape.exportBrepToString())
+    points, triangles = saved.tessellate(DEVIATION)
     if not triangles:
         raise ValueError("the shape has no surface to be divided into triangles")
     rows = [b"opl".ljust(80), struct.pack("<I", len(triangles))]
     for corners in triangles:
-        numbers = [value for corner in corners for value in points[corner]]
+        numbers = [round(x, 6) + 0.0 for corner in corners for x in points[corner]]
         rows.append(struct.pack("<12fH", 0.0, 0.0, 0.0, *numbers, 0))
     return b"".join(rows)
 
