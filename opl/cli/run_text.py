@@ -184,8 +184,8 @@ def _belt(settings: Any) -> Iterator[str]:
         yield f"the belt is switched by {settings.belt_switched_by}, says the job"
     elif not settings.actions.switches:
         yield (
-            "caution: nothing in the program switches the belt; name outputs in program.at_start "
-            "and at_end, or who does it in program.belt_switched_by"
+            "caution: nothing in the program switches the belt; name outputs in "
+            f"{opl.keys.PROGRAM_AT_START} and at_end, or who does it in {opl.keys.PROGRAM_BELT}"
         )
 
 

@@ -8,6 +8,14 @@ CLEARANCE = "clearance_mm"
 # a YAML file that has one of these keys is a job
 OF_A_JOB = frozenset({"workpiece", "wheel", "passes"})
 
+# changes that make a coarse row of the part that comes with opl: enough that all which computes is
+# loaded by it
+COARSE_EXAMPLE = {
+    "passes.rows": 1, "passes.max_chord_error_mm": 0.3, "passes.max_step_mm": 40,
+    "search.contact_positions": 15, "search.max_contact_error_mm": 0.5,
+    "wheel.max_belt_penetration_mm": 1.0,
+}  # fmt: skip
+
 # what holds a list; a list at any other key is a sweep
 LISTS = frozenset(
     {
@@ -60,6 +68,8 @@ OF_PROGRAM = {
     "accepted_pulses": "program.accept_unverified_pulses",
     "pulses_per_radian": "program.pulse_ratios",
 }
+PROGRAM_AT_START = "program.at_start"
+PROGRAM_BELT = "program.belt_switched_by"
 PROGRAM_CONTROLLER = "program.controller"
 PROGRAM_MOTION = "program.motion"
 PROGRAM_TOOL_POSE = "program.T_flange_tool_mm"

@@ -13,9 +13,9 @@ from opl.job import keys
 from opl.job.load import Job
 from opl.motion.motion import TimedMotion
 from opl.program.posts import Reader, find_post, readers
+from opl.proof.common_shift import common_shift
 from opl.proof.events import name_findings
 from opl.proof.written import written_findings
-from opl.verification.common_shift import common_shift
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import Verification, replay
 

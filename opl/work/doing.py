@@ -17,6 +17,7 @@ from opl.files.claiming import write_files
 from opl.files.confining import confine_to
 from opl.files.resources import folder
 from opl.geometry.faces import list_faces
+from opl.job import keys
 from opl.job.load import Job, load_job
 from opl.run.delivery import deliver
 from opl.run.descriptions import describe_job, face_figures
@@ -36,13 +37,6 @@ SELDOM = 0.05  # [s] between two words about progress
 CREASE = math.radians(30.0)  # between triangles of a mesh that ends a face, as of `opl faces`
 FIGURES = "figures.json"  # of a task that is no run
 
-# a coarse row of the part that comes with opl: all that computes is loaded by it
-_EXAMPLE = {
-    "passes.rows": 1, "passes.max_chord_error_mm": 0.3, "passes.max_step_mm": 40,
-    "search.contact_positions": 15, "search.max_contact_error_mm": 0.5,
-    "wheel.max_belt_penetration_mm": 1.0,
-}  # fmt: skip
-
 
 def prepare(memory: int | None, warm: bool) -> None:
     """Make this process ready for tasks.
@@ -55,7 +49,9 @@ def prepare(memory: int | None, warm: bool) -> None:
     if memory is not None:
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     if warm:
-        run_job(load_job(folder("workpieces") / "v_shape" / "job.yaml", changes=_EXAMPLE))
+        run_job(
+            load_job(folder("workpieces") / "v_shape" / "job.yaml", changes=keys.COARSE_EXAMPLE)
+        )
 
 
 def do(task: Task, tell: Tell) -> Outcome | None:

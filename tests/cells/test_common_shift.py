@@ -8,7 +8,7 @@ import pytest
 
 from opl.geometry.frames import pose
 from opl.motion.motion import MoveKind
-from opl.verification.common_shift import common_shift, fit_shift
+from opl.proof.common_shift import common_shift, fit_shift
 from opl.verification.kinematic_checks import missing_points
 from opl.verification.recognise import recognise
 from tests.cells.test_recognise import RULE

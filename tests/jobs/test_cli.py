@@ -163,7 +163,10 @@ def test_figures_of_the_path_follow_from_the_table(result, table):
     rows, q, passes = on_wheel(table)
     path = result["path"]
     rounding = np.deg2rad(2.5e-3)  # the table tells whole pulses, as the program does
-    assert np.ptp(q, axis=0) == pytest.approx(path["joint_ranges_rad"], abs=rounding)
+    # the lines between the positions that are written cut corners of the path, within the contact
+    # error, so they may turn joints a little less, never more
+    less = np.array(path["joint_ranges_rad"]) - np.ptp(q, axis=0)
+    assert (less > -rounding).all() and (less < 2e-3).all()
     assert path["joint_range_sum_rad"] == pytest.approx(sum(path["joint_ranges_rad"]), abs=1e-5)
     within = np.diff(passes) == 0
     travel = np.abs(np.diff(q, axis=0)[within]).sum()
@@ -191,7 +194,7 @@ def test_the_smallest_clearance_of_the_table_is_that_of_the_result(result, table
 
 def test_job_and_table_agree_to_the_pulse(v_run, result, table):
     text = (v_run[0] / "V_SHAPE.JBI").read_bytes().decode("ascii")
-    assert text.count("\r\n") == text.count("\n") > 1000
+    assert text.count("\r\n") == text.count("\n") > 2 * result["program"]["moves"]
     positions = re.findall(r"^C(\d+)=(\S+)\r$", text, flags=re.MULTILINE)
     assert [int(number) for number, _ in positions] == list(range(result["program"]["moves"]))
     assert re.findall(r"^MOV[JL] C(\d+)", text, flags=re.MULTILINE) == [
