@@ -55,7 +55,7 @@ def run_page(run: Written | Refused, report: Report) -> str:
     data["marks"] = _marks(run, prepared, found, report)
     job, survey = run.surfaced.job, (prepared if found is None else found).survey
     data["program"] = _program(run, packer)
-    motion = None if found is None else found.timing.timed.motion
+    motion = None if found is None else found.timed.motion
     body = "\n".join(
         [
             page_text.verdict(report, job, data["marks"]),
@@ -157,7 +157,7 @@ def _marks(
     home = prepared.problem.process.home.tolist()
     marks: dict[str, dict[str, object]] = {"home": {"q": home, "text": "home"}}
     if planned is not None:
-        motion = planned.timing.timed.motion
+        motion = planned.timed.motion
         for name, said, extreme in extremes(report):
             q = np.deg2rad(extreme.joints_deg).tolist()
             marks[name] = {"q": q, "text": said, "hit": extreme.subject.split(" and ")}

@@ -92,9 +92,9 @@ def run_data(prepared: Prepared, planned: Planned | None, packer: Packer) -> Dat
     data["points"], data["paints"] = passes_data(surfaced, packer)
     data["field"] = _field(prepared, prepared.survey if planned is None else planned.survey, packer)
     if planned is not None:
-        timed, scene = planned.timing.timed, prepared.problem.scene
+        scene = prepared.problem.scene
         times, nearest = planned.pictured.value().times, planned.pictured.value().nearest
-        data["motion"] = _motion(timed, packer)
+        data["motion"] = _motion(planned.timed, packer)
         data["clearance"] = {
             "time": packer.floats(times),
             "distance": packer.floats(nearest.distance),
