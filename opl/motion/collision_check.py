@@ -10,10 +10,15 @@ from opl.cell.collision import CollisionScene
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import PartTree, signed_wheel_distance
 from opl.cell.workcell import PART, WHEEL, WorkCell
-from opl.geometry.frames import Array
+from opl.geometry.frames import Array, transform
+from opl.geometry.mesh import box_corners
 from opl.motion.motion import Motion
 
 RESOLUTION = np.deg2rad(1.0)  # largest joint change between two configurations that are checked
+# Where the part may touch the wheel it turns and slides by many times what it may sink in: no
+# corner of its box moves farther than this between two places that are looked at
+STEP = 1e-3  # [m]
+FINER = 16  # parts of a step, where the part could be too deep on the way
 
 
 @dataclass(frozen=True)
@@ -41,7 +46,12 @@ def densify(q: Array, resolution: float) -> tuple[Array, np.ndarray]:
         Configurations, shape (m, 6), ending with the last; and for each the index of the move that
         it belongs to (the configuration that the move ends at), shape (m,).
     """
-    counts = np.maximum(np.ceil(np.abs(np.diff(q, axis=0)).max(axis=1) / resolution), 1).astype(int)
+    counts = np.ceil(np.abs(np.diff(q, axis=0)).max(axis=1) / resolution)
+    return _in_parts(q, np.maximum(counts, 1).astype(int))
+
+
+def _in_parts(q: Array, counts: np.ndarray) -> tuple[Array, np.ndarray]:
+    """Divide the joint lines between configurations into so many parts each, as `densify` does."""
     move = np.repeat(np.arange(1, len(q)), counts)
     ends = np.cumsum(counts)
     fraction = (np.arange(len(move)) - np.repeat(ends - counts, counts) + 1) / counts[move - 1]
@@ -57,19 +67,58 @@ def colliding_moves(
     The part may sink into the belt by its largest penetration while it is on the wheel, on
     approaches and on retracts; on free moves it keeps its clearance from the wheel.
     """
+    sunk, sunk_at_end = _at_wheel(cell, part, motion)
     q, move = densify(motion.q, RESOLUTION)
-    Ts_base_flange = forward_kinematics(cell.robot, q)
-    needed = np.where(motion.free[move], cell.part_from_wheel, -cell.planned_penetration)
-    Ts_contact0_workpiece = cell.Ts_contact0_workpiece(Ts_base_flange)
-    cuts = signed_wheel_distance(part, cell.wheel, Ts_contact0_workpiece, needed) < needed
     # a move that is refused for the wheel need not be checked further
-    unrefused = ~np.isin(move, move[cuts])
+    unrefused = ~sunk[move]
     hits = np.zeros(len(q), dtype=bool)
     hits[unrefused] = scene.collides(q[unrefused])
     faults = []
-    for index in np.unique(move[cuts | hits]):
+    for index in np.unique(np.concatenate([np.flatnonzero(sunk), move[hits]])):
+        if sunk[index]:
+            faults.append(CollidingMove(int(index), (PART, WHEEL), bool(sunk_at_end[index])))
+            continue
         on_move = np.flatnonzero(move == index)
-        first = on_move[(cuts | hits)[on_move]][0]
-        pair = (PART, WHEEL) if cuts[first] else scene.colliding_pairs(q[first])[0]
-        faults.append(CollidingMove(int(index), pair, bool((cuts | hits)[on_move[-1]])))
+        first = on_move[hits[on_move]][0]
+        pair = scene.colliding_pairs(q[first])[0]
+        faults.append(CollidingMove(int(index), pair, bool(hits[on_move[-1]])))
     return faults
+
+
+def _at_wheel(cell: WorkCell, part: PartTree, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Return which moves bring the part too near to the wheel, and which of them end there.
+
+    Where it may touch the wheel, a place between two that are looked at is nearer by half the way
+    between them at the most. Where that could matter, more are looked at.
+
+    Returns:
+        Two flags for each move, by the configuration that it ends at, each of shape (n,).
+    """
+    corners = box_corners(part.triangles.reshape(-1, 3))
+
+    def distance(q: Array, enough: Array) -> Array:
+        Ts = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, q))
+        return signed_wheel_distance(part, cell.wheel, Ts, enough)
+
+    Ts_base_workpiece = forward_kinematics(cell.robot, motion.q) @ cell.T_flange_workpiece
+    placed = transform(Ts_base_workpiece[:, None], corners)
+    moved = np.linalg.norm(np.diff(placed, axis=0), axis=-1).max(axis=1)
+    moved[motion.free[1:]] = 0.0
+    turned = np.abs(np.diff(motion.q, axis=0)).max(axis=1)
+    counts = np.ceil(np.maximum(turned / RESOLUTION, moved / STEP))
+    counts = np.maximum(counts, 1).astype(int)
+    q, move = _in_parts(motion.q, counts)
+    needed = np.where(motion.free, cell.part_from_wheel, -cell.planned_penetration)[move]
+    half = np.concatenate([[0.0], moved / counts / 2.0])[move]
+    found = distance(q, needed + half)
+    sunk = np.zeros(len(motion), dtype=bool)
+    sunk[move[found < needed]] = True
+    at_end = (found < needed)[np.concatenate([[0], np.cumsum(counts)])]
+    near = found < needed + half
+    near[1:] |= near[:-1]
+    unsure = np.flatnonzero(near & (half > 0.0) & ~sunk[move])
+    between = np.arange(1, FINER)[:, None] / FINER
+    finer = (q[unsure - 1, None] + between * (q[unsure] - q[unsure - 1])[:, None]).reshape(-1, 6)
+    at = np.repeat(unsure, FINER - 1)
+    sunk[move[at[distance(finer, needed[at]) < needed[at]]]] = True
+    return sunk, at_end

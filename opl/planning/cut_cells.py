@@ -11,7 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from opl.cell.wheel_distance import TOLERANCE, PartTree, signed_wheel_distance
+from opl.cell.wheel_distance import PartTree, signed_wheel_distance
+from opl.cell.wheel_triangle import TOLERANCE
 from opl.cell.workcell import WorkCell
 from opl.geometry import frames
 from opl.geometry.frames import Array

@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
-from opl.cell.wheel_distance import part_tree
+from opl.cell.wheel_distance import part_tree, signed_wheel_distance
 from opl.motion.collision_check import RESOLUTION, colliding_moves, densify
 from opl.motion.motion import MoveKind
 from tests.support.bare_cells import bare_cell, block, free_move, with_obstacle
@@ -123,6 +123,29 @@ def test_the_part_may_sink_into_the_belt_by_the_penetration(depth, found):
     if found:
         assert faults[0].pair == ("part", "wheel")
         assert index in [fault.move for fault in faults if fault.at_end]
+
+
+def test_the_deepest_place_of_a_long_line_counts_wherever_it_is():
+    problem, motion = small_problem(), small_motion()
+    cell, part = problem.cell, problem.scene.part
+    on_wheel = np.flatnonzero(motion.on_wheel)
+    tried = 0
+    for start, end in zip(on_wheel[:-16:24], on_wheel[16::24], strict=True):
+        line = motion.take(np.array([start, end]))
+        q = line.q[0] + np.linspace(0.0, 1.0, 3001)[:, None] * (line.q[1] - line.q[0])
+        Ts = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, q))
+        depth = -signed_wheel_distance(part, cell.wheel, Ts, 0.0)
+        if not 0.0003 < depth.max() < 0.05 or depth.argmax() in (0, 3000):
+            continue
+        tried += 1
+        for more, found in ((-5e-5, True), (5e-5, False)):
+            # the planner keeps 0.1 mm back
+            other = replace(cell, max_belt_penetration=depth.max() + 1e-4 + more)
+            faults = colliding_moves(other, problem.scene.collision, part, line)
+            assert [fault.pair for fault in faults if not fault.at_end] == [
+                ("part", "wheel")
+            ] * found
+    assert tried > 3
 
 
 def test_a_free_move_keeps_the_clearance_from_the_wheel():

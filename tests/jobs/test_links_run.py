@@ -32,8 +32,6 @@ BACK_UNDER_IT = {
     "search.contact_positions": 12,
     "search.max_contact_step": 20,
     "search.max_contact_error_mm": 1.5,
-    # chords of so coarse a path sink deeper where few positions are written
-    "wheel.max_belt_penetration_mm": 1.5,
     "passes.max_chord_error_mm": 1.0,
     "passes.max_step_mm": 60,
     # so near the wheel that ways in the air graze the plate

@@ -143,9 +143,10 @@ def test_part_and_wheel_touch_by_both_but_within_the_stated_margin(part):
     off = found.gap[near] - found.exact[near]
     assert off.min() > -TOO_NEAR
     assert off.max() < GAP_ACCURACY
-    # a depth is that of the deepest point here, the shortest way out there: not less
+    # a depth is the shortest way out by both
     deep = (found.exact < -1e-4) & (found.exact > -0.005)
-    assert (found.gap[deep] <= found.exact[deep] + GAP_ACCURACY).all()
+    assert deep.sum() > 0.01 * COUNT
+    assert (np.abs(found.gap[deep] - found.exact[deep]) < GAP_ACCURACY).all()
 
 
 def main():

@@ -1,4 +1,4 @@
-"""Part against wheel: exact distances of triangles against dense samples of them."""
+"""Part against wheel: distances of triangles against dense samples of them, and of ways out."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from opl.cell.wheel_distance import TOLERANCE, part_tree, signed_wheel_distance
+from opl.cell.wheel_distance import part_tree, signed_wheel_distance
+from opl.cell.wheel_triangle import TOLERANCE
 from opl.geometry.frames import pose
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.wheel import ContactWheel
@@ -30,6 +31,25 @@ def by_brute_force(points, wheel, Ts):
             np.where((beside < 0) & (beyond < 0), np.maximum(beside, beyond), outside).min()
         )
     return np.array(least)
+
+
+def out_along(triangle, wheel, directions):
+    """Return how far a triangle is beyond all of the wheel in directions, written out here."""
+    x, y, z = directions.T
+    rim = wheel.width / 2 * np.abs(x) + wheel.radius * np.hypot(y, z)
+    return ((triangle - [0.0, 0.0, wheel.radius]) @ directions.T).min(axis=0) - rim
+
+
+def way_out_by_trying(random, triangle, wheel):
+    """Return minus the shortest way out of all directions, tried closer and closer to the best."""
+    tried = random.normal(size=(4000, 3))
+    for spread in (0.1, 0.03, 0.01, 0.003, 1e-3, 1e-4, 1e-5):
+        tried /= np.linalg.norm(tried, axis=1)[:, None]
+        best = tried[np.argsort(out_along(triangle, wheel, tried))[-20:]]
+        tried = np.concatenate([best + spread * random.normal(size=(200, 20, 3)), best[None]])
+        tried = tried.reshape(-1, 3)
+    tried /= np.linalg.norm(tried, axis=1)[:, None]
+    return out_along(triangle, wheel, tried).max()
 
 
 def random_poses(random, n, reach):
@@ -77,7 +97,29 @@ def test_the_distance_is_that_of_the_nearest_point_of_any_triangle(n, seed, widt
     points, spacing = samples_of(mesh, 24)
     sampled = by_brute_force(points, wheel, Ts)
     assert (found <= sampled + TOLERANCE + 1e-12).all()
-    assert (found >= sampled - spacing - 1e-12).all()
+    apart = found >= 0.0
+    assert (found >= sampled - spacing - 1e-12)[apart].all()
+    # a point in the wheel is not deeper in it than all of its triangle, which must come out as one
+    assert (found < TOLERANCE)[sampled < 0.0].all()
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(0.005, 0.3), st.floats(0.02, 0.4), st.floats(0.001, 1))
+def test_a_triangle_in_the_wheel_is_as_deep_as_its_shortest_way_out(seed, width, radius, scale):
+    random = np.random.default_rng(seed)
+    wheel = wheel_of(width, radius)
+    mesh = random_mesh(random, 1, scale)
+    # near the rim, where ways out lead between the directions of side and axle
+    rim = np.array([random.choice([-0.5, 0.5]) * width, 0.0, 0.0])
+    triangle = mesh.triangles[0] - mesh.triangles[0].mean(axis=0) + rim
+    triangle += random.normal(scale=0.1 * min(width, radius), size=3)
+    found = signed_wheel_distance(part_tree(mesh_of(triangle[None])), wheel, np.eye(4), EXACT)
+    tried = way_out_by_trying(random, triangle, wheel)
+    assert found >= tried - TOLERANCE  # every direction is a way out
+    if found < 0.0:
+        assert found == pytest.approx(tried, rel=1e-3, abs=1e-5)
+    else:
+        assert tried <= found + TOLERANCE
 
 
 def test_dense_samples_come_as_near_as_the_exact_distance():
@@ -86,8 +128,11 @@ def test_dense_samples_come_as_near_as_the_exact_distance():
     Ts = random_poses(random, 6, reach=0.2)
     points, _ = samples_of(mesh, 700)
     found = signed_wheel_distance(part_tree(mesh), wheel, Ts, EXACT)
-    np.testing.assert_allclose(found, by_brute_force(points, wheel, Ts), atol=2e-4)
-    assert (found <= by_brute_force(points, wheel, Ts) + TOLERANCE).all()
+    sampled = by_brute_force(points, wheel, Ts)
+    apart = sampled > 0.0
+    assert apart.any()
+    np.testing.assert_allclose(found[apart], sampled[apart], atol=2e-4)
+    assert (found <= sampled + TOLERANCE).all()
 
 
 @settings(max_examples=60, deadline=None)
@@ -117,9 +162,9 @@ def test_an_edge_of_the_wheel_that_sinks_into_a_flat_face_is_seen():
     found = signed_wheel_distance(part_tree(face), wheel, tilted, EXACT)
     points, _ = samples_of(face, 60)
     assert by_brute_force(points, wheel, tilted[None])[0] > 0.0  # samples miss it
-    # the deepest point of the face is as far from the wheel's side as from its rim
-    sink = depth / (np.cos(np.radians(30.0)) + np.sin(np.radians(30.0)))
-    assert found == pytest.approx(-sink, abs=2 * TOLERANCE)
+    # the face is out of the wheel once it is at the corner; its deepest point, as far from the
+    # wheel's side as from its rim, is only 0.73 as deep
+    assert found == pytest.approx(-depth, abs=2 * TOLERANCE)
 
 
 def test_a_part_that_encloses_the_wheel_is_far_from_its_surface_but_not_inside():

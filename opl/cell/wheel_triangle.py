@@ -1,0 +1,238 @@
+"""One triangle of the held part against the wheel: how far it is away, or how deep in the wheel.
+
+The signed distance to a cylinder is convex, so planes below it bound it on a whole triangle. A
+triangle whose bound is no better than what is known is skipped, another is halved until the rest
+cannot matter.
+
+How deep one is that cuts into the wheel is how far it has to be moved to be out of it, as the
+second opinion has it too. At the rim that is more than its deepest point is below the surface, by
+up to the square root of two: a face that cuts the corner of the wheel off has to go all the way to
+the corner. Any direction gives a way out; the shortest is along the axle, away from it at a corner
+of the triangle, along its normal, or square to one of its edges where that crosses the rim. Only
+those of the last kind have to be looked for.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+TOLERANCE = 2e-6  # [m] distances returned are at most this much too large
+DEEPEST = 96  # pieces that wait at once; halving to a micrometre needs far fewer
+# Square to an edge, evenly. Between two the way out can be shorter than about both only if it is
+# a least one there, and then by no more than a thousandth.
+DIRECTIONS = 64
+_CLOSER = 24  # times that the bracket around a shortest one is made smaller, by the golden section
+_GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+
+
+@njit("float64(float64[:,::1],float64,float64,float64,float64,float64)", cache=True)
+def _out_along(corners, half_width, radius, nx, ny, nz):  # type: ignore[no-untyped-def]
+    """Return how far a triangle is beyond all of the wheel in a direction, of any length.
+
+    Negative where it has to be moved that far. The corners, shape (3, 3), are seen from the middle
+    of the wheel.
+    """
+    length = np.sqrt(nx * nx + ny * ny + nz * nz)
+    if length == 0.0:
+        return -np.inf
+    least = np.inf
+    for k in range(3):
+        least = min(least, nx * corners[k, 0] + ny * corners[k, 1] + nz * corners[k, 2])
+    return (least - half_width * abs(nx) - radius * np.sqrt(ny * ny + nz * nz)) / length
+
+
+@njit("float64(float64[:,::1],float64,float64,float64[:,::1],float64)", cache=True)
+def _out_around(corners, half_width, radius, across, angle):  # type: ignore[no-untyped-def]
+    """Return the same for the direction at an angle between the two of ``across``, shape (2, 3)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return _out_along(
+        corners,
+        half_width,
+        radius,
+        c * across[0, 0] + s * across[1, 0],
+        c * across[0, 1] + s * across[1, 1],
+        c * across[0, 2] + s * across[1, 2],
+    )
+
+
+@njit("float64(float64[::1],float64,float64,float64)", cache=True)
+def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-def]
+    """Return minus the length of the shortest way out of a triangle that is in the wheel.
+
+    Of one that is outside it is some distance that it keeps at least, not less than 0. The corners,
+    x, y and z of each, are seen from contact frame 0. Ways no longer than ``enough`` says, such as
+    -0.001 for a millimetre, are all the same.
+    """
+    corners = triangle.reshape(3, 3).copy()
+    corners[:, 2] -= radius
+    most = -np.inf
+    for sign in (-1.0, 1.0):
+        most = max(most, _out_along(corners, half_width, radius, sign, 0.0, 0.0))
+    for k in range(3):
+        most = max(most, _out_along(corners, half_width, radius, 0.0, corners[k, 1], corners[k, 2]))
+    if most >= enough:
+        return most
+    edges = np.empty((3, 3))
+    for k in range(3):
+        for i in range(3):
+            edges[k, i] = corners[(k + 1) % 3, i] - corners[k, i]
+    nx = edges[0, 1] * edges[1, 2] - edges[0, 2] * edges[1, 1]
+    ny = edges[0, 2] * edges[1, 0] - edges[0, 0] * edges[1, 2]
+    nz = edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0]
+    for sign in (-1.0, 1.0):
+        most = max(most, _out_along(corners, half_width, radius, sign * nx, sign * ny, sign * nz))
+    across, tried = np.empty((2, 3)), np.empty(DIRECTIONS)
+    turn = 2.0 * np.pi / DIRECTIONS
+    for k in range(3):
+        if most >= enough:
+            return most
+        ex, ey, ez = edges[k, 0], edges[k, 1], edges[k, 2]
+        length, square = np.sqrt(ex * ex + ey * ey + ez * ez), np.sqrt(ey * ey + ez * ez)
+        if length == 0.0:
+            continue
+        # one square to the axle as well; of an edge along the axle all are
+        across[0, 0] = 0.0
+        across[0, 1], across[0, 2] = (-ez / square, ey / square) if square > 0.0 else (1.0, 0.0)
+        across[1, 0] = (ey * across[0, 2] - ez * across[0, 1]) / length
+        across[1, 1] = -ex * across[0, 2] / length
+        across[1, 2] = ex * across[0, 1] / length
+        for d in range(DIRECTIONS):
+            tried[d] = _out_around(corners, half_width, radius, across, d * turn)
+        for d in range(DIRECTIONS):
+            if tried[d] < tried[d - 1] or tried[d] < tried[(d + 1) % DIRECTIONS]:
+                continue
+            low, high = (d - 1.0) * turn, (d + 1.0) * turn
+            first, second = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+            one = _out_around(corners, half_width, radius, across, first)
+            other = _out_around(corners, half_width, radius, across, second)
+            for _ in range(_CLOSER):
+                if one > other:
+                    high, second, other = second, first, one
+                    first = high - _GOLDEN * (high - low)
+                    one = _out_around(corners, half_width, radius, across, first)
+                else:
+                    low, first, one = first, second, other
+                    second = low + _GOLDEN * (high - low)
+                    other = _out_around(corners, half_width, radius, across, second)
+            most = max(most, tried[d], one, other)
+    return most
+
+
+@njit("UniTuple(float64,4)(float64,float64,float64,float64,float64)", cache=True)
+def distance_of_point(x, y, z, half_width, radius):  # type: ignore[no-untyped-def]
+    """Signed distance to the wheel as in `ContactWheel.signed_distance`, and its gradient."""
+    away = np.sqrt(y * y + (z - radius) ** 2)
+    beside = abs(x) - half_width
+    beyond = away - radius
+    if beside > 0.0 and beyond > 0.0:
+        value = np.sqrt(beside * beside + beyond * beyond)
+        along, out = beside / value, beyond / value
+    elif beside > beyond:
+        value, along, out = beside, 1.0, 0.0
+    else:
+        value, along, out = beyond, 0.0, 1.0
+    scale = out / away if away > 0.0 else 0.0
+    return value, along if x >= 0.0 else -along, scale * y, scale * (z - radius)
+
+
+@njit("float64(float64,float64,float64,float64,float64,float64)", cache=True)
+def _mean_bound(beside0, beside1, beside2, beyond0, beyond1, beyond2):  # type: ignore[no-untyped-def]
+    """Largest lower bound that a mean of two linear functions gives, from their values at corners.
+
+    The mean at which corners 0 and 1 are equal; the others come by calling it with other corners.
+    """
+    rise, fall = beside0 - beside1, beyond1 - beyond0
+    share = fall / (rise + fall) if rise + fall != 0.0 else -1.0
+    if not 0.0 < share < 1.0:
+        return -np.inf
+    rest = 1.0 - share
+    return min(share * beside0 + rest * beyond0, share * beside2 + rest * beyond2)
+
+
+@njit(
+    "float64(float64[:,::1],float64[:,:,::1],int64,float64,float64,float64,float64,float64[:,::1])",
+    cache=True,
+)
+def nearest_on_triangle(  # type: ignore[no-untyped-def]
+    T, triangles, index, half_width, radius, needed, best, room
+):
+    """Return the distance of a triangle, or ``best`` if it is not nearer than that.
+
+    Below the distance lie its own tangent plane, the plane of the wheel's side, the tangent plane
+    of its rim, and every mean of the last two: at an edge only such a mean is flat along the part.
+    A mean below 0 is no bound of the way out: it counts along less than a direction.
+    ``room``, shape (DEEPEST + 1, 9), is where pieces of the triangle wait.
+    """
+    for k in range(3):
+        for i in range(3):
+            room[0, 3 * k + i] = (
+                T[i, 0] * triangles[index, k, 0]
+                + T[i, 1] * triangles[index, k, 1]
+                + T[i, 2] * triangles[index, k, 2]
+                + T[i, 3]
+            )
+    n = 1
+    whole = True
+    while n > 0:
+        n -= 1
+        ax, ay, az = room[n, 0], room[n, 1], room[n, 2]
+        bx, by, bz = room[n, 3], room[n, 4], room[n, 5]
+        cx, cy, cz = room[n, 6], room[n, 7], room[n, 8]
+        x, y, z = (ax + bx + cx) / 3.0, (ay + by + cy) / 3.0, (az + bz + cz) / 3.0
+        value, gx, gy, gz = distance_of_point(x, y, z, half_width, radius)
+        best = min(best, value)
+        slope_a = gx * (ax - x) + gy * (ay - y) + gz * (az - z)
+        slope_b = gx * (bx - x) + gy * (by - y) + gz * (bz - z)
+        slope_c = gx * (cx - x) + gy * (cy - y) + gz * (cz - z)
+        bound = value + min(slope_a, slope_b, slope_c)
+        enough = min(best - TOLERANCE, needed)
+        if bound < enough:
+            away = np.sqrt(y * y + (z - radius) ** 2)
+            out_y = y / away if away > 0.0 else 0.0
+            out_z = (z - radius) / away if away > 0.0 else 0.0
+            side = 1.0 if x >= 0.0 else -1.0
+            beside_a, beside_b, beside_c = side * ax, side * bx, side * cx
+            beyond = away - radius + half_width
+            beyond_a = beyond + out_y * (ay - y) + out_z * (az - z)
+            beyond_b = beyond + out_y * (by - y) + out_z * (bz - z)
+            beyond_c = beyond + out_y * (cy - y) + out_z * (cz - z)
+            mean = max(
+                _mean_bound(beside_a, beside_b, beside_c, beyond_a, beyond_b, beyond_c),
+                _mean_bound(beside_b, beside_c, beside_a, beyond_b, beyond_c, beyond_a),
+                _mean_bound(beside_c, beside_a, beside_b, beyond_c, beyond_a, beyond_b),
+                min(beside_a, beside_b, beside_c),
+                min(beyond_a, beyond_b, beyond_c),
+            )
+            bound = max(bound, mean - half_width)
+            if whole and bound < 0.0:  # it may be in the wheel
+                out = way_out(room[0], half_width, radius, enough)
+                if out < 0.0 or out >= enough:
+                    return out if out < enough else best
+        if bound >= enough or n + 2 > DEEPEST:
+            continue
+        if whole:  # it has to be halved: its corners may be the nearest points
+            whole = False
+            for k in range(3):
+                value, _, _, _ = distance_of_point(
+                    room[0, 3 * k], room[0, 3 * k + 1], room[0, 3 * k + 2], half_width, radius
+                )
+                best = min(best, value)
+        ab = (ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2
+        bc = (bx - cx) ** 2 + (by - cy) ** 2 + (bz - cz) ** 2
+        ca = (cx - ax) ** 2 + (cy - ay) ** 2 + (cz - az) ** 2
+        if bc >= ab and bc >= ca:  # turn the corners so that a and b end the longest edge
+            ax, ay, az, bx, by, bz, cx, cy, cz = bx, by, bz, cx, cy, cz, ax, ay, az
+        elif ca >= ab:
+            ax, ay, az, bx, by, bz, cx, cy, cz = cx, cy, cz, ax, ay, az, bx, by, bz
+        mx, my, mz = (ax + bx) / 2.0, (ay + by) / 2.0, (az + bz) / 2.0
+        value, _, _, _ = distance_of_point(mx, my, mz, half_width, radius)
+        best = min(best, value)
+        room[n, 0], room[n, 1], room[n, 2] = ax, ay, az
+        room[n, 3], room[n, 4], room[n, 5] = mx, my, mz
+        room[n, 6], room[n, 7], room[n, 8] = cx, cy, cz
+        room[n + 1, 0], room[n + 1, 1], room[n + 1, 2] = mx, my, mz
+        room[n + 1, 3], room[n + 1, 4], room[n + 1, 5] = bx, by, bz
+        room[n + 1, 6], room[n + 1, 7], room[n + 1, 8] = cx, cy, cz
+        n += 2
+    return best
