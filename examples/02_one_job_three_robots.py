@@ -40,12 +40,7 @@ JOB = {
         "max_chord_error_mm": 0.3,
         "max_step_mm": 20,
     },
-    "search": {
-        "method": "recursive",
-        "contact_positions": 40,
-        "max_contact_step": 5,
-        "max_contact_error_mm": 0.5,
-    },
+    "search": {"contact_positions": 40, "max_contact_step": 5, "max_contact_error_mm": 0.5},
     "process": {
         "feed_mm_s": 20,
         "approach_mm": 20,

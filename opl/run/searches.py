@@ -19,11 +19,12 @@ from opl.planning.optimal import plan_optimal
 from opl.planning.plan import Found, ObjectiveValue, OutOfBudget, Plan, SearchOutcome
 from opl.planning.problem import GrindingProblem
 from opl.planning.weighted import plan_weighted
+from opl.planning.work import WORK_OF_A_CHECK
 from opl.run.values import Prepared
 
 # of motions from the paper's start node, which are searched for comparison only
 MOST_CHECKS = 20
-MOST_LATER_CHECKS = 200  # where the proof found no motion either
+MOST_LATER_CHECKS = 200  # where the proof found no motion either; more if it left work over
 MOST_FIRST_CHECKS = 40  # of motions of the recursive search, before the proof begins without it
 
 
@@ -63,15 +64,25 @@ def search_path(
         first = try_recursive(problem, search.start, MOST_FIRST_CHECKS)
         if isinstance(first, OutOfBudget):
             # what it proposes collides again and again: the proof knows better where not to look
-            best = plan_optimal(problem, search.optimal, None, report)
+            done = 0.0
+
+            def note(share: float) -> None:
+                nonlocal done
+                done = share
+                report(share)
+
+            best = plan_optimal(problem, search.optimal, None, note)
             if best is not None:
                 return FoundPaths(_finished(search, problem, best, nameable), best)
-            first = try_recursive(problem, search.start, MOST_LATER_CHECKS)
+            # a proof can end early: no track leads through the least boxes, a longer one may
+            left = search.optimal.max_subproblems * (1.0 - done)
+            most = int(left / (WORK_OF_A_CHECK * len(problem.points)))
+            first = try_recursive(problem, search.start, max(most, MOST_LATER_CHECKS))
             if isinstance(first, OutOfBudget):
                 raise NoPathError(
                     f"no path found: the {first.checks} best motions of the recursive search are "
-                    "not free, and the work allowed for the proof was done before one was; more "
-                    "work, or more room around the robot, may help"
+                    "not free, and the proof found none that is in the work allowed; more work, or "
+                    "more room around the robot, may help"
                 )
     recursive = first.plan if isinstance(first, Found) else plan_recursive(problem, search.start)
     plan = recursive

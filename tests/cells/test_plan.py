@@ -206,6 +206,20 @@ def test_a_search_that_finds_nothing_in_its_work_says_so_and_ends(monkeypatch):
         searches.search_path(replace(job.search, optimal=optimal), shut)
 
 
+def test_what_a_proof_that_ends_early_leaves_over_goes_to_the_recursive_search(monkeypatch):
+    problem = one_row_problem()
+    free = plan_recursive(problem).path
+    ghosts = Ghosts(free.q[(free.cutter_point > 3) & (free.cutter_point < 16)], radius=0.02)
+    haunted = with_scene(problem, collision=ghosts)
+    wanted = plan_recursive(haunted)
+    assert wanted.checks > 1
+    monkeypatch.setattr(searches, "MOST_FIRST_CHECKS", 1)
+    monkeypatch.setattr(searches, "MOST_LATER_CHECKS", 1)
+    monkeypatch.setattr(searches, "plan_optimal", lambda *arguments: None)  # gave up at once
+    found = searches.search_path(small_job().search, haunted)
+    np.testing.assert_array_equal(found.recursive.path.q, wanted.path.q)
+
+
 def test_another_scene_finds_free_moves_of_its_own():
     scene = small_problem().scene
     other = replace(scene, collision=Ghosts(np.zeros(6), radius=0.1))
