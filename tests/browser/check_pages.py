@@ -145,7 +145,6 @@ def test_the_drawn_robot_is_where_the_motion_is_and_its_point_on_the_wheel(runs,
     T_joint_flange = np.array(one.page.evaluate("() => window.opl.page.cell.flange")).reshape(4, 4)
     whole = np.flatnonzero(motion.on_wheel & (motion.cutter_point % 1.0 == 0.0))
     points, cell, met = run.surfaced.points, run.surfaced.job.cell, 0
-    off = 1e-3 * opl.make_report(run).verification.max_contact_error_mm
     for move in [*np.linspace(1, len(motion) - 1, 4).astype(int), *whole[[0, len(whole) // 2]]]:
         one.scrub(float(times[move]))
         drawn = one.flange() @ T_joint_flange
@@ -169,9 +168,9 @@ def test_the_drawn_robot_is_where_the_motion_is_and_its_point_on_the_wheel(runs,
             assert np.allclose(on_part, place[:3], atol=2e-5)
             T_base_contact = cell.wheel.T_base_contact(motion.contact_position[move])
             assert np.allclose(on_wheel, T_base_contact[:3, 3], atol=2e-5)
-            # a point that is passed between written positions may be off as far as was proven
-            assert np.linalg.norm(np.subtract(on_part, on_wheel)) < LIFT + off + 2e-5
-            met += 1
+            if motion.written[move]:  # between written positions the part may slide over the belt
+                assert np.linalg.norm(np.subtract(on_part, on_wheel)) < LIFT + 1e-4
+                met += 1
     assert met > 0
 
 
