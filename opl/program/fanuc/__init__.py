@@ -1,8 +1,8 @@
 """FANUC TP programs as text (.LS): written, read back.
 
 Positions are joint angles, of straight moves too, which leaves the controller no choice between
-configurations; moves carry their time in whole milliseconds. What is proven goes through the
-written points; the corners that CNT100 cuts off are not.
+configurations; moves carry their time in whole milliseconds. How far CNT100
+cuts off corners is not known in millimetres.
 """
 
 from opl.program.fanuc.read import CORNERS, START, parse

@@ -1,6 +1,6 @@
 """Reading FANUC TP programs as text: J and L moves to positions given as joint angles.
 
-CNT is read, not played: the corners it cuts off are not replayed.
+How far CNT cuts off corners is not known in millimetres.
 """
 
 from __future__ import annotations
