@@ -152,10 +152,11 @@ def _chain(  # type: ignore[no-untyped-def]
                     corner = rounded_off(
                         axes, T0, q, places, targets, freedom, tool, starts[ahead], j, k, zone
                     )
+                refused = corner > most
                 for b in range(len(wide)):
-                    if wide[b, 0] == starts[ahead] and wide[b, 1] == j and wide[b, 2] == k:
-                        corner = np.inf
-                if corner <= most:
+                    here = wide[b, 0] == starts[ahead] and wide[b, 1] == j
+                    refused |= here and wide[b, 2] == k
+                if not refused:
                     cost[line] = cost[ahead] + own
                     largest[line] = max(largest[ahead], errors[line])
                     before[line] = ahead

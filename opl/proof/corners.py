@@ -131,7 +131,8 @@ def contact_errors(
     """
     if not corners:
         return np.zeros((0, len(DEPTHS)))
-    wheel, place = job.cell.wheel, np.stack([corner.places() for corner in corners])
+    wheel = job.cell.wheel
+    place = np.stack([corner.places(_lead_pace(job, points, corner)) for corner in corners])
     known = np.isfinite(place)
     q = np.stack([corner.configurations() for corner in corners])[known]
     Ts_contact0_workpiece = (
@@ -164,6 +165,20 @@ def contact_errors(
     found[1, known] = (Ts_contact0_contact[:, :3, 2] * apart).sum(axis=1)
     error = np.nan_to_num(_with_bows(found)).max(axis=(0, 3))
     return np.asarray(np.maximum.accumulate(error, axis=1))
+
+
+def _lead_pace(job: Job, points: CutterPoints, corner: Rounding) -> float:
+    """Return how many cutter points a lead next to the end of a pass passes in all of its move.
+
+    The part is only moved on a lead, so every point of it moves as the flange does.
+    """
+    if sum(corner.grinds) != 1:
+        return 0.0
+    lead, way = (corner.after, 1) if corner.grinds[0] else (corner.before, -1)
+    here = round(float(lead.place[0]))
+    step = abs(points.arc_length[here] - points.arc_length[here - way])
+    p_flange = forward_kinematics(job.cell.robot, lead.q)[:, :3, 3]
+    return float(np.linalg.norm(np.diff(p_flange, axis=0), axis=1).sum() / step)
 
 
 def _with_bows(values: Array) -> Array:

@@ -62,10 +62,6 @@ class Side:
         """Return the fractional cutter points at shares, shape (...)."""
         return np.interp(share, self.share, self.place)
 
-    def pace(self, cut: float) -> float:
-        """Return how many cutter points a share of one is, judged by what is cut off."""
-        return float(self.place_at(np.array(cut)) - self.place[0]) / cut
-
     def cut(self, zone: float, tool_points: Callable[[Array], Array]) -> float:
         """Return which share may be cut off for a zone in [m]; `tool_points` see `roundings`."""
         if np.isinf(zone):
@@ -112,20 +108,20 @@ class Rounding:
         left, begun = self._shares()
         return np.asarray(self.before.q_at(left) + self.after.q_at(begun) - self.before.q[0])
 
-    def places(self) -> Array:
+    def places(self, lead_pace: float) -> Array:
         """Return the fractional cutter points there, NaN off the pass, shape (DEPTHS, ACROSS).
 
-        A lead goes on along the pass, as far for what the joints turn as the move on the wheel.
+        A lead goes on along the pass, by `lead_pace` cutter points in all of its move.
         """
         left, begun = self._shares()
-        here, ratio = self.before.place[0], self.before.length / self.after.length
+        here = self.before.place[0]
         if all(self.grinds):
             return np.asarray(self.before.place_at(left) + self.after.place_at(begun) - here)
         if self.grinds[1]:
-            place = self.after.place_at(begun) - left * ratio * self.after.pace(self.cuts[1])
+            place = self.after.place_at(begun) - left * lead_pace
             return np.where(place >= here, place, np.nan)
         if self.grinds[0]:
-            place = self.before.place_at(left) - begun / ratio * self.before.pace(self.cuts[0])
+            place = self.before.place_at(left) + begun * lead_pace
             return np.where(place <= here, place, np.nan)
         return np.full(left.shape, np.nan)
 

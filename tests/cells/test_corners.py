@@ -101,7 +101,7 @@ def off_by_hand(corner, left, begun):
     return max(abs(seen[at, 2]), abs(float(wheel.signed_distance(Ts[at, :3, 3]))))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     st.integers(0, 10**6),
     st.floats(0.02, 1.0),
@@ -131,7 +131,7 @@ def test_narrower_zones_leave_less():
     wide, narrow = ({c.k: error for c, error in rounded(zone)} for zone in (np.inf, 0.004))
     assert wide.keys() == narrow.keys()
     assert all(narrow[k] <= wide[k] + 2e-6 for k in wide)
-    assert max(wide.values()) > 1.2 * max(narrow.values())
+    assert any(narrow[k] < 0.8 * wide[k] for k in wide)
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -1,7 +1,7 @@
 """Universal Robots scripts (URScript): written, read back.
 
-Positions are joint positions in radians, of straight moves too; every move carries its time. Corners
-are cut off within their blends, 1 mm at the most.
+Positions are joint positions in radians, of straight moves too; every move carries its time.
+Corners are cut off within their blends, 1 mm at the most.
 """
 
 from opl.program.digits import rounded_radians
