@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Mapping
 
 import numpy as np
 
@@ -45,19 +45,26 @@ def verdict(report: Report, job: Job, marks: Container[str]) -> str:
             "What would help": bullets(_help(report)),
             "Tried, does not help": bullets(report.tried_in_vain),
         }
-    columns = {
-        **found,
+    conditions = {
         "In this cell": bullets(_cell(job.cell)),
         "Assumed": bullets(_assumed(report, job.cell.robot)),
         "Not proven": bullets(NEVER_PROVEN),
         "Warnings": bullets(report.warnings),
     }
-    lists = "".join(
-        f"<div><h3>{text(name)}</h3>{lines}</div>" for name, lines in columns.items() if lines
+    if proven:
+        answer = section("verdict", "What was found", _columns({**found, **conditions}))
+    else:  # where it failed comes first
+        answer = section("verdict", "What was found", _columns(found))
+        answer += section("conditions", "Cell, assumptions and limits", _columns(conditions))
+    return head + answer + _files(report)
+
+
+def _columns(lists: Mapping[str, str]) -> str:
+    """Return lists side by side, each under its name; empty ones are left out."""
+    inside = "".join(
+        f"<div><h3>{text(name)}</h3>{lines}</div>" for name, lines in lists.items() if lines
     )
-    return head + section(
-        "verdict", "What was found", f'<div class="columns">{lists}</div>', _files(report)
-    )
+    return f'<div class="columns">{inside}</div>'
 
 
 def signature() -> str:
@@ -81,7 +88,8 @@ def _files(report: Report) -> str:
         ),
         table("files written", heads, list(outputs.items()), kind="words digests"),
     )
-    return f'<h3>Files</h3>{bullets([made])}<div class="beside">{"".join(tables)}</div>'
+    beside = f'<div class="beside">{"".join(tables)}</div>'
+    return section("files", "Files", f"<p>{text(made)}</p>", beside)
 
 
 def _proven(report: Report) -> Iterator[str]:

@@ -8,7 +8,7 @@ from opl.job.load import Job
 from opl.job.refusals import dwell_refusal, keys_named
 from opl.motion.feed import slow_stretches
 from opl.motion.motion import Motion, TimedMotion
-from opl.motion.timing import Timing, time_motion
+from opl.motion.timing import time_motion
 from opl.planning.borders import Nameable
 from opl.planning.plan import Plan
 from opl.planning.positions import HALVINGS, with_fewest_positions, with_shorter_moves
@@ -86,7 +86,7 @@ def _plan(surfaced: Surfaced, watch: Watch) -> Planned | Refused:
         timing = time_motion(motion, surfaced.points, job.process, job.cell.robot)
         slow = slow_stretches(timing, job.process)
     timed = TimedMotion.passing(motion, timing.timed.duration)
-    pictured = Beside(lambda: _pictured(prepared, found.plan, timing))
+    pictured = Beside(lambda: _pictured(prepared, found.plan, timed))
     planned = Planned(prepared, found.plan, compared, exact, timed, timing, slow, pictured)
     refusal = dwell_refusal(slow, job.process)
     return planned if refusal is None else Refused(planned, refusal, (), watch.seconds)
@@ -111,10 +111,10 @@ def _positions(prepared: Prepared, exact: Motion) -> tuple[Motion, Motion]:
     return exact, motion
 
 
-def _pictured(prepared: Prepared, plan: Plan, timing: Timing) -> Pictured:
+def _pictured(prepared: Prepared, plan: Plan, timed: TimedMotion) -> Pictured:
     path, problem = plan.path, prepared.problem
     survey = survey_nodes(problem, path.ik_branch, path.q[path.cutter_point % 1.0 == 0.0])
-    times, nearest = nearest_along(timing.timed, problem.scene.collision)
+    times, nearest = nearest_along(timed, problem.scene.collision)
     return Pictured(survey, times, nearest, draw_charts(prepared, plan, survey))
 
 

@@ -28,7 +28,7 @@ from opl.verification.replay import Verification
 from tests.attacks.faults import KINDS, Case
 from tests.support.small_programs import PROGRAMS, small_program
 
-# what a fault may do and not be seen: how far a ground point is moved, in any direction, and the
+# what a fault may do and not be seen: how far a ground point is moved off its contact, and the
 # part of its time that a pass takes more or less than the job asks for
 PLACE = 1e-4  # [m]
 SPEED = 0.02
@@ -47,12 +47,14 @@ arched top that does not come with opl.
 
 - **caught** (by what): refused, or not proven. **-**: the language has no place for it.
 - **below**: what it does is less than is resolved, so the program is proven as it stands. In mm:
-  so far the ground point is moved where the fault is, less than 0.1 mm, the contact limit of these
-  jobs. In % of a pass: so much the time of the pass is off what the job asks for, 2 % at the most,
-  because speeds of few digits are off by nearly as much; a single move may be 1.3 times as slow or
-  as fast where others make up for it, and 0.25 mm ahead of the feed, since places between two
-  cutter points are recognised less well than the points. "Straight, and replayed so": the other
-  way of the move was replayed in the cell, and is free and on the contact model.
+  so far the ground point is moved off its contact where the fault is, less than 0.1 mm, the contact
+  limit of these jobs; how far along the axle is said beside it, where that is more: there another
+  place of the belt grinds the same. In % of a pass: so much the time of the pass is off what the
+  job asks for, 2 % at the most, because speeds of few digits are off by nearly as much; a single
+  move may be 1.3 times as slow or as fast where others make up for it, and 0.25 mm ahead of the
+  feed, since places between two cutter points are recognised less well than the points.
+  "Straight, and replayed so": the other way of the move was replayed in the cell, and is free and
+  on the contact model.
 - **proven**: it does no harm, and must be proven.
 
 An event (an output, a wait, a dwell, a call, a jump) has no size: none is below.
@@ -131,10 +133,10 @@ def _missed(kind, program, text):
     if len(before.q) != len(after.q):
         return Outcome("below", "straight, and replayed so")
     moved = _ground_points(program, after) - _ground_points(program, before)
-    far = float(np.linalg.norm(moved, axis=-1).max())
+    far, aside = _off_contact(program.job.cell.wheel.T_base_contact0, moved)
     takes, took = _times(after), _times(before)
     if far > 0.0:
-        why = f"{1e3 * far:.3f} mm"
+        why = f"{1e3 * far:.3f} mm" + (f", {1e3 * aside:.3f} along the axle" if aside > far else "")
         return Outcome("below" if far < PLACE else "missed", why)
     if (takes != took).any():
         late = max(_off_time(program, takes), key=abs)
@@ -167,6 +169,15 @@ def _ground_points(program, playback):
     Ts = forward_kinematics(cell.robot, playback.q[playback.stations][rows])
     nearest = points[np.clip(np.round(motion.cutter_point[rows]).astype(int), 0, len(points) - 1)]
     return transform((Ts @ cell.T_flange_workpiece)[:, None], nearest[:, None])[:, 0]
+
+
+def _off_contact(T_base_contact0, moved):
+    """Return how far ground points moved, across the axle and along it, the most of each in [m].
+
+    Along the axle, on the belt, another place of it grinds the same: the contact position is free.
+    """
+    x, y, z = T_base_contact0[:3, :3].T @ moved.T
+    return float(np.hypot(y, z).max()), float(np.abs(x).max())
 
 
 def outcomes_in(name, kinds=ALL_KINDS):

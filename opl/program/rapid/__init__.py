@@ -7,7 +7,7 @@ cut off within z0, 0.3 mm of the tool point.
 
 from opl.program.digits import rounded_degrees
 from opl.program.listing import listing_reader
-from opl.program.posts import Post
+from opl.program.posts import Post, StationaryTools
 from opl.program.rapid.read import CORNERS, DECIMALS, START, parse
 from opl.program.rapid.tool_data import declaration_faults
 from opl.program.rapid.write import DIALECT, VARIABLES, tool_name, write
@@ -17,7 +17,7 @@ POST = Post(
     write,
     DIALECT.template,
     VARIABLES,
-    knows_stationary_tools=True,
+    stationary_tools=StationaryTools.USUAL,
     reader=listing_reader(
         DIALECT.suffix,
         parse,
