@@ -141,15 +141,15 @@ def _extremes(found: Mapping[str, Any], joint_names: Sequence[str]) -> Iterator[
 
 def _corners(found: Mapping[str, Any]) -> str:
     """Say what was proven of corners, and what that rests on."""
-    zones = "their zones"
-    if found["zones_unknown"]:
-        zones += f", half of each move for {found['zones_unknown']} whose zone nobody knows"
-    where = f", {found['max_contact_error_at']}" if found["max_contact_error_at"] else ""
+    unknown, where = found["zones_unknown"], found["max_contact_error_at"]
+    zones = f", half of each move for {unknown} whose zone nobody knows" if unknown else ""
     return (
-        f"{found['rounded']} corners, rounded anyhow within {zones}: contact error "
+        f"{found['rounded']} corners, rounded anyhow within their zones{zones}: contact error "
         f"{found['max_contact_error_mm']:.3f} mm at most of {found['allowed_contact_error_mm']:g} "
-        f"mm allowed{where}; clearances, depth in the belt and order hold. Assumed of the "
-        "controller: it leaves no move before half-way, and does not overshoot"
+        f"mm allowed{where and f', {where}'}, where the part meets and leaves the belt "
+        f"{found['max_contact_error_at_ends_mm']:.3f} mm (not limited); clearances, depth in the "
+        "belt and order hold. Assumed of the controller: it leaves no move before half-way, and "
+        "does not overshoot"
     )
 
 

@@ -32,7 +32,8 @@ class ChainRule:
             where neighbours in the run differ by more, their lines may.
         zone: How far from a corner in [m] of the tool point a controller may leave its lines, no
             earlier than half-way; 0 for exact corners.
-        corner: How far from the wheel's surface that may take the contact, in [m].
+        corner: How far from the wheel's surface that may take the contact, in [m]; where nothing
+            lies between neighbours in the run, their corner may be as it is.
     """
 
     shortest: float
@@ -148,7 +149,7 @@ def _chain(  # type: ignore[no-untyped-def]
                 corner = 0.0
                 if not _even(pace, starts[ahead], j, k, ratio):
                     continue
-                if zone > 0.0:
+                if zone > 0.0 and k > starts[ahead] + 2:
                     corner = rounded_off(
                         axes, T0, q, places, targets, freedom, tool, starts[ahead], j, k, zone
                     )

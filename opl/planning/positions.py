@@ -35,7 +35,7 @@ USED = 0.95
 # The same of rounded corners, which are looked at as the proof does, at fewer places.
 USED_AT_CORNERS = 0.99
 # Times that moves are halved next to a corner that is too wide: what is left then is for the proof.
-HALVINGS = 4
+HALVINGS = 3
 # Speeds of neighbouring lines may differ by two steps of `opl.motion.gradual`, and the faster one
 # is slowed then: a position for every step would cost more than the time it saves.
 STEPS_AT_ONCE = PLANNED_RATIO**2
@@ -54,8 +54,8 @@ class PositionRule:
             infinite where nobody knows; no earlier than half-way.
         tool_points: Gives the tool point that the zone counts by, at configurations (n, 6) in [m],
             shape (n, 3).
-        too_wide: Gives the corners of a motion that the proof would not let pass, by the indices of
-            three written configurations each.
+        too_wide: Gives the corners between moves on the wheel that the proof would not let pass, by
+            the indices of three written configurations each.
     """
 
     max_contact_error: float
@@ -103,7 +103,7 @@ def with_fewest_positions(
     runs = dict(on_wheel_runs(scene.cell, points, motion, process, rule))
     stale = list(runs)
     while stale:
-        for first in stale:
+        for first in dict.fromkeys(stale):
             run, chain = runs[first], rule.chain
             found = fewest(screws, run, chain, blocked.get(first, frozenset()))
             if found is None:
@@ -117,7 +117,9 @@ def with_fewest_positions(
         thinned = _on_lines(screws, runs, chosen, replace(motion, written=written))
         stale = []
         hitting = [line for line in _colliding_lines(scene, thinned) if line[1] - line[0] > 1]
-        for taken in (*hitting, *_improvable(thinned, rule.too_wide(thinned))):
+        # of neighbouring configurations there are none to put in between
+        wide = [turn for turn in rule.too_wide(thinned) if turn[2] - turn[0] > 2]
+        for taken in (*hitting, *wide):
             of = max(start for start in runs if start <= taken[0])
             refused = tuple(row - of for row in taken)
             if refused not in blocked.get(of, frozenset()):
@@ -133,9 +135,7 @@ def with_shorter_moves(motion: Motion, corners: Iterable[tuple[int, int, int]]) 
     `corners` are indices of three configurations each.
     """
     moves = {move for first, _, last in corners for move in range(first + 1, last + 1)}
-    grinding = motion.grinding
-    halves = {move: np.array([0.5]) for move in sorted(moves) if grinding[move]}
-    return with_moves_cut(motion, halves) if halves else motion
+    return with_moves_cut(motion, {move: np.array([0.5]) for move in sorted(moves)})
 
 
 def _on_lines(
@@ -151,23 +151,6 @@ def _on_lines(
             shares, _ = line_errors(screws, run, start - first, end - first)
             q[start + 1 : end] = q[start] + shares[:, None] * (q[end] - q[start])
     return replace(motion, q=q)
-
-
-def _improvable(
-    motion: Motion, corners: Iterable[tuple[int, int, int]]
-) -> Iterator[tuple[int, ...]]:
-    """Yield what not to take for some corners, where more positions can be put in.
-
-    At the ends of a pass it is the line: the lead stays.
-    """
-    for before, here, after in corners:
-        grinds = motion.grinding[here], motion.grinding[after]
-        if all(grinds) and after - before > 2:
-            yield before, here, after
-        elif not grinds[0] and after - here > 1:
-            yield here, after
-        elif not grinds[1] and here - before > 1:
-            yield before, here
 
 
 def on_wheel_runs(

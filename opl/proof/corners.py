@@ -32,9 +32,11 @@ class CornerProof:
         rounded: Number of corners that may be rounded.
         unknown: Number of those whose zones nobody knows: half of each move is taken for them.
         max_contact_error: Largest distance of the ground point from the wheel's surface on any
-            rounding in [m].
+            rounding between moves on the wheel in [m].
         place: Where that is, empty without contact.
         allowed: How large it may be in [m].
+        at_ends: The same where the part meets and leaves the belt, which is told, not limited: a
+            rounding begins to lift it off before the end of the pass.
         findings: What is wrong.
     """
 
@@ -43,6 +45,7 @@ class CornerProof:
     max_contact_error: float
     place: str
     allowed: float
+    at_ends: float
     findings: tuple[Finding, ...]
 
 
@@ -62,7 +65,8 @@ def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playb
     allowed, tool_points = job.search.max_contact_error, tool_points_of(job)
     corners = list(roundings(motion, zones, tool_points))
     errors = contact_errors(job, points, motion, corners)
-    worst = errors[:, -1]
+    inner = np.array([all(corner.grinds) for corner in corners], dtype=bool)
+    worst = np.where(inner, errors[:, -1], 0.0)
     faults: list[tuple[Rounding, str]] = []
     for one in np.argsort(-worst, kind="stable")[:MOST_NAMED].tolist():
         if worst[one] > allowed:
@@ -84,6 +88,7 @@ def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playb
         0.0 if most is None else float(worst[most]),
         "" if most is None else _place(motion, corners[most]),
         allowed,
+        float(errors[~inner, -1].max(initial=0.0)),
         tuple(
             Finding(
                 Level.ERROR,
@@ -115,7 +120,7 @@ def too_wide(
     corners = list(roundings(motion, zones, tool_points_of(job)))
     errors = contact_errors(job, points, motion, corners)[:, -1]
     for corner, error in zip(corners, errors, strict=True):
-        if error > job.search.max_contact_error:
+        if all(corner.grinds) and error > job.search.max_contact_error:
             before, here, after = positions[corner.k - 1 : corner.k + 2].tolist()
             yield before, here, after
 

@@ -15,6 +15,7 @@ class CornersReport:
     max_contact_error_mm: float
     max_contact_error_at: str  # pass and cutter point, empty without contact
     allowed_contact_error_mm: float
+    max_contact_error_at_ends_mm: float  # where the part meets and leaves the belt: not limited
 
 
 @dataclass(frozen=True)

@@ -202,6 +202,7 @@ def corners_report(found: CornerProof | None) -> CornersReport | None:
         round(found.max_contact_error * MM, 4),
         found.place,
         round(found.allowed * MM, 4),
+        round(found.at_ends * MM, 4),
     )
 
 

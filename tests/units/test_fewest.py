@@ -119,7 +119,8 @@ def test_no_choice_of_fewer_positions_keeps_the_rule(which, start, count, error,
             return None
         if zone > 0.0:
             corners = zip(chain, chain[1:], chain[2:], strict=False)
-            if any(corner_error(screws, part, corner, zone) > error for corner in corners):
+            longer = [corner for corner in corners if corner[2] > corner[0] + 2]
+            if any(corner_error(screws, part, corner, zone) > error for corner in longer):
                 return None
         if not all(keeps_pace(screws, part, i, j) for i, j, _ in lines):
             return None
