@@ -19,7 +19,7 @@ from opl.geometry.mesh import TriangleMesh
 from opl.geometry.rotations import quaternion
 from opl.geometry.shapes import Body, Box, Cylinder
 from opl.verification.engine import pybullet, start
-from opl.verification.meshes import is_inside, triangle_body
+from opl.verification.meshes import concave_shape, is_inside, triangle_body
 from opl.verification.patches import Drum, Patches
 
 BASE_LINK = -1  # Bullet's number of the link that does not move
@@ -240,13 +240,7 @@ class World:
 
     def _add_mesh(self, corners: Array) -> Solid:
         """Add triangles, their corners of shape (3 m, 3)."""
-        shape = self._client.createCollisionShape(
-            pybullet.GEOM_MESH,
-            vertices=corners.tolist(),
-            indices=list(range(len(corners))),
-            flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
-        )
-        return self._body(PART, shape)
+        return self._body(PART, concave_shape(self._client, corners))
 
     def _add(self, body: Body, T_base_body: Array | None = None) -> Solid:
         client = self._client
