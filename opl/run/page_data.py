@@ -21,7 +21,8 @@ from opl.report import curves
 from opl.report.chart import chart_cells
 from opl.report.drawn import drawn_cell, drawn_passes, drawn_wheel, painted, views
 from opl.report.packing import Packer
-from opl.run.result import PlaceReport, Report
+from opl.run.proof_result import PlaceReport
+from opl.run.result import Report
 from opl.run.values import Planned, Prepared, Surfaced
 
 MM, MICRONS = 1e3, 1e6

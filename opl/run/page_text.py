@@ -22,7 +22,6 @@ NEVER_PROVEN = (
     "the first move, to home from wherever the robot stands",
     "cables, hoses and people, beyond limits of joints that the cell states",
     "anything that stands in the real cell and not in the job",
-    "how the controller rounds corners between exact stops: limited by the program, not proven",
     "what the belt removes: force, wear and finish",
 )
 
@@ -107,6 +106,12 @@ def _proven(report: Report) -> Iterator[str]:
                 f"read back from {', '.join(found.file.files)}: {found.file.postures} "
                 "configurations, moves and speeds are those proven"
             )
+            corners = found.file.corners
+            if corners is not None:
+                yield (
+                    f"{corners.rounded} corners, however the controller rounds them inside their "
+                    f"zones: contact error {corners.max_contact_error_mm:.4f} mm at most"
+                )
     if program is not None and not program.read_back:
         yield "of the file itself nothing: opl has no reader for this controller"
 
@@ -140,5 +145,6 @@ def _assumed(report: Report, robot: Robot) -> Iterator[str]:
         zones = ", ".join(f"{MM * zone:g}" for zone in robot.position_level_zones)
         yield f"corner zones of position levels 1 to 8: {zones} mm, as its file has them"
     else:
-        yield "corner zones: how far the controller cuts corners where it does not stop"
+        yield "corner zones: where nobody says how wide, half of a move is taken"
+    yield "rounded corners: no move is left before half-way, none overshot"
     yield "calibration: wheel, gripper and part are where the job says"

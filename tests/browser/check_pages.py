@@ -292,6 +292,11 @@ def test_a_line_of_the_program_leads_to_its_configuration_and_back(runs, opened)
         shown = one.page.evaluate("() => Array.from(window.opl.shown.q)")
         assert np.allclose(shown, run.program.moves[k].q, atol=1e-5)
         assert "now" in row.get_attribute("class").split()
+    one.page.locator("#program-0").press("ArrowUp")  # as with the pointer
+    shown = one.page.evaluate("() => Array.from(window.opl.shown.q)")
+    assert np.allclose(shown, run.program.moves[-2].q, atol=1e-5)
+    one.page.locator("#program-0").press("Tab")
+    assert np.allclose(one.page.evaluate("() => Array.from(window.opl.shown.q)"), shown)
 
 
 @pytest.mark.parametrize("name", ["good", "post", "trough"])
@@ -361,7 +366,7 @@ def test_a_batch_is_sorted_by_a_click(browser, runs, tmp_path):
         opl.BatchRow(out.parent / "job.yaml", run.status, 0, out, "", opl.make_report(run))
         for run, out in runs.values()
     ]
-    (tmp_path / "report.html").write_text(batch_page(rows, tmp_path))
+    (tmp_path / "report.html").write_text(batch_page(5 * rows, tmp_path))
     context = browser.new_context()
     page = context.new_page()
     page.goto((tmp_path / "report.html").as_uri())
@@ -371,6 +376,9 @@ def test_a_batch_is_sorted_by_a_click(browser, runs, tmp_path):
     assert status.all_inner_texts() == sorted(before)
     page.locator("thead button").nth(1).click()
     assert status.all_inner_texts() == sorted(before, reverse=True)
+    page.emulate_media(media="print")
+    assert sum(row.is_visible() for row in page.locator("tbody tr").all()) == 5 * len(rows)
+    page.emulate_media(media="screen")
     page.locator("tbody a").first.click()
     page.locator("body.ready").wait_for()
     context.close()

@@ -104,9 +104,9 @@ class Viewer {
       home.replaceChildren(...rows);
       home.addEventListener("keydown", (event) => {
         const moves = [...home.querySelectorAll<HTMLElement>(".move")];
-        const now = moves.findIndex((row) => row === this.now?.row);
-        const step = { ArrowDown: 1, ArrowUp: -1 }[event.key] ?? 0;
-        if (step !== 0) event.preventDefault();
+        const [now, step] = [moves.findIndex((row) => row === this.now?.row), { ArrowDown: 1, ArrowUp: -1 }[event.key] ?? 0];
+        if (step === 0) return;
+        event.preventDefault();
         moves[now + step]?.click();
       });
     });
