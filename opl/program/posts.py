@@ -82,7 +82,7 @@ class Reader:
     read: Callable[[Mapping[str, bytes], Robot, ProgramSettings], Reading]
     rounded: Callable[[Array, Robot, ProgramSettings], Array]
     start: Callable[[Robot], WrittenSpeed]
-    corners: Callable[[ProgramSettings], Corners]
+    corners: Callable[[ProgramSettings, Robot], Corners]
     describe: Callable[[str, bytes, Robot], list[str]]
     differences: Callable[[tuple[str, bytes], tuple[str, bytes], Robot], list[str]]
     nameable: Callable[[Array, Robot, ProgramSettings, float], NDArray[np.bool_]] = (

@@ -1,8 +1,8 @@
 """FANUC TP programs as text (.LS): written, read back.
 
 Positions are joint angles, of straight moves too, which leaves the controller no choice between
-configurations; moves carry their time in whole milliseconds. What is proven goes through the
-written points; the corners that CNT100 cuts off are not.
+configurations; moves carry their time in whole milliseconds. How far CNT100
+cuts off corners is not known in millimetres.
 
 On request straight moves carry the motion option RTCP (remote TCP): the origin of the user frame is
 a tool that stands, and the speed is that between it and the part (FANUC, teach pendant programming,

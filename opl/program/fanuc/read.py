@@ -1,7 +1,8 @@
 """Reading FANUC TP programs as text: J and L moves to positions given as joint angles.
 
 In a user frame the program has a tool that stands at its origin, and every L move has to say so
-(RTCP); user frame 0 has none. CNT is read, not played: the corners it cuts off are not replayed.
+(RTCP); user frame 0 has none. How far CNT cuts off corners is not
+known in millimetres.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """ABB RAPID modules (IRC5 and later): written, read back.
 
 Joint moves carry their time and lead to joint angles; straight ones lead the part past a stationary
-tool at the wheel, to poses of it in the part, at the speed over the part. What is proven goes
-through the written points; the corners that zone z0 cuts off, up to 0.3 mm of the tool point, are
-not.
+tool at the wheel, to poses of it in the part, at the speed over the part. Corners are
+cut off within z0, 0.3 mm of the tool point.
 """
 
 from opl.program.digits import rounded_degrees
