@@ -14,12 +14,14 @@ The file runs alone: copied into a plug-in it needs no opl, so versions never me
 
 from __future__ import annotations
 
+import http.client
 import json
 import urllib.error
 import urllib.parse
 import urllib.request
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -224,20 +226,30 @@ class Client:
             content: bytes = answer.read()
             return content
 
-    def _answer(self, request: urllib.request.Request, wait: float) -> Any:
+    @contextmanager
+    def _answer(self, request: urllib.request.Request, wait: float) -> Iterator[Any]:
+        """Yield an answer to be read; what breaks off meanwhile is told as a `ServiceError`."""
         try:
-            return urllib.request.urlopen(request, timeout=wait)
+            with urllib.request.urlopen(request, timeout=wait) as answer:
+                yield answer
         except urllib.error.HTTPError as error:
-            content = error.read()
-            try:
-                told = json.loads(content)
-                where, message = str(told["where"]), str(told["message"])
-            except (ValueError, KeyError, TypeError):
-                where, message = "", content.decode("utf-8", "replace")[:200]
-            raise ServiceError(error.code, where, message) from error
-        except OSError as error:
+            raise _refusal(error) from error
+        except (OSError, http.client.HTTPException) as error:
             reason = getattr(error, "reason", error)
             raise ServiceError(0, self._address, f"does not answer: {reason}") from error
+
+
+def _refusal(error: urllib.error.HTTPError) -> ServiceError:
+    """Return what the service says against a request."""
+    try:
+        content = error.read()
+    except (OSError, http.client.HTTPException):  # it does not wait until all has been sent
+        return ServiceError(error.code, "", str(error.reason))
+    try:
+        told = json.loads(content)
+        return ServiceError(error.code, str(told["where"]), str(told["message"]))
+    except (ValueError, KeyError, TypeError):
+        return ServiceError(error.code, "", content.decode("utf-8", "replace")[:200])
 
 
 def _job(found: Mapping[str, Any]) -> RemoteJob:

@@ -65,6 +65,7 @@ HOMES = {
         "cell/separating",
         "search",
         "motion/fewest",
+        "motion/corner_error",
         "motion/line_error",
     },
 }

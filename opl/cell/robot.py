@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -180,16 +180,13 @@ def link_names(robot: Robot) -> tuple[str, ...]:
 def collision_shapes(robot: Robot) -> tuple[pin.Model, pin.GeometryModel]:
     """Return the joints of a robot and the shapes they move, new ones at each call."""
     model = pin.buildModelFromUrdf(str(robot.urdf))
-    shapes = pin.buildGeomFromUrdf(
-        model,
-        str(robot.urdf),
-        pin.GeometryType.COLLISION,
-        package_dirs=[str(robot.urdf.parent)],  # where relative names of meshes start
-    )
+    shapes = pin.GeometryModel()  # one that pinocchio makes itself is never let go of
+    places = [str(robot.urdf.parent)]  # where relative names of meshes start
+    pin.buildGeomFromUrdf(model, str(robot.urdf), pin.GeometryType.COLLISION, shapes, places)
     return model, shapes
 
 
-@cache
+@lru_cache(maxsize=16)  # a service may see a robot of its own in each job
 def _model(urdf: Path) -> pin.Model:
     return pin.buildModelFromUrdf(str(urdf))
 

@@ -92,6 +92,8 @@ def _facts(report: opl.Report, job: opl.Job) -> Iterator[str]:
                 f"read back from {', '.join(found.file.files)}: {found.file.postures} "
                 "configurations, moves and speeds as proven"
             )
+            if found.file.corners is not None:
+                yield _corners(vars(found.file.corners))
             if job.program.one_job_per_pass:
                 yield "each pass is a job from home to home: it may be left out or repeated"
     if program is not None:
@@ -137,6 +139,20 @@ def _extremes(found: Mapping[str, Any], joint_names: Sequence[str]) -> Iterator[
             yield f"  {what}: {amount}, {place.subject}, {place.place}, at {angles} deg"
 
 
+def _corners(found: Mapping[str, Any]) -> str:
+    """Say what was proven of corners, and what that rests on."""
+    unknown, where = found["zones_unknown"], found["max_contact_error_at"]
+    zones = f", half of each move for {unknown} whose zone nobody knows" if unknown else ""
+    return (
+        f"{found['rounded']} corners, rounded anyhow within their zones{zones}: contact error "
+        f"{found['max_contact_error_mm']:.3f} mm at most of {found['allowed_contact_error_mm']:g} "
+        f"mm allowed{where and f', {where}'}, where the part meets and leaves the belt "
+        f"{found['max_contact_error_at_ends_mm']:.3f} mm (not limited); clearances, depth in the "
+        "belt and order hold. Assumed of the controller: it leaves no move before half-way, and "
+        "does not overshoot"
+    )
+
+
 def show_proof(report: Mapping[str, Any], robot: str, joint_names: Sequence[str]) -> None:
     """Print what was proven of a program, or how far the proof came.
 
@@ -155,6 +171,9 @@ def show_proof(report: Mapping[str, Any], robot: str, joint_names: Sequence[str]
             f"replayed in {_REPLAYED.format(**report)}",
             *_extremes(report, joint_names),
         ]
+    corners, faults = report["corners"], {one["kind"] for one in report["findings"]}
+    if corners is not None and "corner" not in faults:
+        lines.append(_corners(corners))
     lines += _caution(report["unverified_pulse_ratios"], robot, "the proof rests on them")
     if report["as_written"] is None:
         lines.append("no result.json beside it tells whether opl run wrote these very bytes")

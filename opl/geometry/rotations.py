@@ -24,6 +24,29 @@ def from_rotation_vector(turn: Array) -> Array:
     return np.asarray(Rotation.from_rotvec(turn).as_matrix())
 
 
+def turn_of_change(turn: Array) -> Array:
+    """Return how a small change of a rotation vector turns the frame about its own axes.
+
+    The right Jacobian of the exponential map (Solà et al., "A micro Lie theory", 2018, eq. 143).
+
+    Args:
+        turn: Axis times angle in [rad], shape (3,).
+
+    Returns:
+        Shape (3, 3).
+    """
+    angle = float(np.linalg.norm(turn))
+    x, y, z = turn
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # (1 - cos a) / a^2 and (a - sin a) / a^3, by their series where those lose their digits
+    if angle < 1e-3:
+        first, second = 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
+    else:
+        first = (1.0 - np.cos(angle)) / angle**2
+        second = (angle - np.sin(angle)) / angle**3
+    return np.asarray(np.eye(3) - first * cross + second * cross @ cross)
+
+
 def quaternion(R: Array) -> Array:
     """Return the quaternion (x, y, z, w), w not negative, of a rotation of shape (3, 3)."""
     from scipy.spatial.transform import Rotation

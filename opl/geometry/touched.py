@@ -24,7 +24,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from opl.geometry.frames import Array, inverse, pose, rotation_angle, transform
-from opl.geometry.rotations import from_rotation_vector
+from opl.geometry.rotations import from_rotation_vector, turn_of_change
 
 KINDS = ("left_edge", "right_edge", "front", "axle", "rim", "left_side", "right_side")
 DEGREES_OF_FREEDOM = 6
@@ -228,4 +228,11 @@ def _fit(rows: _Equations, T_base_start: Array) -> Array:
     def values(change: Array) -> Array:
         return rows.values(rows.seen_from(moved(change)))
 
-    return moved(least_squares(values, np.zeros(6), method="lm", xtol=1e-12, ftol=1e-15).x)
+    def slopes(change: Array) -> Array:
+        T_base_moved = moved(change)
+        own = rows.jacobian(rows.seen_from(T_base_moved))  # about and along its own axes
+        R = T_base_start[:3, :3].T @ T_base_moved[:3, :3]
+        return np.hstack([own[:, :3] @ turn_of_change(change[:3]), own[:, 3:] @ R.T])
+
+    fit = least_squares(values, np.zeros(6), slopes, method="lm", xtol=1e-12, ftol=1e-15)
+    return moved(fit.x)

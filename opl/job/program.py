@@ -17,14 +17,20 @@ from opl.geometry.frames import Array
 from opl.job import keys
 from opl.job.actions import ActionSection
 from opl.job.bodies import Matrix, pose_of
+from opl.job.move_kinds import Percents, PositionLevels
 from opl.job.refusals import keys_named
 from opl.job.source import Source
+from opl.job.stationary_tool import (
+    is_led_past_one,
+    require_stationary_tool,
+    stationary_tool_of,
+)
 from opl.job.user_frame import UserFrameSection
 from opl.job.workpiece import GripperSection
 from opl.program.actions import Actions
 from opl.program.export import try_out
 from opl.program.led import StationaryTool
-from opl.program.posts import Post, find_post, known_posts
+from opl.program.posts import Post, StationaryTools, find_post, known_posts
 from opl.program.ratios import with_ratios
 from opl.program.settings import (
     ByKind,
@@ -39,39 +45,6 @@ _YASKAWA_ONLY = (
     *("positions", "user_frame"),
     *("position_levels", "acceleration_percent", "deceleration_percent", "one_job_per_pass"),
 )
-
-_Level = Annotated[int, Field(ge=0, le=8)]
-_Percent = Annotated[int, Field(ge=1, le=100, json_schema_extra={"unit": "%"})]
-
-
-class _PositionLevels(Document):
-    """Position level (PL) of each kind of move: how far its corners may be rounded.
-
-    At 0 the robot stops at the position, at 8 it rounds most.
-    """
-
-    model_config = ConfigDict(title="Position levels")
-    renamed: ClassVar[Mapping[str, str]] = {"air": "free_move"}
-
-    on_wheel: _Level = Field(default=1, description="While grinding.")
-    lead: _Level = Field(default=1, description="Approach and retract.")
-    free_move: _Level = Field(default=1, description="From and to home, and between passes.")
-
-
-class _Percents(Document):
-    """A ramp for each kind of move, in percent of the controller's own; else the controller's."""
-
-    model_config = ConfigDict(title="Ramp percents")
-    renamed: ClassVar[Mapping[str, str]] = {"air": "free_move"}
-
-    on_wheel: _Percent | None = Field(default=None, description="While grinding.")
-    lead: _Percent | None = Field(default=None, description="Approach and retract.")
-    free_move: _Percent | None = Field(
-        default=None, description="From and to home, and between passes."
-    )
-
-    def in_si(self) -> ByKind:
-        return ByKind(self.on_wheel, self.lead, self.free_move)
 
 
 class ProgramSection(Document):
@@ -99,6 +72,14 @@ class ProgramSection(Document):
         "that stays near the verified path; else joint moves, in KRL straight ones: its joint "
         "speeds are whole percents, too coarse for the feed.",
     )
+    stationary_tool: bool | None = Field(
+        default=None,
+        description="Straight moves lead the part past a tool point that stands at the wheel "
+        "(contact frame 0), so that their speed is that over the part: the surface feed where the "
+        "part is ground there. In RAPID unless false. In FANUC if true: needs the option Remote "
+        "TCP (RTCP), and `user_frame` set on the controller as the program says. URScript has "
+        "none; what KRL ($IPO_MODE #TCP) and INFORM (an option) make of positions is not public.",
+    )
     positions: Literal["pulses", "base", "robot", "user"] = Field(
         default="pulses",
         description="Positions as encoder pulses, or as poses in the base, robot or user frame. "
@@ -107,7 +88,7 @@ class ProgramSection(Document):
     user_frame: UserFrameSection | None = Field(
         default=None,
         description="The frame of `positions: user`, else user frame 1 at the wheel: touched up, "
-        "it takes the whole program along, home included.",
+        "it takes the whole program along, home included. In FANUC that of `stationary_tool`.",
     )
     pulse_ratios: str | None = Field(
         default=None,
@@ -118,16 +99,16 @@ class ProgramSection(Document):
         default=[],
         description="Names of joints whose pulse ratios nobody has verified and you accept.",
     )
-    position_levels: _PositionLevels = Field(
-        default=_PositionLevels(),
+    position_levels: PositionLevels = Field(
+        default=PositionLevels(),
         description="Position level (PL) of each kind of move. For Yaskawa controllers.",
     )
-    acceleration_percent: _Percents = Field(
-        default=_Percents(),
+    acceleration_percent: Percents = Field(
+        default=Percents(),
         description="Acceleration (ACC) of each kind of move. For Yaskawa controllers.",
     )
-    deceleration_percent: _Percents = Field(
-        default=_Percents(),
+    deceleration_percent: Percents = Field(
+        default=Percents(),
         description="Deceleration (DEC) of each kind of move. For Yaskawa controllers.",
     )
     one_job_per_pass: bool = Field(
@@ -165,8 +146,8 @@ class ProgramSection(Document):
 
     @model_validator(mode="after")
     def _fits(self) -> ProgramSection:
-        if self.positions != "user" and self.user_frame is not None:
-            raise ValueError("user_frame goes with positions: user only")
+        if self.user_frame is not None and self.positions != "user" and not self.stationary_tool:
+            raise ValueError("user_frame goes with positions: user only, in FANUC stationary_tool")
         return self
 
     def _form(self, post: Post) -> MotionForm:
@@ -227,19 +208,21 @@ class ProgramSection(Document):
         self, source: Source, post: Post, at_wheel: StationaryTool, load: Load | None
     ) -> ProgramSettings:
         levels, tool = self.position_levels, self.T_flange_tool_mm
-        stands = post.knows_stationary_tools and self._form(post) is MotionForm.STRAIGHT
-        frame = self.user_frame
-        if frame is None and self.positions == "user":
-            frame = UserFrameSection.model_validate({})
+        frame, stationary = None, None
+        if is_led_past_one(self.stationary_tool, post, self._form(post)):
+            stationary, frame = stationary_tool_of(self.user_frame, post, at_wheel)
+        elif self.positions == "user":
+            section = self.user_frame or UserFrameSection.model_validate({})
+            frame = section.in_si(at_wheel.T_base_tool)
         actions = (self.at_start, self.before_pass, self.after_pass, self.at_end)
         return ProgramSettings(
             controller=self.controller,
             tool=self.tool,
             T_flange_tool=np.eye(4) if tool is None else pose_of(tool),
             motion=self._form(post),
-            stationary=at_wheel if stands else None,
+            stationary=stationary,
             positions=PositionForm(self.positions),
-            user_frame=None if frame is None else frame.in_si(at_wheel.T_base_tool),
+            user_frame=frame,
             levels=ByKind(levels.on_wheel, levels.lead, levels.free_move),
             acceleration=self.acceleration_percent.in_si(),
             deceleration=self.deceleration_percent.in_si(),
@@ -257,7 +240,11 @@ class ProgramSection(Document):
 
     def _require_possible(self, source: Source, post: Post, robot: Robot) -> None:
         """Refuse another maker's arm, and keys that the post would pass over in silence."""
-        led = self._form(post) is MotionForm.STRAIGHT and not post.knows_stationary_tools
+        form = self._form(post)
+        if self.stationary_tool:
+            require_stationary_tool(source, post, form)
+        past_one = is_led_past_one(self.stationary_tool, post, form)
+        led = form is MotionForm.STRAIGHT and not past_one
         if (led or self.positions != "pulses") and self.tool and not self.T_flange_tool_mm:
             raise InputError(
                 source.at(keys.PROGRAM_TOOL_POSE),
@@ -280,8 +267,9 @@ class ProgramSection(Document):
                     f"an arm with a spherical wrist, which {robot.title} has not",
                 )
             return
+        in_frame = post.stationary_tools is StationaryTools.IN_FRAME
         for key in _YASKAWA_ONLY:
-            if key in self.model_fields_set:
+            if key in self.model_fields_set and not (in_frame and key == "user_frame"):
                 raise InputError(
                     source.at(f"program.{key}"), f"is for Yaskawa controllers, not for {post.title}"
                 )

@@ -14,8 +14,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from opl.motion.corner_error import rounded_off
 from opl.motion.gradual import LEAST_COUNTED
-from opl.motion.line_error import Run, Screws, rounded_off, straight_off
+from opl.motion.line_error import Run, Screws, straight_off
 
 _SHORT = 1 << 20  # what a line shorter in time than the controller follows counts for, in lines
 _NEVER = 1 << 60  # what no chain is as dear as
@@ -29,17 +30,20 @@ class ChainRule:
         shortest: Least time of a line in [s]; one that cannot but be shorter counts for many.
         ratio: Largest ratio of the speeds of neighbouring lines, as `opl.motion.gradual` has them;
             where neighbours in the run differ by more, their lines may.
-        cut: Share of a line that may be cut off where a corner is rounded, at either end; 0 for
-            exact corners.
+        zone: How far from a corner in [m] of the tool point a controller may leave its lines, no
+            earlier than half-way; 0 for exact corners.
+        corner: How far from the wheel's surface that may take the contact, in [m]; where nothing
+            lies between neighbours in the run, their corner may be as it is.
     """
 
     shortest: float
     ratio: float = np.inf
-    cut: float = 0.0
+    zone: float = 0.0
+    corner: float = np.inf
 
 
 def fewest(
-    screws: Screws, run: Run, rule: ChainRule, blocked: frozenset[tuple[int, int]] = frozenset()
+    screws: Screws, run: Run, rule: ChainRule, blocked: frozenset[tuple[int, ...]] = frozenset()
 ) -> NDArray[np.intp] | None:
     """Return the fewest configurations that do, in order, the first and the last among them.
 
@@ -50,14 +54,19 @@ def fewest(
         screws: The arm.
         run: The run, two configurations at least.
         rule: What the chain has to keep.
-        blocked: Lines that may not be taken, by the indices of their ends.
+        blocked: What may not be taken: lines by the indices of their ends, and corners by where
+            their lines come from, meet and lead to.
 
     Returns:
         Indices in the run; None if no chain keeps the rule.
     """
-    barred = np.array(sorted(blocked), dtype=np.int64).reshape(-1, 2)
+    lines, corners = (
+        np.array(sorted(one for one in blocked if len(one) == n), dtype=np.int64).reshape(-1, n)
+        for n in (2, 3)
+    )
     arm = screws.axes, screws.T_base_flange
-    chain = _chain(*arm, *run.arrays, rule.shortest, rule.ratio, rule.cut, barred)  # type: ignore[call-arg]
+    limits = rule.shortest, rule.ratio, rule.zone, rule.corner
+    chain = _chain(*arm, *run.arrays, *limits, lines, corners)  # type: ignore[call-arg]
     return chain.astype(np.intp) if len(chain) else None
 
 
@@ -119,8 +128,9 @@ def _even(pace, i, j, k, ratio):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _chain(  # type: ignore[no-untyped-def]
-    axes, T0, q, places, targets, freedom, room, allowed, pace, shortest, ratio, cut, barred
-):
+    axes, T0, q, places, targets, freedom, room, allowed, pace, tool,
+    shortest, ratio, zone, most, barred, wide,
+):  # fmt: skip
     """Return the best chain; empty if there is none. A line is charged for with all before it."""
     starts, first, errors = _lines(
         axes, T0, q, places, targets, freedom, room, allowed, pace, barred
@@ -139,12 +149,15 @@ def _chain(  # type: ignore[no-untyped-def]
                 corner = 0.0
                 if not _even(pace, starts[ahead], j, k, ratio):
                     continue
-                if cut > 0.0:
+                if zone > 0.0 and k > starts[ahead] + 2:
                     corner = rounded_off(
-                        axes, T0, q, places, targets, freedom, room, allowed,
-                        starts[ahead], j, k, cut,
-                    )  # fmt: skip
-                if corner <= 1.0:
+                        axes, T0, q, places, targets, freedom, tool, starts[ahead], j, k, zone
+                    )
+                refused = corner > most
+                for b in range(len(wide)):
+                    here = wide[b, 0] == starts[ahead] and wide[b, 1] == j
+                    refused |= here and wide[b, 2] == k
+                if not refused:
                     cost[line] = cost[ahead] + own
                     largest[line] = max(largest[ahead], errors[line])
                     before[line] = ahead

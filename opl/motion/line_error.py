@@ -26,7 +26,6 @@ _AHEAD = 1e-3  # of a line, for the derivative along it
 _PACE = 0.04
 _SLOWER = 0.3
 _ROUND_OFF = 5e-4  # [s] that the digits of a position leave of the time of a short way
-_CORNER_SHARES = (0.25, 0.5, 0.75)  # of the way across a corner that is cut
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +42,7 @@ class Run:
         pace: Three times since the start in [s], shape (n, 3): that it takes through all of the
             configurations, the least that the process allows, and that of the ground point at the
             feed.
+        tool: The tool point that zones are counted by, in [m], shape (n, 3).
     """
 
     q: Array
@@ -52,6 +52,7 @@ class Run:
     room: Array
     allowed: Array
     pace: Array
+    tool: Array
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -100,21 +101,8 @@ def line_errors(screws: Screws, run: Run, start: int, end: int) -> tuple[Array, 
     """
     shares, errors = np.empty((2, end - start - 1))
     arm = screws.axes, screws.T_base_flange
-    _along(*arm, *run.arrays, start, end, shares, errors)  # type: ignore[call-arg]
+    _along(*arm, *run.arrays[:-1], start, end, shares, errors)  # type: ignore[call-arg]
     return shares, errors
-
-
-def corner_error(screws: Screws, run: Run, corner: tuple[int, int, int], cut: float) -> float:
-    """Return how far off a rounded corner is at the most, as a multiple of what is allowed.
-
-    Args:
-        screws: The arm.
-        run: The run.
-        corner: Where the line comes from, turns and leads to.
-        cut: Share of either line that may be cut off.
-    """
-    arm = screws.axes, screws.T_base_flange
-    return float(rounded_off(*arm, *run.arrays[:-1], *corner, cut))  # type: ignore[call-arg]
 
 
 @njit(cache=True)
@@ -139,7 +127,7 @@ def _flange(axes, T0, q, T):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _off(axes, T0, q, place, target, T, off):  # type: ignore[no-untyped-def]
+def off_target(axes, T0, q, place, target, T, off):  # type: ignore[no-untyped-def]
     """Put how far a place is from its target, seen from there, into off, shape (6,)."""
     _flange(axes, T0, q, T)
     d0, d1, d2 = T[0, 3] - target[0, 3], T[1, 3] - target[1, 3], T[2, 3] - target[2, 3]
@@ -181,13 +169,13 @@ def _pass_by(axes, T0, q, places, targets, freedom, room, pace, i, j, k, least, 
     for step in range(3):
         for c in range(6):
             point[c] = q[i, c] + s * (q[j, c] - q[i, c])
-        _off(axes, T0, point, places[k], targets[k], T, off)
+        off_target(axes, T0, point, places[k], targets[k], T, off)
         if step == 2:
             break
         if step == 0:
             for c in range(6):
                 point[c] += _AHEAD * (q[j, c] - q[i, c])
-            _off(axes, T0, point, places[k], targets[k], T, ahead)
+            off_target(axes, T0, point, places[k], targets[k], T, ahead)
             for c in range(6):
                 ahead[c] = (ahead[c] - off[c]) / _AHEAD
         along = squared = 0.0
@@ -251,43 +239,3 @@ def _keeps_pace(pace, i, j, k, share):  # type: ignore[no-untyped-def]
     return takes >= least / (1.0 + _PACE) - _ROUND_OFF and takes <= planned * (1.0 + most) + (
         _ROUND_OFF
     )
-
-
-@njit(cache=True)
-def rounded_off(axes, T0, q, places, targets, freedom, room, allowed, i, j, k, cut):  # type: ignore[no-untyped-def]
-    """Return how far off the corner at j is if it is cut, as a multiple of what is allowed."""
-    T, point, off, other = np.empty((3, 4)), np.empty(6), np.empty(6), np.empty(6)
-    worst = 0.0
-    for share in _CORNER_SHARES:
-        for c in range(6):
-            before, after = q[i, c] - q[j, c], q[k, c] - q[j, c]
-            point[c] = q[j, c] + cut * ((1.0 - share) * before + share * after)
-        # walk to the place that is nearest
-        m, step = j, 0
-        _off(axes, T0, point, places[m], targets[m], T, off)
-        nearest = np.square(off).sum()
-        for way in (-1, 1):
-            while i <= m + way <= k and step != -way:
-                _off(axes, T0, point, places[m + way], targets[m + way], T, other)
-                found = np.square(other).sum()
-                if found >= nearest:
-                    break
-                m, nearest, step = m + way, found, way
-                off[:] = other
-        least = _left(off, freedom[m], room[m]) / allowed[m]
-        for side in (m - 1, m + 1):
-            if not i <= side <= k:
-                continue
-            _off(axes, T0, point, places[side], targets[side], T, other)
-            along = squared = 0.0
-            for c in range(6):
-                along -= off[c] * (other[c] - off[c])
-                squared += (other[c] - off[c]) ** 2
-            s = min(max(along / squared, 0.0), 1.0) if squared > 0.0 else 0.0
-            for c in range(6):
-                other[c] = off[c] + s * (other[c] - off[c])
-            near = m if s < 0.5 else side
-            limit = min(allowed[m], allowed[side]) if s > 0.0 else allowed[m]
-            least = min(least, _left(other, freedom[near], room[near]) / limit)
-        worst = max(worst, least)
-    return worst

@@ -8,7 +8,7 @@ is what the written positions make of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,15 +22,20 @@ from opl.geometry.wheel import MM_PER_M, ContactWheel
 from opl.motion.collision_check import colliding_moves
 from opl.motion.fewest import ChainRule, fewest
 from opl.motion.gradual import PLANNED_RATIO
-from opl.motion.line_error import LEVER, ROLLS, SLIDES, Run, line_errors, screws_of
+from opl.motion.line_error import LEVER, ROLLS, SLIDES, Run, Screws, line_errors, screws_of
 from opl.motion.motion import Motion
 from opl.motion.process_settings import ProcessSettings
 from opl.motion.timing import on_wheel, time_motion
 from opl.planning.scene import PlanningScene
+from opl.planning.speed_steps import with_moves_cut
 
 # Part of the allowed contact error that is used: between the places that are looked at, and in the
 # proof, which looks at others, a little more is found.
 USED = 0.95
+# The same of rounded corners, which are looked at as the proof does, at fewer places.
+USED_AT_CORNERS = 0.99
+# Times that moves are halved next to a corner that is too wide: what is left then is for the proof.
+HALVINGS = 3
 # Speeds of neighbouring lines may differ by two steps of `opl.motion.gradual`, and the faster one
 # is slowed then: a position for every step would cost more than the time it saves.
 STEPS_AT_ONCE = PLANNED_RATIO**2
@@ -45,11 +50,26 @@ class PositionRule:
         max_chord_error: What of it is spent on the surface between two cutter points, in the middle
             of which it is largest, in [m].
         shortest: Least time of a move on the wheel that the controller follows, in [s].
+        zone: How far from a written position on the wheel in [m] the controller may leave its move,
+            infinite where nobody knows; no earlier than half-way.
+        tool_points: Gives the tool point that the zone counts by, at configurations (n, 6) in [m],
+            shape (n, 3).
+        too_wide: Gives the corners between moves on the wheel that the proof would not let pass, by
+            the indices of three written configurations each.
     """
 
     max_contact_error: float
     max_chord_error: float
     shortest: float
+    zone: float
+    tool_points: Callable[[Array], Array]
+    too_wide: Callable[[Motion], Iterable[tuple[int, int, int]]]
+
+    @property
+    def chain(self) -> ChainRule:
+        """What each chain of lines has to keep."""
+        corner = USED_AT_CORNERS * self.max_contact_error
+        return ChainRule(self.shortest, STEPS_AT_ONCE, self.zone, corner)
 
     def allowed(self, place: Array) -> Array:
         """Return how far off a line may be at fractional cutter points in [m], shape (n,)."""
@@ -78,13 +98,13 @@ def with_fewest_positions(
         UnsafeError: If there are none on some pass: only where the motion itself breaks the rule.
     """
     screws = screws_of(scene.cell.robot)
-    blocked: dict[int, frozenset[tuple[int, int]]] = {}
+    blocked: dict[int, frozenset[tuple[int, ...]]] = {}
     chosen: dict[int, NDArray[np.intp]] = {}
     runs = dict(on_wheel_runs(scene.cell, points, motion, process, rule))
     stale = list(runs)
     while stale:
-        for first in stale:
-            run, chain = runs[first], ChainRule(rule.shortest, STEPS_AT_ONCE)
+        for first in dict.fromkeys(stale):
+            run, chain = runs[first], rule.chain
             found = fewest(screws, run, chain, blocked.get(first, frozenset()))
             if found is None:
                 index = motion.pass_index[first] + 1
@@ -94,20 +114,43 @@ def with_fewest_positions(
         for first, run in runs.items():
             written[first : first + len(run.q)] = False
             written[chosen[first]] = True
-        thinned = replace(motion, written=written)
+        thinned = _on_lines(screws, runs, chosen, replace(motion, written=written))
         stale = []
-        for first, last in _colliding_lines(scene, thinned):
-            of = max(start for start in runs if start <= first)
-            line = first - of, last - of
-            if last - first > 1 and line not in blocked.get(of, frozenset()):
-                blocked[of] = blocked.get(of, frozenset()) | {line}
+        hitting = [line for line in _colliding_lines(scene, thinned) if line[1] - line[0] > 1]
+        # of neighbouring configurations there are none to put in between
+        wide = [turn for turn in rule.too_wide(thinned) if turn[2] - turn[0] > 2]
+        for taken in (*hitting, *wide):
+            of = max(start for start in runs if start <= taken[0])
+            refused = tuple(row - of for row in taken)
+            if refused not in blocked.get(of, frozenset()):
+                blocked[of] = blocked.get(of, frozenset()) | {refused}
                 stale.append(of)
+    return thinned
+
+
+def with_shorter_moves(motion: Motion, corners: Iterable[tuple[int, int, int]]) -> Motion:
+    """Return a motion with configurations in the middle of its moves on the wheel next to corners.
+
+    They lie on the lines, so they move nothing; but no corner is cut off beyond half of a move.
+    `corners` are indices of three configurations each.
+    """
+    moves = {move for first, _, last in corners for move in range(first + 1, last + 1)}
+    return with_moves_cut(motion, {move: np.array([0.5]) for move in sorted(moves)})
+
+
+def _on_lines(
+    screws: Screws,
+    runs: Mapping[int, Run],
+    chosen: Mapping[int, NDArray[np.intp]],
+    motion: Motion,
+) -> Motion:
+    """Return a motion whose configurations between those chosen lie on the lines between them."""
     q = motion.q.copy()
     for first, run in runs.items():
         for start, end in zip(chosen[first][:-1], chosen[first][1:], strict=True):
             shares, _ = line_errors(screws, run, start - first, end - first)
             q[start + 1 : end] = q[start] + shares[:, None] * (q[end] - q[start])
-    return replace(thinned, q=q)
+    return replace(motion, q=q)
 
 
 def on_wheel_runs(
@@ -131,6 +174,7 @@ def on_wheel_runs(
             *_freedom(cell.wheel, t),
             rule.allowed(place),
             pace[rows] - pace[rows[0]],
+            rule.tool_points(motion.q[rows]),
         )
         yield int(rows[0]), run
 

@@ -6,7 +6,7 @@ all of it slow. What is put in lies on the line of the move, so it moves nothing
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -37,7 +37,7 @@ def with_speed_steps(
         cuts = dict(_cuts(motion, points, process, robot))
         if not cuts:
             break
-        motion = _cut(motion, cuts)
+        motion = with_moves_cut(motion, cuts)
     return motion
 
 
@@ -69,8 +69,11 @@ def _piece_ends(slow: float, fast: float) -> Array:
     return np.asarray(np.cumsum(slow * PLANNED_RATIO ** np.arange(1, steps + 1)) * PIECE)
 
 
-def _cut(motion: Motion, cuts: dict[int, Array]) -> Motion:
-    """Return the motion with configurations on the lines of its moves."""
+def with_moves_cut(motion: Motion, cuts: Mapping[int, Array]) -> Motion:
+    """Return the motion with configurations on the lines of its moves on the wheel.
+
+    `cuts` are fractions of each move, ascending, by its index, which ascends as well.
+    """
     before = np.concatenate([np.full(len(shares), move) for move, shares in cuts.items()])
     share = np.concatenate(list(cuts.values()))
 

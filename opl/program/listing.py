@@ -80,7 +80,9 @@ def listing_reader(
     def differences(first: tuple[str, bytes], second: tuple[str, bytes], robot: Robot) -> list[str]:
         return changed_lines(_meaning(parsed(*first), robot), _meaning(parsed(*second), robot))
 
-    return Reader(suffix, read, rounded, start, lambda settings: corners, describe, differences)
+    return Reader(
+        suffix, read, rounded, start, lambda settings, robot: corners, describe, differences
+    )
 
 
 def _described(listing: Listing, robot: Robot) -> list[str]:

@@ -2,9 +2,8 @@
 
 A joint move turns all joints in step. A straight move leads the tool point along a line and turns
 the hand about one axis; here it becomes configurations so near to each other that turning the
-joints in step between them is the same. Corners are taken as written, not as the controller rounds
-them: the playback goes through every written point, and each move says how far its end may be
-rounded.
+joints in step between them is the same. The playback goes through
+every written point, and each move says how far its end may be rounded (`opl.proof.corners`).
 """
 
 from __future__ import annotations
@@ -79,10 +78,25 @@ class Corner:
     Attributes:
         size: In the language's own measure, 0 for an exact stop, infinite where nothing says.
         text: As in the file.
+        reach: How far in [m] the tool point is from the written position at the most where the
+            robot leaves its move, infinite where nobody knows.
     """
 
     size: float
     text: str
+    reach: float = np.inf
+
+    @property
+    def zone(self) -> float:
+        """How far in [m] from the written position the robot may leave its move, 0 for a stop."""
+        return 0.0 if self.exact_stop else self.reach
+
+    @property
+    def told(self) -> str:
+        """The corner and its zone, for people."""
+        if np.isinf(self.zone):
+            return f"{self.text} (zone not known, half of each move taken)"
+        return f"{self.text} (zone {1e3 * self.zone:g} mm)"
 
     @property
     def exact_stop(self) -> bool:

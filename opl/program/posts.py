@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
+from enum import Enum
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -81,7 +82,7 @@ class Reader:
     read: Callable[[Mapping[str, bytes], Robot, ProgramSettings], Reading]
     rounded: Callable[[Array, Robot, ProgramSettings], Array]
     start: Callable[[Robot], WrittenSpeed]
-    corners: Callable[[ProgramSettings], Corners]
+    corners: Callable[[ProgramSettings, Robot], Corners]
     describe: Callable[[str, bytes, Robot], list[str]]
     differences: Callable[[tuple[str, bytes], tuple[str, bytes], Robot], list[str]]
     nameable: Callable[[Array, Robot, ProgramSettings, float], NDArray[np.bool_]] = (
@@ -89,6 +90,14 @@ class Reader:
     )
     companions: tuple[str, ...] = ()
     ramps: Callable[[Purpose, ProgramSettings], str] = lambda kind, settings: ""
+
+
+class StationaryTools(Enum):
+    """Whether straight moves may lead the part past a tool that stands."""
+
+    NONE = "none that public manuals settle"
+    IN_FRAME = "on request, in a user frame that is set on the controller"
+    USUAL = "unless the job wants none"
 
 
 @dataclass(frozen=True)
@@ -103,7 +112,7 @@ class Post:
         variables: What its templates get: name and meaning.
         counts_pulses: Whether positions may be written in encoder pulses.
         motion: How moves on the wheel are written unless the job says so.
-        knows_stationary_tools: Whether straight moves lead the part past a tool that stands.
+        stationary_tools: Whether straight moves may lead the part past a tool that stands.
         reader: Reads its programs back; None where they are written and not read back.
         period: From one interpolated configuration to the next in [s]; 0 where nothing is known of
             it. No controller was asked: each says beside the number where it is from.
@@ -115,7 +124,7 @@ class Post:
     variables: Mapping[str, str]
     counts_pulses: bool = False
     motion: MotionForm = MotionForm.JOINT
-    knows_stationary_tools: bool = False
+    stationary_tools: StationaryTools = StationaryTools.NONE
     reader: Reader | None = None
     period: float = 0.0
 

@@ -88,7 +88,7 @@ class ProgramSettings:
         stationary: The tool at the wheel past which straight moves lead the part, None where the
             tool in the hand runs straight.
         positions: How positions are written.
-        user_frame: The frame of positions in a user frame.
+        user_frame: The frame of positions in a user frame, or that of a stationary tool.
         levels: How far corners may be rounded where the robot does not stop (PL of a Yaskawa).
         acceleration: Of each kind of move in percent of the controller's own ramp.
         deceleration: The same for slowing down.

@@ -14,6 +14,7 @@ from opl.job.load import Job
 from opl.motion.motion import TimedMotion
 from opl.program.posts import Reader, find_post, readers
 from opl.proof.common_shift import common_shift
+from opl.proof.corners import CornerProof, corner_proof
 from opl.proof.events import name_findings
 from opl.proof.written import written_findings
 from opl.verification.recognise import Rule, recognise
@@ -31,6 +32,7 @@ class Proof:
         timed: The motion as recognised and its times, None if the files do not tell one.
         verification: What the replay found, None without a motion.
         findings: What is wrong.
+        corners: What rounding leaves of it; None where the written points themselves are wrong.
     """
 
     files: tuple[str, ...]
@@ -39,6 +41,7 @@ class Proof:
     timed: TimedMotion | None
     verification: Verification | None
     findings: tuple[Finding, ...]
+    corners: CornerProof | None = None
 
     @property
     def ground(self) -> int:
@@ -97,7 +100,11 @@ def prove(
         *name_findings(job, reading.name),
     )
     moves = len(playback.moves)
-    return Proof(tuple(files), reading.foreign, moves, found.timed, replayed, findings)
+    if replayed.findings or found.findings:
+        return Proof(tuple(files), reading.foreign, moves, found.timed, replayed, findings)
+    corners = corner_proof(job, points, found.timed.motion, playback)
+    findings = (*findings, *corners.findings)
+    return Proof(tuple(files), reading.foreign, moves, found.timed, replayed, findings, corners)
 
 
 def reader_of(job: Job) -> Reader:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from opl.planning.positions import PositionRule
 from opl.program.moves import SAME_CONFIGURATION, Program
 from opl.program.played import Playback
 from opl.program.posts import find_post
+from opl.proof.corners import CornerProof, corner_proof, too_wide, tool_points_of
 from opl.proof.events import name_findings
 from opl.proof.prove import prove
 from opl.proof.written import written_findings
@@ -47,6 +49,7 @@ class FileProof:
         findings: What is wrong.
         places: File and line of the move to each configuration, for people; none where the files
             do not hold as many as were proven.
+        corners: What rounding leaves of them; None where something else is wrong.
     """
 
     files: tuple[str, ...]
@@ -56,6 +59,7 @@ class FileProof:
     replayed: bool
     findings: tuple[Finding, ...]
     places: tuple[str, ...] = ()
+    corners: CornerProof | None = None
 
     @property
     def proven(self) -> bool:
@@ -77,13 +81,18 @@ def in_file_digits(motion: Motion, job: Job) -> Motion:
     return replace(motion, q=reader.rounded(motion.q, job.cell.robot, job.program))
 
 
-def position_rule(job: Job) -> PositionRule:
+def position_rule(job: Job, points: CutterPoints) -> PositionRule:
     """Return what the written positions of a job have to keep."""
-    search = job.search
+    search, post = job.search, find_post(job.program.controller)
+    corners = None if post.reader is None else post.reader.corners(job.program, job.cell.robot)
+    zone = np.inf if corners is None else corners.on_wheel.zone
     return PositionRule(
         search.max_contact_error,
         search.max_contact_error - search.interpolation.max_contact_error,
-        find_post(job.program.controller).shortest_move,
+        post.shortest_move,
+        zone,
+        tool_points_of(job),
+        partial(too_wide, job, points, zone),
     )
 
 
@@ -130,19 +139,23 @@ def read_back(
     other_paths = difference > EXACT or len(kept.stations) < len(kept.q)
     findings = (*findings, *_differences(kept, program))
     if other_paths:
-        findings = (*findings, *prove(job, points, files).findings)
+        proof = prove(job, points, files)
+        findings, corners = (*findings, *proof.findings), proof.corners
     else:
         named = np.isin(np.arange(len(verified.motion)), configurations)
         motion = replace(verified.motion, written=named)
+        corners = corner_proof(job, points, motion, kept)
         findings = (
             *findings,
+            *corners.findings,
             *limit_findings(job.cell, TimedMotion(motion.take(configurations), kept.duration)),
             *written_findings(job, points, motion, kept, reader),
             *name_findings(job, reading.name),
         )
     apart = _apart(job, q, proven) if difference > EXACT else 0.0
     places = tuple(move.place for move in kept.moves)
-    return FileProof(tuple(files), len(q), rounding, apart, bool(other_paths), findings, places)
+    anew = bool(other_paths)
+    return FileProof(tuple(files), len(q), rounding, apart, anew, findings, places, corners)
 
 
 def _without_repeats(playback: Playback) -> Playback:

@@ -70,7 +70,10 @@ def _rounded_ends(
     job: Job, motion: Motion, playback: Playback, reader: Reader
 ) -> Iterator[Finding]:
     """Look at how far corners may be rounded, and for stops on the wheel: the belt digs in."""
-    corners, stops = reader.corners(job.program), motion.ends_phase & ~motion.on_wheel
+    corners, stops = (
+        reader.corners(job.program, job.cell.robot),
+        motion.ends_phase & ~motion.on_wheel,
+    )
     runs_on = corners.on_wheel.size > 0.0
     for k, move in enumerate(playback.moves):
         limit = corners.stop if stops[k] else corners.of(Purpose.of(motion.phase[k]))

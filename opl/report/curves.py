@@ -71,10 +71,10 @@ def limit(end: float, value: float, name: str = "limit") -> Line:
 
 
 def joint_panels(
-    timing: Timing, robot: Robot, fixed: Array | None, packer: Packer
+    timed: TimedMotion, robot: Robot, fixed: Array | None, packer: Packer
 ) -> list[dict[str, Any]]:
     """Return the joint angles: found, contact fixed, their range on the wheel, and limits."""
-    motion, times = timing.timed.motion, moments(timing.timed)
+    motion, times = timed.motion, moments(timed)
     ground, panels = motion.on_wheel, []
     q, end = np.rad2deg(motion.q), float(times[-1])
     for joint, name in enumerate(robot.joint_names):
@@ -141,10 +141,19 @@ def acceleration_panels(timing: Timing, robot: Robot, packer: Packer) -> list[di
     ]
 
 
-def feed_panels(timing: Timing, feed: float, robot: Robot, packer: Packer) -> list[dict[str, Any]]:
-    """Return the speed along the surface with what lowers it, and the contact position."""
-    timed, times = timing.timed, moments(timing.timed)
-    speed = MM * timing.surface_distance / np.maximum(timed.duration, SHORTEST)
+def feed_panels(
+    timing: Timing, passing: TimedMotion, feed: float, robot: Robot, packer: Packer
+) -> list[dict[str, Any]]:
+    """Return the speed along the surface with what lowers it, and the contact position.
+
+    Args:
+        timing: The moves from written to written configuration, and what sets their times.
+        passing: The same motion through all of its configurations.
+        feed: As set in [m/s].
+        robot: The robot.
+        packer: Takes the arrays.
+    """
+    times, speed = moments(timing.timed), MM * surface_speed(timing)
     causes = [
         AT_REST
         if np.isnan(distance)
@@ -160,11 +169,11 @@ def feed_panels(timing: Timing, feed: float, robot: Robot, packer: Packer) -> li
     slow = np.array([text.startswith("lowered") for text in causes])
     lines = [
         limit(float(times[-1]), MM * feed, "set"),
-        Line("found step", times, speed, "along the surface"),
+        Line("found step", times, speed, "along the surface, mean of a move"),
         Line("blame step", times, np.where(slow, speed, np.nan), "lowered"),
     ]
     labels = {"codes": packer.counts([names.index(text) for text in causes]), "names": names}
-    t = Line("found", times, timed.motion.contact_position, "t")
+    t = Line("found", moments(passing), passing.motion.contact_position, "t")
     return [
         panel(packer, "feed", "mm/s", lines, labels=labels),
         panel(packer, "contact position t", "mm on the flat, deg on the edges", [t]),
@@ -182,6 +191,11 @@ def clearance_panels(times: Array, nearest: Nearest, packer: Packer) -> list[dic
 def moments(timed: TimedMotion) -> Array:
     """Return when each configuration is reached in [s], shape (n,)."""
     return np.asarray(np.cumsum(timed.duration))
+
+
+def surface_speed(timing: Timing) -> Array:
+    """Return the mean speed of the ground point on each move in [m/s], NaN off the wheel."""
+    return timing.surface_distance / np.maximum(timing.timed.duration, SHORTEST)
 
 
 def _speeds(timed: TimedMotion) -> Array:

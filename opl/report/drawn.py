@@ -112,7 +112,7 @@ def drawn_passes(
 def painted(values: Array, unit: str, packer: Packer) -> dict[str, Any]:
     """Return colours for a value of each cutter point, grey for NaN, and what their ends stand for.
 
-    From dark to light evenly, so that they are told apart without hue and in print.
+    From dark to light evenly, so that they can be distinguished without hue and in print.
     """
     known = values[~np.isnan(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)

@@ -39,7 +39,7 @@ def view_frame(
     Args:
         heading: Of its section.
         views: From where it can be looked at.
-        paints: What the passes can be coloured by.
+        paints: What the passes can be coloured by, as they are at first before all others.
         boxes: What can be shown or left out; what is not named has no box.
         moving: Whether there is a motion to play.
     """
@@ -49,7 +49,7 @@ def view_frame(
         f'<input type="checkbox" id="{name}"{" checked" if on else ""}> {label}</label>'
         for name, (label, on) in BOXES.items()
     )
-    painted = {"none": PAINTS["none"], **{name: PAINTS[name] for name in paints}}
+    painted = {name: PAINTS[name] for name in paints}
     return section(
         "cell",
         heading,
@@ -73,7 +73,7 @@ def view_frame(
 
 def hover() -> str:
     """Return where the script says what the pointer is on."""
-    return '<p class="told" id="hover" aria-live="polite">&nbsp;</p>'
+    return '<p class="status" id="hover" aria-live="polite">&nbsp;</p>'
 
 
 def choice(name: str, label: str, options: dict[str, str]) -> str:

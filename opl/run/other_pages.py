@@ -11,7 +11,7 @@ from opl.job.cell import Cell
 from opl.report.drawn import drawn_cell, drawn_wheel, views, views_of_part
 from opl.report.html import bullets, page, section, text
 from opl.report.packing import Packer
-from opl.report.view_frame import hover, view_frame
+from opl.report.view_frame import view_frame
 from opl.run.descriptions import describe_cell
 from opl.run.page_data import EMPTY, joints_data, passes_data
 from opl.run.values import Surfaced
@@ -41,8 +41,7 @@ def points_page(surfaced: Surfaced, figures: str) -> str:
         [
             f"<header><h1>{text(job.name)}: what will be ground</h1>"
             f"<p>{text(figures)}</p></header>",
-            view_frame("The part", data["views"], paints, ["frames"], False),
-            hover(),
+            view_frame("The part", data["views"], ["pass", "ridge", "none"], ["frames"], False),
             bullets(["orange dots: no pass comes by here"] if len(missed) else []),
             section("warnings", "Warnings", bullets(map(str, surfaced.warnings))),
         ]
@@ -80,7 +79,6 @@ def cell_page(cell: Cell) -> str:
         [
             f"<header><h1>{text(name)}</h1></header>",
             view_frame("The cell", data["views"], [], ["section", "robot", "surroundings"], False),
-            hover(),
             section("words", "What it holds", bullets(describe_cell(cell))),
         ]
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from opl.cell.drawn_cell import drawn_solids
+from opl.cell.workcell import PART, WHEEL
 from opl.motion.motion import Motion
 from opl.planning.survey import NodeSurvey
 from opl.report.chart import NEAR_SINGULAR, chart_frame, chart_image, measured_clearance
@@ -18,6 +19,7 @@ from opl.report.view_frame import BOXES, choice, hover, view_frame
 from opl.run import page_tables, page_text
 from opl.run.page_data import (
     blocked_place,
+    colliding,
     extremes,
     move_to,
     moves_at,
@@ -53,14 +55,17 @@ def run_page(run: Written | Refused, report: Report) -> str:
     packer = Packer()
     data = run_data(prepared, found, packer)
     data["marks"] = _marks(run, prepared, found, report)
+    if {PART, WHEEL} & set(data["marks"].get("start", {}).get("hit", ())):  # seen from close by
+        data["views"] = {"contact": data["views"]["contact"], **data["views"]}
     job, survey = run.surfaced.job, (prepared if found is None else found).survey
     data["program"] = _program(run, packer)
     motion = None if found is None else found.timed.motion
+    paints = ["none", *data["paints"]]
     body = "\n".join(
         [
             page_text.verdict(report, job, data["marks"]),
             '<div class="bench">',
-            view_frame("The cell", data["views"], data["paints"], BOXES, found is not None),
+            view_frame("The cell", data["views"], paints, BOXES, found is not None),
             '<div class="rest">',
             bullets(
                 f"{name} is drawn with fewer triangles than it is proven with"
@@ -112,6 +117,9 @@ def _curves_section() -> str:
         "curves-section",
         "Curves",
         f'<div class="controls">{choice("curves-of", "show", CURVES)}</div>',
+        '<p class="screen">Blue: found; grey dashes: contact kept at t = 0; band: range on the '
+        "wheel; red dashes: limits, where a curve comes near; orange: feed lowered. Point to read, "
+        "click to pose the robot there.</p>",
         '<div id="curves"></div>',
     )
 
@@ -134,12 +142,15 @@ def _program(run: Written | Refused, packer: Packer) -> dict[str, object] | None
 
 def _program_section(run: Written | Refused) -> str:
     listings = "".join(
-        f'<h3>{text(name)}</h3><pre id="program-{k}" tabindex="0"></pre>'
+        f'<h3>{text(name)}</h3><pre id="program-{k}" tabindex="0" aria-label="{text(name)}"></pre>'
         for k, name in enumerate(_listed(run))
     )
     if not listings:
         return ""
-    hint = "A click on the line of a move poses the robot at its end; what is played is marked."
+    hint = (
+        "A click on the line of a move, or the arrow keys, pose the robot at its end; what is "
+        "played is marked."
+    )
     return section("program", "Program", f"<p>{hint}</p>", listings)
 
 
@@ -176,6 +187,8 @@ def _marks(
             place = blocked_place(reason, prepared.survey, prepared.problem.wheel_distance)
             if place is not None:
                 point, position = place
-                marks[f"reason-{k}"] = {"point": point, "t": float(t[position]), "text": reason}
+                at = {"point": point, "t": float(t[position])}
+                hit = colliding(prepared.survey, place)
+                marks[f"reason-{k}"] = {**at, "text": reason, "hit": hit}
     first = next((mark for name, mark in marks.items() if name.startswith("reason-")), None)
     return marks if first is None else {**marks, "start": first}

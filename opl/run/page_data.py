@@ -12,16 +12,17 @@ from opl.cell.collision import CollisionScene
 from opl.cell.drawn_cell import drawn_chain, drawn_solids
 from opl.cell.nearest import Nearest, nearest_pairs
 from opl.cell.robot import Robot
-from opl.cell.workcell import WorkCell
+from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.scallop import ridge_height
 from opl.motion.motion import Motion, MoveKind, TimedMotion
-from opl.planning.survey import NodeState, NodeSurvey
+from opl.planning.survey import CODES, NodeState, NodeSurvey
 from opl.report import curves
 from opl.report.chart import chart_cells
 from opl.report.drawn import drawn_cell, drawn_passes, drawn_wheel, painted, views
 from opl.report.packing import Packer
-from opl.run.result import PlaceReport, Report
+from opl.run.proof_result import PlaceReport
+from opl.run.result import Report
 from opl.run.values import Planned, Prepared, Surfaced
 
 MM, MICRONS = 1e3, 1e6
@@ -102,12 +103,12 @@ def run_data(prepared: Prepared, planned: Planned | None, packer: Packer) -> Dat
             "points": packer.floats(nearest.points),
             "pairs": [list(pair) for pair in nearest.pairs],
         }
-        robot, timing = scene.cell.robot, planned.timing
+        robot, timing, feed = scene.cell.robot, planned.timing, job.process.feed
         data["curves"] = {
-            "joints": curves.joint_panels(timing, robot, prepared.fixed.q, packer),
+            "joints": curves.joint_panels(planned.timed, robot, prepared.fixed.q, packer),
             "speeds": curves.speed_panels(timing, robot, packer),
             "accelerations": curves.acceleration_panels(timing, robot, packer),
-            "feed": curves.feed_panels(timing, job.process.feed, robot, packer),
+            "feed": curves.feed_panels(timing, planned.timed, feed, robot, packer),
             "clearance": curves.clearance_panels(times, nearest, packer),
         }
         data["paints"] = {**_paints(planned, times, nearest, packer), **data["paints"]}
@@ -133,6 +134,13 @@ def blocked_place(reason: str, survey: NodeSurvey, distance: Array) -> tuple[int
     rank = np.array(ranks)[survey.states[point]]
     rows = np.flatnonzero(rank == rank.min())
     return point, int(rows[distance[point, rows].argmax()])
+
+
+def colliding(survey: NodeSurvey, node: tuple[int, int]) -> list[str]:
+    """Return the names of the two bodies that collide at a node; none where none do."""
+    if survey.states[node] == CODES[NodeState.WHEEL]:
+        return [PART, WHEEL]
+    return list(survey.pairs[survey.hit[node]]) if survey.hit[node] >= 0 else []
 
 
 def extremes(report: Report) -> list[tuple[str, str, PlaceReport]]:
@@ -213,12 +221,11 @@ def nearest_along(timed: TimedMotion, scene: CollisionScene) -> tuple[Array, Nea
 
 def _paints(planned: Planned, times: Array, nearest: Nearest, packer: Packer) -> Mapping[str, Data]:
     """Return what the passes of a planned motion can be coloured by."""
-    timing = planned.timing
-    motion, duration = timing.timed.motion, timing.timed.duration
-    moments = curves.moments(timing.timed)
+    motion, moments = planned.timed.motion, curves.moments(planned.timed)
     rows = np.flatnonzero(motion.on_wheel & (motion.cutter_point % 1.0 == 0.0))
     point = motion.cutter_point[rows].astype(int)
-    speed = MM * timing.surface_distance[rows] / np.maximum(duration[rows], curves.SHORTEST)
+    passed_by = np.searchsorted(motion.positions, rows)  # the written move that leads there
+    speed = MM * curves.surface_speed(planned.timing)[passed_by]
     near = MM * np.interp(moments[rows], times, nearest.distance)
 
     def at_points(values: Array, unit: str) -> Data:

@@ -87,7 +87,9 @@ def _comparison(report: Report, joint_names: Sequence[str]) -> str:
         rows.append(("sum", *(f"{one.joint_range_sum_rad:.6f}" for one in figures)))
         rows.append(("joint travel", *(f"{one.joint_travel_rad:.4f}" for one in figures)))
         rows.append(("travel of t", *(f"{one.contact_travel:.1f}" for one in figures)))
-        rows.append(("time on wheel, s", *(f"{one.seconds_on_wheel:.2f}" for one in figures)))
+        rows.append(
+            ("time on wheel of the path, s", *(f"{one.seconds_on_wheel:.2f}" for one in figures))
+        )
     heads = [NAMES.get(name, name) for name in report.compared]
     if not report.fixed.feasible and "fixed" in report.compared:
         heads[list(report.compared).index("fixed")] += " (not feasible)"
@@ -185,7 +187,7 @@ def _pendant(T: Array) -> tuple[str, ...]:
 
 def _where_on_wheel(planned: Planned, wheel: ContactWheel) -> str:
     """Return for how long each stretch of the belt's width works."""
-    timed = planned.timing.timed
+    timed = planned.timed
     t, grinding = timed.motion.contact_position, timed.motion.grinding
     edges = np.linspace(-wheel.last_position, wheel.last_position, 36)
     middle = (t[grinding] + t[np.flatnonzero(grinding) - 1]) / 2.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Mapping
 
 import numpy as np
 
@@ -22,7 +22,6 @@ NEVER_PROVEN = (
     "the first move, to home from wherever the robot stands",
     "cables, hoses and people, beyond limits of joints that the cell states",
     "anything that stands in the real cell and not in the job",
-    "how the controller rounds corners between exact stops: limited by the program, not proven",
     "what the belt removes: force, wear and finish",
 )
 
@@ -46,19 +45,26 @@ def verdict(report: Report, job: Job, marks: Container[str]) -> str:
             "What would help": bullets(_help(report)),
             "Tried, does not help": bullets(report.tried_in_vain),
         }
-    columns = {
-        **found,
+    conditions = {
         "In this cell": bullets(_cell(job.cell)),
         "Assumed": bullets(_assumed(report, job.cell.robot)),
         "Not proven": bullets(NEVER_PROVEN),
         "Warnings": bullets(report.warnings),
     }
-    lists = "".join(
-        f"<div><h3>{text(name)}</h3>{lines}</div>" for name, lines in columns.items() if lines
+    if proven:
+        answer = section("verdict", "What was found", _columns({**found, **conditions}))
+    else:  # where it failed comes first
+        answer = section("verdict", "What was found", _columns(found))
+        answer += section("conditions", "Cell, assumptions and limits", _columns(conditions))
+    return head + answer + _files(report)
+
+
+def _columns(lists: Mapping[str, str]) -> str:
+    """Return lists side by side, each under its name; empty ones are left out."""
+    inside = "".join(
+        f"<div><h3>{text(name)}</h3>{lines}</div>" for name, lines in lists.items() if lines
     )
-    return head + section(
-        "verdict", "What was found", f'<div class="columns">{lists}</div>', _files(report)
-    )
+    return f'<div class="columns">{inside}</div>'
 
 
 def signature() -> str:
@@ -82,7 +88,8 @@ def _files(report: Report) -> str:
         ),
         table("files written", heads, list(outputs.items()), kind="words digests"),
     )
-    return f'<h3>Files</h3>{bullets([made])}<div class="beside">{"".join(tables)}</div>'
+    beside = f'<div class="beside">{"".join(tables)}</div>'
+    return section("files", "Files", f"<p>{text(made)}</p>", beside)
 
 
 def _proven(report: Report) -> Iterator[str]:
@@ -99,6 +106,12 @@ def _proven(report: Report) -> Iterator[str]:
                 f"read back from {', '.join(found.file.files)}: {found.file.postures} "
                 "configurations, moves and speeds are those proven"
             )
+            corners = found.file.corners
+            if corners is not None:
+                yield (
+                    f"{corners.rounded} corners, however the controller rounds them inside their "
+                    f"zones: contact error {corners.max_contact_error_mm:.4f} mm at most"
+                )
     if program is not None and not program.read_back:
         yield "of the file itself nothing: opl has no reader for this controller"
 
@@ -132,5 +145,6 @@ def _assumed(report: Report, robot: Robot) -> Iterator[str]:
         zones = ", ".join(f"{MM * zone:g}" for zone in robot.position_level_zones)
         yield f"corner zones of position levels 1 to 8: {zones} mm, as its file has them"
     else:
-        yield "corner zones: how far the controller cuts corners where it does not stop"
+        yield "corner zones: where nobody says how wide, half of a move is taken"
+    yield "rounded corners: no move is left before half-way, none overshot"
     yield "calibration: wheel, gripper and part are where the job says"

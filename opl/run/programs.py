@@ -19,8 +19,9 @@ from opl.proof.digest import changed_since, digests_in, other_inputs, read_resul
 from opl.proof.prove import Proof, prove
 from opl.run.job_folder import MOST_RESULT
 from opl.run.listings import read_program
-from opl.run.reporting import replay_report
-from opl.run.result import RESULT, VerificationReport
+from opl.run.proof_result import VerificationReport
+from opl.run.reporting import corners_report, replay_report
+from opl.run.result import RESULT
 from opl.run.surfacing import cut_surface
 from opl.run.watch import Stage, Watch
 
@@ -100,7 +101,7 @@ def prove_program(job: Job, files: Sequence[Path], watch: Watch | None = None) -
 
 
 def _report(job: Job, points: CutterPoints, proof: Proof) -> dict[str, Any]:
-    found, timed = proof.verification, proof.timed
+    found, timed, corners = proof.verification, proof.timed, corners_report(proof.corners)
     replayed = dict.fromkeys(field.name for field in fields(VerificationReport))
     if found is not None:
         replayed = vars(replay_report(found, None)).copy()
@@ -118,6 +119,7 @@ def _report(job: Job, points: CutterPoints, proof: Proof) -> dict[str, Any]:
         "cutter_points_ground": proof.ground,
         "duration_s": None if timed is None else round(timed.seconds, 3),
         **replayed,
+        "corners": None if corners is None else vars(corners),
         "findings": [
             {"kind": one.kind, "where": one.where, "message": one.message} for one in proof.findings
         ],

@@ -13,8 +13,15 @@ from opl.job.search import Objective
 from opl.motion.feed import SlowStretch
 from opl.planning.holders import Holder
 from opl.program.moves import CycleTime
+from opl.proof.corners import CornerProof
 from opl.proof.read_back import FileProof
 from opl.run import result
+from opl.run.proof_result import (
+    CornersReport,
+    FileReport,
+    PlaceReport,
+    VerificationReport,
+)
 from opl.run.result import Report
 from opl.run.values import Planned, Prepared, Proven, Refused, Written
 from opl.verification.extremes import Extreme
@@ -185,9 +192,23 @@ def _cycle(cycle: CycleTime | None, robot: Robot) -> result.CycleReport | None:
     )
 
 
-def replay_report(found: Verification, proof: FileProof | None) -> result.VerificationReport:
+def corners_report(found: CornerProof | None) -> CornersReport | None:
+    """Return what is reported of the corners of a program, None if they were not looked at."""
+    if found is None:
+        return None
+    return CornersReport(
+        found.rounded,
+        found.unknown,
+        round(found.max_contact_error * MM, 4),
+        found.place,
+        round(found.allowed * MM, 4),
+        round(found.at_ends * MM, 4),
+    )
+
+
+def replay_report(found: Verification, proof: FileProof | None) -> VerificationReport:
     """Return what is reported of a replay, and of the files of its motion if they were read."""
-    return result.VerificationReport(
+    return VerificationReport(
         found.engine,
         found.poses,
         found.collisions,
@@ -196,13 +217,14 @@ def replay_report(found: Verification, proof: FileProof | None) -> result.Verifi
         found.limit_violations,
         None
         if proof is None
-        else result.FileReport(
+        else FileReport(
             proof.proven,
             proof.files,
             proof.configurations,
             round(proof.largest_rounding * MM, 4),
             round(proof.largest_difference * MM, 4),
             proof.replayed,
+            corners_report(proof.corners),
         ),
         0.0 if found.deepest is None else round(found.deepest.amount * MM, 3),
         round(found.allowed_penetration * MM, 3),
@@ -210,10 +232,10 @@ def replay_report(found: Verification, proof: FileProof | None) -> result.Verifi
     )
 
 
-def _place(one: Extreme | None) -> result.PlaceReport | None:
+def _place(one: Extreme | None) -> PlaceReport | None:
     if one is None:
         return None
-    return result.PlaceReport(one.subject, one.place, np.rad2deg(one.q).round(3).tolist())
+    return PlaceReport(one.subject, one.place, np.rad2deg(one.q).round(3).tolist())
 
 
 def _program(written: Written) -> result.ProgramReport:

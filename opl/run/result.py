@@ -14,6 +14,8 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+from opl.run.proof_result import VerificationReport
+
 RESULT, PAGE = "result.json", "report.html"  # files of a run
 
 
@@ -148,45 +150,6 @@ class CycleReport:
     open_ended: bool  # it also waits for inputs or runs other programs
     accelerations_assumed: bool
     parts: Sequence[PartReport]  # in the order of the program
-
-
-@dataclass(frozen=True)
-class FileReport:
-    """What was found when the files of the program were read back."""
-
-    proven: bool
-    files: Sequence[str]
-    postures: int
-    largest_rounding_mm: float
-    largest_difference_mm: float
-    replayed: bool
-
-
-@dataclass(frozen=True)
-class PlaceReport:
-    """Where something is least or largest."""
-
-    subject: str  # the pair of bodies
-    place: str  # pass and cutter point, or which move
-    joints_deg: Sequence[float]
-
-
-@dataclass(frozen=True)
-class VerificationReport:
-    """What the replay found."""
-
-    engine: str
-    poses: int
-    collisions: int
-    min_clearance_mm: float
-    max_contact_error_mm: float
-    limit_violations: int
-    file: FileReport | None  # None if nothing was read back
-    max_belt_penetration_mm: float  # deepest that the part was in the belt
-    allowed_belt_penetration_mm: float
-    min_clearance_at: PlaceReport | None  # None if it is the farthest that is measured
-    max_contact_error_at: PlaceReport | None
-    max_belt_penetration_at: PlaceReport | None
 
 
 @dataclass(frozen=True)

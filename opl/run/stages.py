@@ -7,11 +7,11 @@ from opl.files.beside import Beside
 from opl.job.load import Job
 from opl.job.refusals import dwell_refusal, keys_named
 from opl.motion.feed import slow_stretches
-from opl.motion.motion import TimedMotion
-from opl.motion.timing import Timing, time_motion
+from opl.motion.motion import Motion, TimedMotion
+from opl.motion.timing import time_motion
 from opl.planning.borders import Nameable
 from opl.planning.plan import Plan
-from opl.planning.positions import with_fewest_positions
+from opl.planning.positions import HALVINGS, with_fewest_positions, with_shorter_moves
 from opl.planning.speed_steps import with_speed_steps
 from opl.planning.survey import survey_nodes
 from opl.program.posts import find_post
@@ -82,24 +82,39 @@ def _plan(surfaced: Surfaced, watch: Watch) -> Planned | Refused:
         compared = compare(prepared, found)
     with watch.stage(Stage.MOTION):
         exact = with_speed_steps(found.plan.motion, surfaced.points, job.process, job.cell.robot)
-        # what is proven is what the digits of the program can say
-        motion = in_file_digits(exact, job)
-        if job.program.motion is MotionForm.JOINT:
-            scene, rule = prepared.problem.scene, position_rule(job)
-            motion = with_fewest_positions(scene, surfaced.points, motion, job.process, rule)
+        exact, motion = _positions(prepared, exact)
         timing = time_motion(motion, surfaced.points, job.process, job.cell.robot)
         slow = slow_stretches(timing, job.process)
     timed = TimedMotion.passing(motion, timing.timed.duration)
-    pictured = Beside(lambda: _pictured(prepared, found.plan, timing))
+    pictured = Beside(lambda: _pictured(prepared, found.plan, timed))
     planned = Planned(prepared, found.plan, compared, exact, timed, timing, slow, pictured)
     refusal = dwell_refusal(slow, job.process)
     return planned if refusal is None else Refused(planned, refusal, (), watch.seconds)
 
 
-def _pictured(prepared: Prepared, plan: Plan, timing: Timing) -> Pictured:
+def _positions(prepared: Prepared, exact: Motion) -> tuple[Motion, Motion]:
+    """Return a motion whose moves allow its corners, and what is written and passed of it."""
+    surfaced = prepared.surfaced
+    job, points = surfaced.job, surfaced.points
+    # what is proven is what the digits of the program can say
+    motion = in_file_digits(exact, job)
+    if job.program.motion is not MotionForm.JOINT:
+        return exact, motion
+    rule = position_rule(job, points)
+    for rounds_left in reversed(range(HALVINGS + 1)):
+        motion = with_fewest_positions(prepared.problem.scene, points, motion, job.process, rule)
+        corners = tuple(rule.too_wide(motion))
+        if not corners or not rounds_left:
+            break
+        exact = with_shorter_moves(exact, corners)
+        motion = in_file_digits(exact, job)
+    return exact, motion
+
+
+def _pictured(prepared: Prepared, plan: Plan, timed: TimedMotion) -> Pictured:
     path, problem = plan.path, prepared.problem
     survey = survey_nodes(problem, path.ik_branch, path.q[path.cutter_point % 1.0 == 0.0])
-    times, nearest = nearest_along(timing.timed, problem.scene.collision)
+    times, nearest = nearest_along(timed, problem.scene.collision)
     return Pictured(survey, times, nearest, draw_charts(prepared, plan, survey))
 
 

@@ -38,7 +38,10 @@ with _no_banners():
 def start() -> BulletClient:
     """Return a new physics server in this process, without a window."""
     with _no_banners():
-        return BulletClient(pybullet.DIRECT)
+        client = BulletClient(pybullet.DIRECT)
+    # meshes by file name would be kept for as long as the process lives, and not read again
+    client.setPhysicsEngineParameter(enableFileCaching=0)
+    return client
 
 
 __all__ = ["BulletClient", "pybullet", "start"]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import tempfile
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 
@@ -33,6 +34,34 @@ def triangle_body(client: BulletClient, mesh: TriangleMesh) -> int:
         shape = client.createCollisionShape(pybullet.GEOM_MESH, fileName=str(path))
         # the body reads the file once more
         return int(client.createMultiBody(baseMass=0.0, baseCollisionShapeIndex=shape))
+
+
+# PyBullet never lets go of a list that it was given: the same ones are filled again and again
+_CORNERS: list[list[float]] = []
+_GIVEN: list[list[float]] = []
+_NUMBERS: list[int] = []
+_FILLED = Lock()
+
+
+def concave_shape(client: BulletClient, corners: Array) -> int:
+    """Add triangles as they are; return Bullet's number of their shape.
+
+    Their corners are in [m], shape (3 n, 3).
+    """
+    n = len(corners)
+    with _FILLED:
+        _CORNERS.extend([] for _ in range(n - len(_CORNERS)))
+        _GIVEN[:] = _CORNERS[:n]
+        for row, corner in zip(_GIVEN, corners.tolist(), strict=True):
+            row[:] = corner
+        _NUMBERS[:] = range(n)
+        shape = client.createCollisionShape(
+            pybullet.GEOM_MESH,
+            vertices=_GIVEN,
+            indices=_NUMBERS,
+            flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
+        )
+    return int(shape)
 
 
 def is_inside(triangles: Array, p: Array) -> bool:

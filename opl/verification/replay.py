@@ -150,10 +150,7 @@ class _Run:
         self._pairs = world.pairs()
         self._needed = np.array([pair.clearance for pair in self._pairs])
         self._counts = np.array([pair.counts for pair in self._pairs], dtype=bool)
-        # how far a turn of each joint by 1 rad can bring each pair together, in [m]
-        joints = range(len(motion.q[0]))
-        moved = [[pair.moved_by(joint) for joint in joints] for pair in self._pairs]
-        self._levers = np.array(moved).reshape(-1, len(joints)) * world.levers()
+        self._levers = world.levers(self._pairs)
         # what each pair is at least apart, as far as known, in [m]
         self._apart = np.full(len(self._pairs), -np.inf)
         self._corners = box_corners(cell.part.vertices)

@@ -8,7 +8,7 @@ Bullet finds nothing at all, so every other mesh is a compound of its triangles,
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from opl.geometry.mesh import TriangleMesh
 from opl.geometry.rotations import quaternion
 from opl.geometry.shapes import Body, Box, Cylinder
 from opl.verification.engine import pybullet, start
-from opl.verification.meshes import is_inside, triangle_body
+from opl.verification.meshes import concave_shape, is_inside, triangle_body
 from opl.verification.patches import Drum, Patches
 
 BASE_LINK = -1  # Bullet's number of the link that does not move
@@ -134,6 +134,11 @@ class World:
                 found.append(replace(pair, clearance=clearance))
         return found
 
+    def part_and_wheel(self) -> SolidPair:
+        """Return the pair that may touch; how far apart the two must be on free moves."""
+        part, _ = self._held[0]
+        return SolidPair(part, self._wheel, self._cell.part_from_wheel)
+
     def _pairs(self) -> Iterator[SolidPair]:
         links, clearance = self._links, self._cell.required_clearance
         for k, link in enumerate(links):
@@ -212,26 +217,29 @@ class World:
         """Version of the engine."""
         return str(pybullet.getAPIVersion())
 
-    def levers(self) -> Array:
-        """Return how far from each joint's axis anything that it moves can ever be, in [m], (6,).
+    def levers(self, pairs: Sequence[SolidPair]) -> Array:
+        """Return how far a turn of each joint by 1 rad can bring pairs together, in [m], (k, 6).
 
-        A bound for all configurations: the arm stretched out from the joint on, then the largest
-        link or held body stretched out beyond it.
+        A bound for all configurations: the arm stretched out from that joint to the one that the
+        farther body of the pair hangs on, and the body stretched out beyond it.
         """
         self.move_to(np.zeros(len(self._joints)))
         origins = [
             np.array(self._client.getLinkState(self._robot, joint)[4]) for joint in self._joints
         ]
-        moved = [*self._links[1:], *(held for held, _ in self._held)]
-        radii = []
-        for solid in moved:
+        lengths = np.linalg.norm(np.diff(origins, axis=0), axis=1)
+        radii = {}
+        for solid in (*self._links[1:], *(held for held, _ in self._held)):
             origin = origins[solid.moved_by - 1]
             low, high = self._client.getAABB(solid.body, solid.link)
             away = np.maximum(np.abs(np.array(low) - origin), np.abs(np.array(high) - origin))
-            radii.append(float(np.linalg.norm(away)))
-        lengths = np.linalg.norm(np.diff(origins, axis=0), axis=1)
-        beyond = np.concatenate([np.cumsum(lengths[::-1])[::-1], [0.0]])
-        return beyond + max(radii)
+            radii[solid] = float(np.linalg.norm(away))
+        found = np.zeros((len(pairs), len(self._joints)))
+        for row, pair in zip(found, pairs, strict=True):
+            less, more = sorted((pair.first, pair.second), key=lambda solid: solid.moved_by)
+            for joint in range(less.moved_by, more.moved_by):
+                row[joint] = lengths[joint : more.moved_by - 1].sum() + radii[more]
+        return found
 
     def _link_name(self, index: int) -> str:
         if index == BASE_LINK:
@@ -240,13 +248,7 @@ class World:
 
     def _add_mesh(self, corners: Array) -> Solid:
         """Add triangles, their corners of shape (3 m, 3)."""
-        shape = self._client.createCollisionShape(
-            pybullet.GEOM_MESH,
-            vertices=corners.tolist(),
-            indices=list(range(len(corners))),
-            flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
-        )
-        return self._body(PART, shape)
+        return self._body(PART, concave_shape(self._client, corners))
 
     def _add(self, body: Body, T_base_body: Array | None = None) -> Solid:
         client = self._client

@@ -189,6 +189,7 @@ def work(pipe: Connection, parent: int) -> None:
         found = doing.do(task, lambda stage, fraction: _told(pipe, stage, fraction))
         os.chdir(home)
         pipe.send(found)
+        doing.tidy_up()
 
 
 def _told(pipe: Connection, stage: str, fraction: float) -> bool:

@@ -55,6 +55,13 @@ class Case:
         """Return the first move of a kind from a place on, None if there is none."""
         return next((k for k, one in enumerate(self.labels) if one == label and k >= after), None)
 
+    def last_of_first(self, label):
+        """Return the last move of the first run of a kind."""
+        k = self.first_of(label)
+        while k + 1 < len(self.labels) and self.labels[k + 1] == label:
+            k += 1
+        return k
+
     @property
     def middle(self):
         """A move in the middle of the first pass, amid others on the wheel; to a cutter point."""
@@ -427,7 +434,9 @@ def _cornered(case, k, which):
 
 kind("corner", "a wide corner on the wheel")(lambda case: _cornered(case, case.middle, 2))
 kind("corner", "a stop on the wheel")(lambda case: _cornered(case, case.middle, 0))
-kind("corner", "no stop at the end of a pass")(lambda case: _cornered(case, case.pass_of[1], 1))
+kind("corner", "no stop at the end of a retract")(
+    lambda case: _cornered(case, case.last_of_first("RETRACT"), 1)
+)
 kind("corner", "no stop before an approach")(
     lambda case: _cornered(case, case.first_of("APPROACH") - 1, 1)
 )

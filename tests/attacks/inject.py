@@ -21,14 +21,14 @@ import opl.proof.prove as proving
 from opl.cell.robot import forward_kinematics
 from opl.errors import OplError
 from opl.files.digests import keeps_stamp
-from opl.geometry.frames import transform
+from opl.geometry.frames import inverse, transform
 from opl.proof.digest import changed_since
 from opl.proof.prove import prove
 from opl.verification.replay import Verification
 from tests.attacks.faults import KINDS, Case
 from tests.support.small_programs import PROGRAMS, small_program
 
-# what a fault may do and not be seen: how far a ground point is moved, in any direction, and the
+# what a fault may do and not be seen: how far a ground point passes beside its contact, and the
 # part of its time that a pass takes more or less than the job asks for
 PLACE = 1e-4  # [m]
 SPEED = 0.02
@@ -47,12 +47,14 @@ arched top that does not come with opl.
 
 - **caught** (by what): refused, or not proven. **-**: the language has no place for it.
 - **below**: what it does is less than is resolved, so the program is proven as it stands. In mm:
-  so far the ground point is moved where the fault is, less than 0.1 mm, the contact limit of these
-  jobs. In % of a pass: so much the time of the pass is off what the job asks for, 2 % at the most,
-  because speeds of few digits are off by nearly as much; a single move may be 1.3 times as slow or
-  as fast where others make up for it, and 0.25 mm ahead of the feed, since places between two
-  cutter points are recognised less well than the points. "Straight, and replayed so": the other
-  way of the move was replayed in the cell, and is free and on the contact model.
+  so far beside its contact the ground point now passes, less than 0.1 mm, the contact limit of
+  these jobs; along the axle does not count on the flat of the belt, where another place of it
+  grinds the same, nor does a little sooner or later along the pass. In % of a pass: so much the
+  time of the pass is off what the job asks for, 2 % at the most, because speeds of few digits are
+  off by nearly as much; a single move may be 1.3 times as slow or as fast where others make up for
+  it, and 0.25 mm ahead of the feed, since places between two cutter points are recognised less well
+  than the points. "Straight, and replayed so": the other way of the move was replayed in the cell,
+  and is free and on the contact model.
 - **proven**: it does no harm, and must be proven.
 
 An event (an output, a wait, a dwell, a call, a jump) has no size: none is below.
@@ -130,10 +132,11 @@ def _missed(kind, program, text):
         return Outcome("missed", "other moves")
     if len(before.q) != len(after.q):
         return Outcome("below", "straight, and replayed so")
-    moved = _ground_points(program, after) - _ground_points(program, before)
-    far = float(np.linalg.norm(moved, axis=-1).max())
+    rows = np.flatnonzero(program.motion.on_wheel)
+    moved = np.ptp([each.q[each.stations][rows] for each in (before, after)], axis=0).any()
+    far = _off_contact(program, before, after) if moved else 0.0
     takes, took = _times(after), _times(before)
-    if far > 0.0:
+    if moved:
         why = f"{1e3 * far:.3f} mm"
         return Outcome("below" if far < PLACE else "missed", why)
     if (takes != took).any():
@@ -159,14 +162,40 @@ def _off_time(program, takes):
     return [float(takes[own].sum() / asked[own].sum() - 1.0) for own in passes]
 
 
-def _ground_points(program, playback):
-    """Return where the cutter points of the moves on the wheel are, shape (n, 3)."""
-    motion, points = program.motion, program.points.Ts_workpiece_cutter[:, :3, 3]
-    rows = np.flatnonzero(motion.on_wheel)
+def _off_contact(program, before, after):
+    """Return how far ground points now pass beside where their contact was, the most of it in [m].
+
+    Each is followed from the move before the one that grinds it to the move after. On the flat of
+    the belt its place along the axle does not count: the contact position is free there, another
+    place of the belt grinds the same. On an edge every direction counts.
+    """
+    rows = np.flatnonzero(program.motion.on_wheel)
+    places = program.points.Ts_workpiece_cutter[:, :3, 3]
+    nearest = np.clip(np.round(program.motion.cutter_point[rows]).astype(int), 0, len(places) - 1)
+    own = places[nearest]
+    wheel = program.job.cell.wheel
+    q = after.q[after.stations]
+    fractions = np.linspace(0.0, 1.0, 41)[:, None]
+    (was,) = _in_contact0(program, before.q[before.stations][None, rows], own)
+    free = np.where(np.abs(was[:, :1]) < wheel.width / 2.0, [0.0, 1.0, 1.0], 1.0)
+    beside = [
+        np.linalg.norm(free * (_in_contact0(program, lines, own) - was), axis=-1).min(axis=0)
+        for lines in (
+            q[rows - 1] + fractions[:, None] * (q[rows] - q[rows - 1]),
+            q[rows] + fractions[:, None] * (q[rows + 1] - q[rows]),
+        )
+    ]
+    return float(np.minimum(*beside).max())
+
+
+def _in_contact0(program, q, p_workpiece):
+    """Return points of the part in contact frame 0, shape (k, n, 3), at postures (k, n, 6)."""
     cell = program.job.cell
-    Ts = forward_kinematics(cell.robot, playback.q[playback.stations][rows])
-    nearest = points[np.clip(np.round(motion.cutter_point[rows]).astype(int), 0, len(points) - 1)]
-    return transform((Ts @ cell.T_flange_workpiece)[:, None], nearest[:, None])[:, 0]
+    Ts_base_flange = forward_kinematics(cell.robot, q.reshape(-1, 6)).reshape(*q.shape[:2], 4, 4)
+    Ts_contact0_workpiece = (
+        inverse(cell.wheel.T_base_contact0) @ Ts_base_flange @ cell.T_flange_workpiece
+    )
+    return transform(Ts_contact0_workpiece, p_workpiece)
 
 
 def outcomes_in(name, kinds=ALL_KINDS):

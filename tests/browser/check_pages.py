@@ -144,7 +144,7 @@ def test_the_drawn_robot_is_where_the_motion_is_and_its_point_on_the_wheel(runs,
     joint = run.surfaced.job.cell.robot
     T_joint_flange = np.array(one.page.evaluate("() => window.opl.page.cell.flange")).reshape(4, 4)
     whole = np.flatnonzero(motion.on_wheel & (motion.cutter_point % 1.0 == 0.0))
-    met = 0
+    points, cell, met = run.surfaced.points, run.surfaced.job.cell, 0
     for move in [*np.linspace(1, len(motion) - 1, 4).astype(int), *whole[[0, len(whole) // 2]]]:
         one.scrub(float(times[move]))
         drawn = one.flange() @ T_joint_flange
@@ -161,8 +161,16 @@ def test_the_drawn_robot_is_where_the_motion_is_and_its_point_on_the_wheel(runs,
                 }""",
                 int(motion.cutter_point[move]),
             )
-            assert np.linalg.norm(np.subtract(on_part, on_wheel)) < LIFT + 1e-4
-            met += 1
+            point = int(motion.cutter_point[move])
+            T_workpiece_cutter = points.Ts_workpiece_cutter[point]
+            lifted = cell.T_flange_workpiece @ T_workpiece_cutter @ [0.0, 0.0, LIFT, 1.0]
+            place = forward_kinematics(joint, motion.q[move]) @ lifted
+            assert np.allclose(on_part, place[:3], atol=2e-5)
+            T_base_contact = cell.wheel.T_base_contact(motion.contact_position[move])
+            assert np.allclose(on_wheel, T_base_contact[:3, 3], atol=2e-5)
+            if motion.written[move]:  # between written positions the part may slide over the belt
+                assert np.linalg.norm(np.subtract(on_part, on_wheel)) < LIFT + 1e-4
+                met += 1
     assert met > 0
 
 
@@ -284,6 +292,11 @@ def test_a_line_of_the_program_leads_to_its_configuration_and_back(runs, opened)
         shown = one.page.evaluate("() => Array.from(window.opl.shown.q)")
         assert np.allclose(shown, run.program.moves[k].q, atol=1e-5)
         assert "now" in row.get_attribute("class").split()
+    one.page.locator("#program-0").press("ArrowUp")  # as with the pointer
+    shown = one.page.evaluate("() => Array.from(window.opl.shown.q)")
+    assert np.allclose(shown, run.program.moves[-2].q, atol=1e-5)
+    one.page.locator("#program-0").press("Tab")
+    assert np.allclose(one.page.evaluate("() => Array.from(window.opl.shown.q)"), shown)
 
 
 @pytest.mark.parametrize("name", ["good", "post", "trough"])
@@ -353,7 +366,7 @@ def test_a_batch_is_sorted_by_a_click(browser, runs, tmp_path):
         opl.BatchRow(out.parent / "job.yaml", run.status, 0, out, "", opl.make_report(run))
         for run, out in runs.values()
     ]
-    (tmp_path / "report.html").write_text(batch_page(rows, tmp_path))
+    (tmp_path / "report.html").write_text(batch_page(5 * rows, tmp_path))
     context = browser.new_context()
     page = context.new_page()
     page.goto((tmp_path / "report.html").as_uri())
@@ -363,6 +376,9 @@ def test_a_batch_is_sorted_by_a_click(browser, runs, tmp_path):
     assert status.all_inner_texts() == sorted(before)
     page.locator("thead button").nth(1).click()
     assert status.all_inner_texts() == sorted(before, reverse=True)
+    page.emulate_media(media="print")
+    assert sum(row.is_visible() for row in page.locator("tbody tr").all()) == 5 * len(rows)
+    page.emulate_media(media="screen")
     page.locator("tbody a").first.click()
     page.locator("body.ready").wait_for()
     context.close()

@@ -1,5 +1,6 @@
 """Mesh bodies, pairs that may touch and clearances of single pairs: three libraries agree."""
 
+import gc
 from dataclasses import replace
 from functools import cache
 
@@ -10,12 +11,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from opl.cell.collision import CollisionScene, enclosing_bodies
-from opl.cell.robot import forward_kinematics
+from opl.cell.robot import collision_shapes, forward_kinematics
 from opl.cell.workcell import PairRules
 from opl.geometry.frames import pose
 from opl.geometry.mesh import TriangleMesh, winding_number
 from opl.geometry.shapes import Body
-from opl.verification.meshes import is_inside
+from opl.verification.engine import start
+from opl.verification.meshes import concave_shape, is_inside
 from opl.verification.replay import replay
 from opl.verification.world import World
 from tests.support.bare_cells import (
@@ -239,3 +241,19 @@ def test_rules_widen_with_the_clearance():
     assert cell.pairs.between("gate", "part", 1.0) == pytest.approx(0.05)
     assert cell.pairs.between("R_link", "gate", 1.0) is None
     assert cell.pairs.between("T_link", "gate", 1.0) == 1.0
+
+
+def test_shapes_that_are_gone_leave_no_objects_behind():
+    corners = np.arange(900.0).reshape(300, 3)
+
+    def objects():
+        client = start()
+        assert concave_shape(client, corners) >= 0
+        client.disconnect()
+        for _ in range(20):
+            collision_shapes(v_job().cell.robot)
+        gc.collect()
+        return len(gc.get_objects())
+
+    before = [objects() for _ in range(2)][-1]
+    assert objects() < before + 10

@@ -450,7 +450,7 @@ def test_skipping_pairs_leaves_out_nothing(seed, monkeypatch):
     p = forward_kinematics(problem.cell.robot, q)[3, :3, 3] + random.uniform(-0.15, 0.15, 3)
     cell = with_obstacle(problem.cell, p, (0.02, 0.02, 0.02))
     skipping = replay(cell, NO_POINTS, free_move(q), 1e-4)
-    monkeypatch.setattr(World, "levers", lambda self: np.full(6, 1e12))
+    monkeypatch.setattr(World, "levers", lambda self, pairs: np.full((len(pairs), 6), 1e12))
     measuring = replay(cell, NO_POINTS, free_move(q), 1e-4)
     assert skipping.poses == measuring.poses
     assert skipping.collisions == measuring.collisions
@@ -460,7 +460,7 @@ def test_skipping_pairs_leaves_out_nothing(seed, monkeypatch):
 
 def test_skipping_leaves_the_proven_motion_its_clearances(monkeypatch):
     skipping = replay_tiny()
-    monkeypatch.setattr(World, "levers", lambda self: np.full(6, 1e12))
+    monkeypatch.setattr(World, "levers", lambda self, pairs: np.full((len(pairs), 6), 1e12))
     measuring = replay_tiny()
     np.testing.assert_array_equal(skipping.verified.clearance, measuring.verified.clearance)
     assert skipping.findings == measuring.findings == ()
@@ -469,7 +469,7 @@ def test_skipping_leaves_the_proven_motion_its_clearances(monkeypatch):
 def test_levers_are_as_long_as_anything_moves():
     cell = v_job().cell
     with World(cell) as world:
-        levers = world.levers()
+        (levers,) = world.levers([world.part_and_wheel()])
         random = np.random.default_rng(0)
         corners = np.array(
             np.meshgrid(*zip(cell.part.vertices.min(0), cell.part.vertices.max(0), strict=True))

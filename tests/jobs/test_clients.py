@@ -1,12 +1,15 @@
 """The clients for other programs that the documentation shows, against the service itself."""
 
+import socket
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
 
 import opl
+from opl.client import Client, ServiceError
 from tests.support.jobs import POST, write_job
 from tests.support.serving import serving
 
@@ -46,3 +49,22 @@ def test_it_says_why_there_is_none(address, tmp_path):
     ended = run(address, job.parent, tmp_path / "out")
     assert ended.returncode == 1 and "job.yaml" in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("answer", "status", "message"),
+    [(b"413 Too Large", 413, "Too Large"), (b"200 OK", 0, "does not answer: IncompleteRead")],
+)
+def test_an_answer_that_breaks_off_is_told(answer, status, message):
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def begin():
+            there, _ = listener.accept()
+            with there:
+                there.recv(10_000)
+                there.sendall(b"HTTP/1.1 " + answer + b"\r\nContent-Length: 9\r\n\r\n")
+
+        threading.Thread(target=begin, daemon=True).start()
+        with pytest.raises(ServiceError) as refused:
+            Client(f"http://127.0.0.1:{listener.getsockname()[1]}").job("a")
+    assert refused.value.status == status and refused.value.message.startswith(message)

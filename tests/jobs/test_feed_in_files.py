@@ -68,7 +68,12 @@ def krl_times(program, q):
 
 
 def fanuc_times(program, q):
-    yield from (float(time) / 1000.0 for time in re.findall(r" (\d+)msec ", program.text))
+    """A straight move has a time, or with RTCP a speed of the origin of its frame over the part."""
+    found = re.findall(r" (\d+)(msec|mm/sec) (?:FINE|CNT100)( RTCP)?", program.text)
+    for (number, unit, remote), start, end in zip(found, q[:-1], q[1:], strict=True):
+        assert remote or unit == "msec"
+        length = over_part(program, start, end) if unit == "mm/sec" else 1.0
+        yield length * 1e3 / float(number) if unit == "mm/sec" else float(number) / 1e3
 
 
 def ur_times(program, q):
@@ -86,7 +91,7 @@ TIMES = {
 FORMS = [
     (name, motion) for name in sorted(ARMS) for motion in ("joint", "straight")
     if (name, motion) != ("KRL", "joint")
-]  # fmt: skip
+] + [("FANUC", "stationary")]  # fmt: skip
 
 
 def feeds(program):
@@ -128,14 +133,49 @@ def test_whole_percents_are_too_coarse_and_so_krl_is_straight_unless_a_job_insis
     assert load_job(write_job(tmp_path)).program.motion is MotionForm.JOINT
 
 
-def test_stationary_tool_point_is_the_cutter_point_where_the_contact_stays_in_the_middle():
+@pytest.mark.parametrize(
+    ("controller", "motion", "pattern", "at_least"),
+    [
+        ("RAPID", "straight", r"MoveL .*\[[0-9.]+,500,5000,1000\], ", 80),
+        # whole mm/s: the others have their time
+        ("FANUC", "stationary", r"L P\[\d+\] \d+mm/sec (?:FINE|CNT100) RTCP", 40),
+    ],
+)
+def test_stationary_tool_point_is_the_cutter_point_where_the_contact_stays_in_the_middle(
+    controller, motion, pattern, at_least
+):
     """So the speed of a move in the file is the feed over the surface there."""
-    program = small_program("RAPID", motion="straight")
+    program = small_program(controller, motion=motion)
     q = program.run.proven.planned.prepared.fixed.q
     frames = program.job.program.led.frames(forward_kinematics(program.job.cell.robot, q))
     wanted = program.points.Ts_workpiece_cutter[:, :3, 3]
     np.testing.assert_allclose(frames[:, :3, 3], wanted, atol=1e-9)
-    assert len(re.findall(r"MoveL .*\[[0-9.]+,500,5000,1000\], ", program.text)) > 80
+    assert len(re.findall(pattern, program.text)) > at_least
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (" RTCP", "", "RTCP goes with straight moves"),
+        ("% FINE", "% FINE RTCP", "RTCP goes with straight moves"),
+        ("UFRAME_NUM=1", "UFRAME_NUM=2", "is of user frame 1, UFRAME_NUM 2"),
+        ("UF : 1, UT", "UF : 2, UT", "is of user frame 2, UFRAME_NUM 1"),
+        ("mm/sec CNT100 RTCP", "mm/sec CNT100", "RTCP goes with straight moves"),
+    ],
+)
+def test_remote_tcp_that_is_not_that_of_the_job_is_found(old, new, message):
+    program = small_program("FANUC", motion="stationary")
+    assert not program.read(program.text).findings
+    assert old in program.text
+    found = program.read(program.text.replace(old, new, 1)).findings
+    assert any(message in str(finding) for finding in found), found
+
+
+def test_a_program_wholly_in_another_user_frame_moves_past_another_tool():
+    program = small_program("FANUC", motion="stationary")
+    text = program.text.replace("UFRAME_NUM=1", "UFRAME_NUM=2").replace("UF : 1,", "UF : 2,")
+    found = program.read(text).findings
+    assert "tool 0 in user frame 2; the job's is 0 in user frame 1" in str(found[0])
 
 
 @pytest.mark.parametrize(

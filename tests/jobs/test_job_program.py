@@ -84,6 +84,19 @@ def test_every_key_reaches_the_program_in_si(tmp_path):
     assert found.template == tmp_path / "own.j2"
 
 
+def test_stationary_tool_stands_at_the_wheel_or_in_the_user_frame_of_the_job(tmp_path):
+    straight = "motion: straight\ncontroller: "
+    assert settings(tmp_path, straight + "RAPID").stationary is AT_WHEEL
+    assert settings(tmp_path, straight + "RAPID\nstationary_tool: false").stationary is None
+    assert settings(tmp_path, straight + "FANUC").stationary is None
+    fanuc = straight + "FANUC\nstationary_tool: true"
+    found = settings(tmp_path, fanuc)
+    assert found.user_frame.number == 1
+    np.testing.assert_array_equal(found.stationary.T_base_tool, AT_WHEEL.T_base_tool)
+    found = settings(tmp_path, fanuc + f"\nuser_frame: {{number: 4, T_base_user_mm: {EYE}}}")
+    assert found.user_frame.number == 4 and found.stationary.T_base_tool[2, 3] == 0.18
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -95,6 +108,16 @@ def test_every_key_reaches_the_program_in_si(tmp_path):
             "program.user_frame.number: must be 1 to 63, got 64",
         ),
         ("user_frame: {number: 2}", "user_frame goes with positions: user only"),
+        (
+            "motion: straight\nstationary_tool: true",
+            "stationary_tool: must not be true: Yaskawa DX200 .INFORM. has none that public",
+        ),
+        ("controller: FANUC\nstationary_tool: true", "stationary_tool: needs motion: straight"),
+        ("controller: FANUC\nuser_frame: {number: 2}", "goes with positions: user only"),
+        (
+            "controller: RAPID\nmotion: straight\nstationary_tool: true\nuser_frame: {number: 2}",
+            "user_frame: is for Yaskawa controllers",
+        ),
         (
             "tool: 2\nmotion: straight",
             "T_flange_tool_mm: .* need the data of tool 2",

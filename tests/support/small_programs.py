@@ -113,7 +113,7 @@ class SmallProgram:
 def small_program(controller, part="v_shape", motion="joint"):
     """Return the small program of a controller: of a part that comes with opl, or ``arch``.
 
-    Of joint moves, or with straight ones on the wheel.
+    Of joint moves, or with straight ones on the wheel, or those past a stationary tool on request.
     """
     return _made(controller, part, motion)
 
@@ -149,9 +149,11 @@ def _shipped(controller, part, motion, home):
         # rows this short end where the arms pivot; what is attacked is the file
         "process.max_dwell_s": 10,
         "program.controller": controller,
-        "program.motion": motion,
+        "program.motion": "straight" if motion == "stationary" else motion,
         **ACTIONS,
     }
+    if motion == "stationary":
+        keys["program.stationary_tool"] = True
     if controller != "DX200":
         keys["program.accept_unverified_pulses"] = GONE
     if part == "v_shape":

@@ -11,13 +11,21 @@ from hypothesis import strategies as st
 
 from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import inverse, rotation_angle
+from opl.motion.corner_error import corner_error
 from opl.motion.fewest import ChainRule, fewest
-from opl.motion.line_error import LEVER, Run, corner_error, line_errors, screws_of
+from opl.motion.line_error import LEVER, Run, line_errors, screws_of
 from opl.motion.motion import Motion, MoveKind, TimedMotion
 from opl.planning.positions import PositionRule, on_wheel_runs
 from tests.support.planned import small_job, small_motion, small_problem
 
-RULE = PositionRule(1e-4, 5e-5, 0.0)
+
+def flange_points(q):
+    T = forward_kinematics(small_problem().cell.robot, q)
+    return T[..., :3, 3] + 0.5 * T[..., :3, 2]
+
+
+# zones count by a point of the flange, half a metre in front of it
+RULE = PositionRule(1e-4, 5e-5, 0.0, np.inf, flange_points, lambda motion: ())
 RATIO = 1.6
 
 
@@ -96,22 +104,23 @@ def test_errors_of_lines_are_those_of_another_kinematics():
     st.integers(3, 9),
     st.sampled_from([5e-6, 2e-5, 6e-5]),
     st.sampled_from([0.0, 0.12]),
-    st.sampled_from([0.0, 0.25, 0.5]),
+    st.sampled_from([0.0, 1e-3, np.inf]),
 )
-def test_no_choice_of_fewer_positions_keeps_the_rule(which, start, count, error, shortest, cut):
+def test_no_choice_of_fewer_positions_keeps_the_rule(which, start, count, error, shortest, zone):
     screws, runs = whole_runs()
     run = runs[which % len(runs)]
     part = part_of(run, start, start + count)
     part = replace(part, allowed=np.full(len(part.q), error))
-    rule = ChainRule(shortest, RATIO, cut)
+    rule = ChainRule(shortest, RATIO, zone, error)
 
     def charge(chain):
         lines = [(i, j, line_errors(screws, part, i, j)[1]) for i, j in pairwise(chain)]
         if any((errors > error).any() for _, _, errors in lines):
             return None
-        if cut > 0.0:
+        if zone > 0.0:
             corners = zip(chain, chain[1:], chain[2:], strict=False)
-            if any(corner_error(screws, part, corner, cut) > 1.0 for corner in corners):
+            longer = [corner for corner in corners if corner[2] > corner[0] + 2]
+            if any(corner_error(screws, part, corner, zone) > error for corner in longer):
                 return None
         if not all(keeps_pace(screws, part, i, j) for i, j, _ in lines):
             return None
@@ -141,6 +150,16 @@ def test_a_line_that_is_barred_is_not_taken_and_another_chain_is():
     line = int(free[0]), int(free[1])
     other = fewest(screws, run, ChainRule(0.0), frozenset({line}))
     assert line not in set(pairwise(other.tolist()))
+    assert len(other) >= len(free)
+
+
+def test_a_corner_that_is_barred_is_not_taken_and_its_lines_may_be():
+    screws, runs = whole_runs()
+    run = part_of(runs[0], 0, 40)
+    free = fewest(screws, run, ChainRule(0.0)).tolist()
+    corner = tuple(free[:3])
+    other = fewest(screws, run, ChainRule(0.0), frozenset({corner})).tolist()
+    assert corner not in set(zip(other, other[1:], other[2:], strict=False))
     assert len(other) >= len(free)
 
 

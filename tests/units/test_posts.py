@@ -71,18 +71,26 @@ def test_whole_programs_are_the_golden_ones(controller, assert_golden):
         assert_golden(f"{controller}/straight/{name}", text)
 
 
-def test_program_past_a_stationary_tool_is_the_golden_one(assert_golden):
+@pytest.mark.parametrize(("controller", "name"), [("RAPID", "SAMPLE.mod"), ("FANUC", "SAMPLE.LS")])
+def test_program_past_a_stationary_tool_is_the_golden_one(controller, name, assert_golden):
     wheel = pose(
         Rotation.from_euler("xyz", [90, 0, 90], degrees=True).as_matrix(), np.array([1.1, 0.5, 0.6])
     )
     part = pose(np.eye(3), np.array([0.0, 0.0, 0.1]))
     texts = programs(
-        "RAPID",
+        controller,
         motion=MotionForm.STRAIGHT,
         stationary=StationaryTool(wheel, part),
+        user_frame=UserFrame(3, wheel),
         load=Load(1.25, np.array([0.01, 0.0, 0.13])),
     )
-    assert_golden("RAPID/stationary/SAMPLE.mod", texts["SAMPLE.mod"])
+    assert_golden(f"{controller}/stationary/{name}", texts[name])
+
+
+def test_user_frame_that_fanuc_has_not_is_refused():
+    frame = UserFrame(10, np.eye(4))
+    with pytest.raises(InputError, match="user_frame: must be 1 to 9, got 10"):
+        programs("FANUC", stationary=StationaryTool(np.eye(4), np.eye(4)), user_frame=frame)
 
 
 PART_KG, GRIPPER_KG = (

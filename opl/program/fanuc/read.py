@@ -1,6 +1,8 @@
 """Reading FANUC TP programs as text: J and L moves to positions given as joint angles.
 
-CNT is read, not played: the corners it cuts off are not replayed.
+In a user frame the program has a tool that stands at its origin, and every L move has to say so
+(RTCP); user frame 0 has none. How far CNT cuts off corners is not
+known in millimetres.
 """
 
 from __future__ import annotations
@@ -32,7 +34,7 @@ _WORDS = Words(
 _LABEL = re.compile(r"LBL\[([0-9]+)\]")
 _JUMP = re.compile(r"(?:JMP |WAIT .*TIMEOUT, ?)LBL\[([0-9]+)\]")
 _SETTING = re.compile(r"(UFRAME_NUM|UTOOL_NUM) ?= ?([0-9]+)")
-_MOVE = re.compile(r"([JL]) ?P\[([0-9]+)\] ([0-9]+)(%|msec) (FINE|CNT[0-9]+)")
+_MOVE = re.compile(r"([JL]) ?P\[([0-9]+)\] ([0-9]+)(%|msec|mm/sec) (FINE|CNT[0-9]+)( RTCP)?")
 _NUMBERED = re.compile(r"[0-9]+:(.*);")
 _POSITION = re.compile(
     r"P\[([0-9]+)\]\{GP1:UF:([0-9]+),UT:([0-9]+),"
@@ -52,6 +54,11 @@ _CNT = Corner(100.0, "CNT100")
 CORNERS = Corners(Corner(0.0, "FINE"), _CNT, _CNT, _CNT)
 
 
+_UNITS = {
+    "%": (SpeedUnit.TOP_SPEED, 0.01),
+    "msec": (SpeedUnit.SECONDS, 1e-3),
+    "mm/sec": (SpeedUnit.TOOL_POINT, 1e-3),
+}
 _SECTIONS = ("/PROG", "/ATTR", "/MN", "/POS", "/END")
 _NEXT = dict(pairwise(("", *_SECTIONS)))
 Lines = list[tuple[int, str]]
@@ -63,6 +70,14 @@ class _Position(NamedTuple):
     frame: str
     tool: str
     axes: tuple[str, ...]
+
+
+def tool_in_frame(tool: str, frame: str) -> str:
+    """Return the number of a tool as messages call it, with that of its user frame if it is in one.
+
+    What stands at the origin of a user frame is a tool as well, so the two belong together.
+    """
+    return tool if frame == "0" else f"{tool} in user frame {frame}"
 
 
 def parse(text: str, source: str) -> Listing:
@@ -168,26 +183,32 @@ class _Body:
 
     def _move(self, line: int, code: str, found: re.Match[str]) -> None:
         notes = self.notes
-        word, number, speed, unit, end = found.groups()
+        word, number, speed, unit, end, remote = found.groups()
         position, tool = self.positions.get(number), self.holds.get("UTOOL_NUM")
+        frame = self.holds.get("UFRAME_NUM")
         if position is None:
             notes.doubt(line, f"P[{number}] is not there")
-        elif not self.holds.get("UFRAME_NUM") == position.frame == "0":
-            notes.doubt(line, "moves in a user frame, or before UFRAME_NUM=0")
+        elif frame != position.frame:
+            notes.doubt(line, f"P[{number}] is of user frame {position.frame}, UFRAME_NUM {frame}")
+        elif bool(remote) != (word == "L" and frame != "0"):
+            notes.doubt(line, "RTCP goes with straight moves in a user frame, these with RTCP")
         elif position.tool != tool:
             notes.doubt(line, f"P[{number}] is of tool {position.tool}, UTOOL_NUM {tool}")
         else:
-            if notes.begun == (unit == "%"):
-                notes.doubt(line, "the first move needs a speed in %, every other one in msec")
-            counts = SpeedUnit.TOP_SPEED if unit == "%" else SpeedUnit.SECONDS
-            factor = 0.01 if unit == "%" else 1e-3
+            if notes.begun == (unit == "%") or (unit == "mm/sec" and not remote):
+                notes.doubt(
+                    line,
+                    "the first move needs a speed in %, every other one in msec, with RTCP also "
+                    "in mm/sec",
+                )
+            counts, factor = _UNITS[unit]
             axes = np.deg2rad([float(axis) for axis in position.axes])
             move = ReadMove(
                 target=from_fanuc(axes),
                 straight=word == "L",
                 speed=WrittenSpeed.of_number(counts, factor, speed, 0, speed + unit),
                 corner=Corner(0.0 if end == "FINE" else float(end[3:]) or 1.0, end),
-                tool=position.tool,
+                tool=tool_in_frame(position.tool, frame),
                 place=notes.place(line),
                 resolution=_HALF_DIGIT,
             )

@@ -59,7 +59,7 @@ def play_jobs(
             events.append(Event(len(moves) - 1, one.text, one.place, one.waits))
             continue
         target = targets[one.job.name][one.position]
-        moves.append(_move(one, target, resolution, one.job is not before))
+        moves.append(_move(one, target, resolution, one.job is not before, robot))
         before = one.job
     found += other_tools(moves, str(settings.tool))
     playback, doubtful = play(moves, events, robot, settings.led)
@@ -68,21 +68,29 @@ def play_jobs(
     return None, [*found, *(doubtful if moves else [])]
 
 
-def corners(settings: ProgramSettings) -> Corners:
+def corners(settings: ProgramSettings, robot: Robot) -> Corners:
     """Return the position levels a job allows."""
     levels = (0, settings.levels.on_wheel, settings.levels.lead, settings.levels.air)
-    return Corners(*(Corner(float(level or 0), f"PL={level or 0}") for level in levels))
+    return Corners(*(_corner(None if level is None else str(level), robot) for level in levels))
 
 
-def _move(visit: Visit, target: Array, resolution: Array, starts: bool) -> ReadMove:
+def _corner(level: str | None, robot: Robot) -> Corner:
+    """Return what a position level allows; without one it is the controller's affair."""
+    if level is None or not level.isdecimal():
+        return Corner(np.inf, "no PL" if level is None else f"PL={level}")
+    zones, number = robot.position_level_zones, int(level)
+    known = zones is not None and number <= len(zones)
+    reach = zones[number - 1] if zones is not None and known and number else np.inf
+    return Corner(float(number), f"PL={level}", reach)
+
+
+def _move(visit: Visit, target: Array, resolution: Array, starts: bool, robot: Robot) -> ReadMove:
     step = visit.step
-    level = step.tag("PL")
-    size = float(level) if level is not None and level.isdecimal() else np.inf
     return ReadMove(
         target=target,
         straight=step.word == "MOVL",
         speed=written_speed(step),
-        corner=Corner(size, "none" if level is None else f"PL={level}"),
+        corner=_corner(step.tag("PL"), robot),
         tool=str(_tool(visit)),
         place=_place(visit),
         resolution=resolution,

@@ -1,7 +1,7 @@
 """KUKA KRL programs (KRC2 and later): written, read back.
 
-Positions stand in the moves, so that no .dat file is needed. What is proven goes through the
-written points; the corners that C_PTP and C_VEL cut off are not. Moves on the wheel are straight by
+Positions stand in the moves, so that no .dat file is needed. How far C_PTP and C_VEL cut off
+corners is not known in millimetres. Moves on the wheel are straight by
 default; a single joint move may be one percent of top speed faster than planned, and passes keep
 their time.
 """

@@ -1,8 +1,8 @@
 """Reading KRL programs: PTP to axis angles and LIN to frames, speeds set before each move.
 
 KRL ignores case. A speed, a base, a tool and an approximation hold until they are set again; none
-of them may be missing at the first move, so that nothing of an earlier program counts. C_PTP and
-C_VEL are read, not played: the corners they cut off are not replayed. A speed of PTP is a whole
+of them may be missing at the first move, so that nothing of an earlier program counts. How far
+C_PTP and C_VEL cut off corners is not known in millimetres. A speed of PTP is a whole
 percent, so a single move may be one percent faster than it should; passes keep their time. LIN
 leads the tool in the hand ($IPO_MODE) and turns it evenly ($ORI_TYPE).
 """

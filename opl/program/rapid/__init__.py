@@ -1,14 +1,13 @@
 """ABB RAPID modules (IRC5 and later): written, read back.
 
 Joint moves carry their time and lead to joint angles; straight ones lead the part past a stationary
-tool at the wheel, to poses of it in the part, at the speed over the part. What is proven goes
-through the written points; the corners that zone z0 cuts off, up to 0.3 mm of the tool point, are
-not.
+tool at the wheel, to poses of it in the part, at the speed over the part. Corners are
+cut off within z0, 0.3 mm of the tool point.
 """
 
 from opl.program.digits import rounded_degrees
 from opl.program.listing import listing_reader
-from opl.program.posts import Post
+from opl.program.posts import Post, StationaryTools
 from opl.program.rapid.read import CORNERS, DECIMALS, START, parse
 from opl.program.rapid.tool_data import declaration_faults
 from opl.program.rapid.write import DIALECT, VARIABLES, tool_name, write
@@ -18,7 +17,7 @@ POST = Post(
     write,
     DIALECT.template,
     VARIABLES,
-    knows_stationary_tools=True,
+    stationary_tools=StationaryTools.USUAL,
     reader=listing_reader(
         DIALECT.suffix,
         parse,

@@ -1,7 +1,7 @@
 """Reading RAPID modules: MoveAbsJ to joint targets and MoveL to poses, each with its time.
 
-RAPID ignores case. The zones of the moves are read, not played: z0 lets the controller leave the
-written points by up to 0.3 mm of the tool point, which is not replayed.
+RAPID ignores case. Zones are read as how far the tool point is from a written point at the most
+where the controller leaves its move: 0.3 mm with z0.
 """
 
 from __future__ import annotations
@@ -21,7 +21,15 @@ V_DECIMALS = 3  # of speeds in [mm/s]
 # Of the move to the first configuration, which has no time.
 START = WrittenSpeed(SpeedUnit.TOOL_POINT, 0.05, "v50")
 _FINEST_ZONE = 0.3  # z0 in [mm] of the tool point; the others are named after theirs
-_ZONE = Corner(_FINEST_ZONE, "z0")
+
+
+def _corner(zone: str) -> Corner:
+    """Return the corner of a zone by its name."""
+    size = 0.0 if zone == "fine" else float(zone[1:]) or _FINEST_ZONE
+    return Corner(size, zone, 1e-3 * size)
+
+
+_ZONE = _corner("z0")
 CORNERS = Corners(Corner(0.0, "fine"), _ZONE, _ZONE, _ZONE)
 
 _WORDS = Words(
@@ -130,7 +138,7 @@ def _statement(notes: Notes, line: int, code: str, free: bool) -> None:
         target=target,
         straight=len(rows) > 1,
         speed=speed,
-        corner=Corner(0.0 if zone == "fine" else float(zone[1:]) or _FINEST_ZONE, zone),
+        corner=_corner(zone),
         tool=tool.lower().replace("\\wobj", "\\WObj"),
         frame="the frame of the part" if "\\" in tool else "the base frame",
         place=notes.place(line),

@@ -1,7 +1,7 @@
 """Universal Robots scripts (URScript): written, read back.
 
-Positions are joint positions in radians, of straight moves too; every move carries its time. What
-is proven goes through the written points; the corners that the blends cut off, up to 1 mm, are not.
+Positions are joint positions in radians, of straight moves too; every move carries its time.
+Corners are cut off within their blends, 1 mm at the most.
 """
 
 from opl.program.digits import rounded_radians

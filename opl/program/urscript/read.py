@@ -1,6 +1,7 @@
 """Reading UR scripts: movej and movel to joint positions, each with its time and blend.
 
-The blend radius r is read, not played: the corners it cuts off, up to 1 mm, are not replayed.
+The blend radius r is read as how far the tool point is from a written point at the most where the
+controller leaves its move.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from opl.program.statements import NUMBER, Listing, Notes, Words, read_enclosed
 DECIMALS = 6
 # No corner needs a larger blend than this in [m].
 LARGEST_BLEND = 0.001
-_BLEND = Corner(LARGEST_BLEND, f"r={LARGEST_BLEND:.5f}")
+_BLEND = Corner(LARGEST_BLEND, f"r={LARGEST_BLEND:.5f}", LARGEST_BLEND)
 CORNERS = Corners(Corner(0.0, "r=0.00000"), _BLEND, _BLEND, _BLEND)
 
 _BOOL = "(?:True|False)"
@@ -85,7 +86,7 @@ def _move(notes: Notes, line: int, found: re.Match[str], tool: str | None) -> Re
         target=np.array([float(joint) for joint in joints.split(",")]),
         straight=word == "movel",
         speed=speed,
-        corner=Corner(float(radius), f"r={radius}"),
+        corner=Corner(float(radius), f"r={radius}", float(radius)),
         tool=tool,
         place=notes.place(line),
         resolution=_HALF_DIGIT,

@@ -10,7 +10,7 @@ import { GLTFExporter } from "three/examples/jsm/exporters/GLTFExporter.js";
 import { type Block, colour, type Packed, type Page, type Solid } from "./data";
 
 const RED = 0xd03030;
-const [COARSE, FAST, SLOW, ENOUGH] = [0.5, 20, 40, 6]; // pixels for one of the page, ms of a picture, and how many of them tell
+const [COARSE, FAST, SLOW, ENOUGH] = [0.5, 20, 40, 6]; // pixels for one of the page, ms of a picture, and how many of them decide
 type Wheel = NonNullable<Page["wheel"]>;
 type Drawn = Mesh<BufferGeometry, MeshLambertMaterial>;
 
@@ -44,8 +44,8 @@ export class CellView {
   private waiting = false;
   private settling = 0;
   private moving = COARSE;
-  private pace = 0; // fast pictures less slow ones
-  private before = 0; // when the last one was asked for
+  private balance = 0; // fast pictures less slow ones
+  private before = 0; // when the last one was requested
   drawn = 0; // pictures made up to now
 
   constructor(private readonly canvas: HTMLCanvasElement, private readonly page: Page, private readonly block: Block) {
@@ -106,7 +106,7 @@ export class CellView {
     if (ends !== null) this.nearest.geometry.setAttribute("position", new BufferAttribute(Float32Array.from(ends), 3));
   }
 
-  // Bodies that collide get red and dark edges, so that they are told without colour too.
+  // Bodies that collide get red and dark edges, so that they are recognised without colour too.
   mark(names: string[]): void {
     for (const name of [...this.red, ...names]) {
       const red = names.includes(name);
@@ -129,7 +129,7 @@ export class CellView {
     if (this.ribbon === null) return;
     this.ribbon.visible = colours !== null;
     if (colours !== null) { // both edges of the band at a cutter point are of one colour
-      const both = Float32Array.from({ length: 2 * colours.length }, (_, k) => colours[3 * Math.floor(k / 6) + (k % 3)]);
+      const both = Float32Array.from({ length: 2 * colours.length }, (_, k) => linear(colours[3 * Math.floor(k / 6) + (k % 3)]));
       this.ribbon.geometry.setAttribute("color", new BufferAttribute(both, 3));
     }
     this.draw();
@@ -180,9 +180,9 @@ export class CellView {
       this.waiting = false;
       const took = now - this.before;
       this.before = now;
-      if (!atRest && took < 5 * SLOW) this.pace += took < FAST ? 1 : took > SLOW ? -1 : 0;
-      if (this.pace > ENOUGH && this.moving === COARSE) [this.moving, this.pace] = [Math.min(1, devicePixelRatio), 0];
-      if (this.pace < -ENOUGH && this.moving > COARSE) [this.moving, this.pace] = [COARSE, Number.NEGATIVE_INFINITY]; // once and for all
+      if (!atRest && took < 5 * SLOW) this.balance += took < FAST ? 1 : took > SLOW ? -1 : 0;
+      if (this.balance > ENOUGH && this.moving === COARSE) [this.moving, this.balance] = [Math.min(1, devicePixelRatio), 0];
+      if (this.balance < -ENOUGH && this.moving > COARSE) [this.moving, this.balance] = [COARSE, Number.NEGATIVE_INFINITY]; // once and for all
       const ratio = atRest ? 2 * devicePixelRatio : this.moving;
       if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
       this.renderer.render(this.scene, this.camera);
@@ -236,7 +236,7 @@ export class CellView {
     const triads = new BufferGeometry().setAttribute("position", places(points.triads));
     const hues = [[0.78, 0.06, 0.18], [0.18, 0.49, 0.2], [0.04, 0.31, 0.54]]; // all x axes, then y, then z
     const count = triads.getAttribute("position").count;
-    const hue = (_: unknown, k: number) => hues[Math.floor(k / count)][k % 3];
+    const hue = (_: unknown, k: number) => linear(hues[Math.floor(k / count)][k % 3]);
     triads.setAttribute("color", new BufferAttribute(Float32Array.from({ length: 3 * count }, hue), 3));
     this.frames = new LineSegments(triads, new LineBasicMaterial({ vertexColors: true }));
     this.ribbon.visible = this.frames.visible = false;
@@ -246,6 +246,9 @@ export class CellView {
     (this.joints.at(-1) ?? this.scene).add(onPart.add(this.ribbon, this.trace, this.frames, missed));
   }
 }
+
+// A part of a colour as light, which is what colours of corners are given in.
+const linear = (part: number): number => (part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
 
 function placed<T extends Group | Mesh>(object: T, pose: Matrix4): T {
   object.matrixAutoUpdate = false;

@@ -54,9 +54,7 @@ export class ContactChart {
     this.chosen(this.cell(place));
   }
 
-  nearestTo(point: number, t: number): { point: number; position: number } {
-    return { point: Math.round(point), position: nearest(this.t, t) };
-  }
+  nearestTo = (point: number, t: number) => ({ point: Math.round(point), position: nearest(this.t, t) });
 
   // Where the robot is now; null off the wheel.
   cursor(point: number | null, t: number | null): void {

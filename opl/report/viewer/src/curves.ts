@@ -80,8 +80,7 @@ export function after(times: ArrayLike<number>, time: number): number {
   let [low, high] = [0, times.length - 1];
   while (low < high) {
     const middle = (low + high) >> 1;
-    if (times[middle] < time) low = middle + 1;
-    else high = middle;
+    [low, high] = times[middle] < time ? [middle + 1, high] : [low, middle];
   }
   return low;
 }

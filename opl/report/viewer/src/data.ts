@@ -69,9 +69,7 @@ export class Block {
     return Object.fromEntries(packed.map(([name, value]) => [name, this.array(value)])) as Unpacking<R>;
   }
 
-  text(packed: Packed): string {
-    return new TextDecoder().decode(this.array(packed));
-  }
+  text = (packed: Packed): string => new TextDecoder().decode(this.array(packed));
 }
 
 export const degrees = (angle: number): number => (angle * 180) / Math.PI;

@@ -34,9 +34,7 @@ class Viewer {
     if (this.motion !== null) this.connectPlayer();
     this.connectControls();
     this.listProgram();
-    for (const [id, mark] of Object.entries(page.marks)) {
-      for (const row of document.querySelectorAll(`[data-mark="${id}"]`)) row.addEventListener("click", () => this.showAndScroll(() => this.showMark(mark)));
-    }
+    for (const row of document.querySelectorAll<HTMLElement>("[data-mark]")) row.addEventListener("click", () => this.showAndScroll(() => this.showMark(page.marks[row.dataset.mark ?? ""])));
     if (page.marks.start !== undefined) this.showMark(page.marks.start);
     else if (this.motion !== null) this.showTime(0);
     else if (page.home !== null) this.show({ q: page.home, time: null, point: null, t: null, hit: [], text: "home" });
@@ -63,7 +61,7 @@ class Viewer {
     const { motion, page } = this;
     if (motion === null) return;
     if (!playing) this.stop();
-    this.time = Math.max(0, Math.min(time, this.end));
+    this.time = Math.fround(Math.max(0, Math.min(time, this.end))); // in as many digits as the times of the motion
     const move = Math.max(1, after(motion.time, this.time));
     const length = motion.time[move] - motion.time[move - 1];
     const part = length > 0 ? (this.time - motion.time[move - 1]) / length : 1;
@@ -84,7 +82,7 @@ class Viewer {
     let last = move - 1;
     while (last > 0 && Number.isNaN(motion.point[last])) last--;
     this.view?.ground(onWheel ? point : motion.point[last]);
-    this.tellLine(move);
+    this.markLine(move);
   }
 
   private listProgram(): void {
@@ -102,7 +100,15 @@ class Viewer {
         row.addEventListener("click", () => this.showAndScroll(() => this.showTime(motion.time[move])));
         this.lines.set(move, { row, at });
       }
-      element(`program-${file}`).replaceChildren(...rows);
+      const home = element(`program-${file}`);
+      home.replaceChildren(...rows);
+      home.addEventListener("keydown", (event) => {
+        const moves = [...home.querySelectorAll<HTMLElement>(".move")];
+        const [now, step] = [moves.findIndex((row) => row === this.now?.row), { ArrowDown: 1, ArrowUp: -1 }[event.key] ?? 0];
+        if (step === 0) return;
+        event.preventDefault();
+        moves[now + step]?.click();
+      });
     });
   }
 
@@ -113,7 +119,7 @@ class Viewer {
   }
 
   // The line of the program that is being played, marked and in sight.
-  private tellLine(move: number): void {
+  private markLine(move: number): void {
     while (move < (this.motion?.time.length ?? 0) && !this.lines.has(move)) move++; // a line may lead over several moves
     const line = this.lines.get(move);
     if (line === this.now) return;
@@ -210,9 +216,7 @@ class Viewer {
       box.addEventListener("change", () => this.view?.show(what, box.checked));
     }
     element<HTMLInputElement>("line").addEventListener("change", () => this.shown?.time != null && this.showTime(this.time));
-    element("save").addEventListener("click", async () => {
-      download(URL.createObjectURL((await this.view?.save()) ?? new Blob()), "glb");
-    });
+    element("save").addEventListener("click", async () => download(URL.createObjectURL((await this.view?.save()) ?? new Blob()), "glb"));
     element("picture").addEventListener("click", () => download(element<HTMLCanvasElement>("view").toDataURL(), "png"));
     const paint = element<HTMLSelectElement>("paint");
     paint.addEventListener("change", () => this.paintPasses(paint.value));
@@ -235,7 +239,7 @@ const hover = (text: string) => write("hover", text);
 async function start(): Promise<void> {
   const page: Page = JSON.parse(element("page-data").textContent ?? "");
   const block = await Block.inflate((element("page-block").textContent ?? "").trim());
-  Object.assign(window, { opl: new Viewer(page, block) }); // for whoever asks at the console, as tests do
+  Object.assign(window, { opl: new Viewer(page, block) }); // for use at the console, and in tests
   document.body.classList.add("ready");
 }
 

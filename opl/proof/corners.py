@@ -1,0 +1,233 @@
+"""The corners of a program as a controller may round them: contact, depth, clearance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.cell.robot import forward_kinematics
+from opl.findings import Finding, Level
+from opl.geometry.frames import Array, inverse
+from opl.geometry.toolpath import CutterPoints
+from opl.job.load import Job
+from opl.motion.motion import Motion
+from opl.program.played import Playback
+from opl.proof.roundings import DEPTHS, Rounding, roundings
+from opl.verification.contact import contact_positions
+from opl.verification.triangles import Triangles
+from opl.verification.world import World
+
+MOST_NAMED = 3  # corners of each kind of fault
+_NUDGE = 1e-3  # of a cutter point, for the way along a pass
+_NEWTON = 2  # steps to the place of a pass that an edge of the wheel grinds
+
+
+@dataclass(frozen=True)
+class CornerProof:
+    """What rounding leaves of a program.
+
+    Attributes:
+        rounded: Number of corners that may be rounded.
+        unknown: Number of those whose zones nobody knows: half of each move is taken for them.
+        max_contact_error: Largest distance of the ground point from the wheel's surface on any
+            rounding between moves on the wheel in [m].
+        place: Where that is, empty without contact.
+        allowed: How large it may be in [m].
+        at_ends: The same where the part meets and leaves the belt, which is told, not limited: a
+            rounding begins to lift it off before the end of the pass.
+        findings: What is wrong.
+    """
+
+    rounded: int
+    unknown: int
+    max_contact_error: float
+    place: str
+    allowed: float
+    at_ends: float
+    findings: tuple[Finding, ...]
+
+
+def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playback) -> CornerProof:
+    """Prove every rounding of a program inside its zones, see `opl.proof.roundings`.
+
+    Contact and depth in the belt are looked at on chords across each triangle, clearances all over
+    it. Limits and order need no look: where both moves keep them, so does what lies between.
+
+    Args:
+        job: Cell and tolerances.
+        points: Its cutter points.
+        motion: What the program does, with its meaning, a written configuration for each move.
+        playback: The moves.
+    """
+    zones = np.array([move.corner.zone for move in playback.moves])
+    allowed, tool_points = job.search.max_contact_error, tool_points_of(job)
+    corners = list(roundings(motion, zones, tool_points))
+    errors = contact_errors(job, points, motion, corners)
+    inner = np.array([all(corner.grinds) for corner in corners], dtype=bool)
+    worst = np.where(inner, errors[:, -1], 0.0)
+    faults: list[tuple[Rounding, str]] = []
+    for one in np.argsort(-worst, kind="stable")[:MOST_NAMED].tolist():
+        if worst[one] > allowed:
+            part = np.interp(allowed, np.append(0.0, errors[one]), np.append(0.0, DEPTHS))
+            fits = 1e3 * part * corners[one].reach(tool_points)
+            faults.append(
+                (
+                    corners[one],
+                    f"leaves the ground point {1e3 * worst[one]:.3f} mm from the wheel's surface, "
+                    f"{1e3 * allowed:g} mm allowed; a zone of {np.floor(100.0 * fits) / 100.0:g} "
+                    "mm would do",
+                )
+            )
+    faults += _too_near(job, corners)
+    most = int(worst.argmax()) if worst.max(initial=0.0) > 0.0 else None
+    return CornerProof(
+        len(corners),
+        int(np.isinf(zones[[corner.k for corner in corners]]).sum()),
+        0.0 if most is None else float(worst[most]),
+        "" if most is None else _place(motion, corners[most]),
+        allowed,
+        float(errors[~inner, -1].max(initial=0.0)),
+        tuple(
+            Finding(
+                Level.ERROR,
+                "corner",
+                f"{_place(motion, corner)} ({playback.moves[corner.k].place})",
+                f"{playback.moves[corner.k].corner.told} {fault}",
+            )
+            for corner, fault in faults
+        ),
+    )
+
+
+def tool_points_of(job: Job) -> Callable[[Array], Array]:
+    """Return what gives the tool point, of which zones count, see `roundings`."""
+    robot, led = job.cell.robot, job.program.led
+    return lambda q: np.asarray(led.frames(forward_kinematics(robot, q))[..., :3, 3])
+
+
+def _place(motion: Motion, corner: Rounding) -> str:
+    return motion.place(int(motion.positions[corner.k]))
+
+
+def too_wide(
+    job: Job, points: CutterPoints, zone: float, motion: Motion
+) -> Iterator[tuple[int, int, int]]:
+    """Yield the corners on the wheel that a zone in [m] is too wide for, see `PositionRule`."""
+    positions = motion.positions
+    zones = np.where(motion.on_wheel[positions], zone, 0.0)
+    corners = list(roundings(motion, zones, tool_points_of(job)))
+    errors = contact_errors(job, points, motion, corners)[:, -1]
+    for corner, error in zip(corners, errors, strict=True):
+        if all(corner.grinds) and error > job.search.max_contact_error:
+            before, here, after = positions[corner.k - 1 : corner.k + 2].tolist()
+            yield before, here, after
+
+
+def contact_errors(
+    job: Job, points: CutterPoints, motion: Motion, corners: list[Rounding]
+) -> Array:
+    """Return the largest distances of ground points from the wheel's surface in [m], (n, DEPTHS).
+
+    Down to each depth of the triangle, with what parabolas through three neighbours have between
+    them. On an edge of the wheel a point that is too deep may be near its side: there the distance
+    along the normal of the contact counts where it is larger.
+    """
+    if not corners:
+        return np.zeros((0, len(DEPTHS)))
+    wheel = job.cell.wheel
+    place = np.stack([corner.places(_lead_pace(job, points, corner)) for corner in corners])
+    known = np.isfinite(place)
+    q = np.stack([corner.configurations() for corner in corners])[known]
+    Ts_contact0_workpiece = (
+        inverse(wheel.T_base_contact0)
+        @ forward_kinematics(job.cell.robot, q)
+        @ job.cell.T_flange_workpiece
+    )
+    index = motion.pass_index[motion.positions[[corner.k for corner in corners]]]
+    of_point = np.broadcast_to(index[:, None, None], place.shape)[known]
+    first = np.searchsorted(points.pass_index, of_point)
+    last = np.searchsorted(points.pass_index, of_point, side="right") - 1
+    at = np.clip(place[known], first, last)
+    for _ in range(_NEWTON):
+        # an edge grinds what comes to it: the place where the pass crosses it
+        Ts = Ts_contact0_workpiece @ points.frames_at(at)
+        t = contact_positions(wheel, Ts)
+        T_contact_contact0 = inverse(wheel.T_contact0_contact(t))
+        here = (T_contact_contact0 @ Ts)[:, 0, 3]
+        nudged = np.where(at + _NUDGE <= last, _NUDGE, -_NUDGE)
+        there = T_contact_contact0 @ Ts_contact0_workpiece @ points.frames_at(at + nudged)
+        pace = (there[:, 0, 3] - here) / nudged
+        on_edge = (np.abs(t) > wheel.flat_end) & (pace != 0.0)
+        step = np.where(on_edge, -here / np.where(pace == 0.0, 1.0, pace), 0.0)
+        at = np.clip(at + np.clip(step, -1.0, 1.0), first, last)
+    Ts = Ts_contact0_workpiece @ points.frames_at(at)
+    Ts_contact0_contact = wheel.T_contact0_contact(contact_positions(wheel, Ts))
+    apart = Ts[:, :3, 3] - Ts_contact0_contact[:, :3, 3]
+    found = np.full((2, *place.shape), np.nan)
+    found[0, known] = wheel.signed_distance(Ts[:, :3, 3])
+    found[1, known] = (Ts_contact0_contact[:, :3, 2] * apart).sum(axis=1)
+    error = np.nan_to_num(_with_bows(found)).max(axis=(0, 3))
+    return np.asarray(np.maximum.accumulate(error, axis=1))
+
+
+def _lead_pace(job: Job, points: CutterPoints, corner: Rounding) -> float:
+    """Return how many cutter points a lead next to the end of a pass passes in all of its move.
+
+    The part is only moved on a lead, so every point of it moves as the flange does.
+    """
+    if sum(corner.grinds) != 1:
+        return 0.0
+    lead, way = (corner.after, 1) if corner.grinds[0] else (corner.before, -1)
+    here = round(float(lead.place[0]))
+    step = abs(points.arc_length[here] - points.arc_length[here - way])
+    p_flange = forward_kinematics(job.cell.robot, lead.q)[:, :3, 3]
+    return float(np.linalg.norm(np.diff(p_flange, axis=0), axis=1).sum() / step)
+
+
+def _with_bows(values: Array) -> Array:
+    """Return amounts at places, and those of the parabolas through any three neighbours.
+
+    `values` have shape (..., n), the amounts, none below 0 and NaN where nothing is known, more.
+    """
+    first, middle, last = values[..., :-2], values[..., 1:-1], values[..., 2:]
+    slope, bend = (last - first) / 2.0, first - 2.0 * middle + last
+    inside = np.abs(slope) < np.abs(bend)
+    vertex = middle - np.where(inside, slope**2 / (2.0 * np.where(inside, bend, 1.0)), 0.0)
+    return np.asarray(np.abs(np.concatenate([values, vertex], axis=-1)))
+
+
+def _too_near(job: Job, corners: list[Rounding]) -> Iterator[tuple[Rounding, str]]:
+    """Yield corners that bring something too near, and what."""
+    with World(job.cell) as world:
+        triangles, named = Triangles(world), [0, 0]
+        for corner in corners:
+            found = triangles.too_near(*corner.triangle(), corner.free)
+            if found is not None and named[0] < MOST_NAMED:
+                named[0] += 1
+                yield (
+                    corner,
+                    f"brings {found.names} to {1e3 * found.distance:.2f} mm, "
+                    f"{1e3 * found.needed:g} mm needed",
+                )
+            deepest = _deepest(world, job, corner)
+            if deepest > job.cell.max_belt_penetration and named[1] < MOST_NAMED:
+                named[1] += 1
+                yield (
+                    corner,
+                    f"takes the part {1e3 * deepest:.3f} mm into the belt, "
+                    f"{1e3 * job.cell.max_belt_penetration:g} mm allowed",
+                )
+
+
+def _deepest(world: World, job: Job, corner: Rounding) -> float:
+    """Return how deep the part is in the belt on some chords in [m], 0 where it must keep off."""
+    if corner.free:
+        return 0.0
+    gaps, on_chords = [], corner.configurations()
+    # their ends lie on the moves
+    for q in (*on_chords[-1, 4:-1:4], *on_chords[1, 8:-1:8]):
+        world.move_to(q)
+        gaps.append(world.gap(0.0))
+    return max(0.0, -min(gaps))
