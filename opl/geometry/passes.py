@@ -48,7 +48,7 @@ class Order(str, Enum):
     ONE_WAY = "one_way"  # row by row, all in the direction of axis x
     ZIGZAG = "zigzag"  # row by row, every second one backwards
     BOTH = "both"  # row by row, each there and back
-    SHORTEST = "shortest"  # in whatever order and direction leaves the shortest links
+    SHORTEST = "shortest"  # in whatever order and direction leaves the shortest way between them
 
 
 class PassKind(str, Enum):
@@ -134,7 +134,12 @@ class LaidPasses:
     bending: Array
 
 
-def lay_passes(surface: MachinedSurface, passes: Passes) -> LaidPasses:
+ShortestOrder = Callable[[Sequence[Array]], list[tuple[int, int]]]
+
+
+def lay_passes(
+    surface: MachinedSurface, passes: Passes, shortest: ShortestOrder = shortest_links
+) -> LaidPasses:
     """Return the cutter points of a surface.
 
     The rows lie in the middle of the surface's extent along the planes' normal, in order along it.
@@ -146,6 +151,7 @@ def lay_passes(surface: MachinedSurface, passes: Passes) -> LaidPasses:
     Args:
         surface: The surface to grind, in the workpiece frame.
         passes: How it is cut.
+        shortest: Finds the order `Order.SHORTEST`, given the frames of each pass.
 
     Raises:
         DegenerateNormalError: If a pass runs through a place where the surface has no normal.
@@ -170,7 +176,7 @@ def lay_passes(surface: MachinedSurface, passes: Passes) -> LaidPasses:
     except TooManyStepsError as error:
         raise PassesError(error.limit, str(error)) from error
     laid = [_Laid(*one) for one in zip(curves, nodes, strict=True)]
-    order = list(_ordered(rows, laid, passes.order))
+    order = list(_ordered(rows, laid, passes.order, shortest))
     return LaidPasses(
         CutterPoints(
             Ts_workpiece_cutter=np.concatenate([laid[i].frames[::step] for i, step in order]),
@@ -267,11 +273,14 @@ class _Laid:
 
 
 def _ordered(
-    rows: Sequence[Sequence[SurfaceCurve]], laid: Sequence[_Laid], order: Order
+    rows: Sequence[Sequence[SurfaceCurve]],
+    laid: Sequence[_Laid],
+    order: Order,
+    shortest: ShortestOrder,
 ) -> Iterator[tuple[int, int]]:
     """Yield which curve comes next, and 1 if it is travelled forwards, -1 if backwards."""
     if order is Order.SHORTEST:
-        yield from shortest_links(np.stack([one.frames[[0, -1]] for one in laid]))
+        yield from shortest([one.frames for one in laid])
         return
     first = 0
     for number, row in enumerate(rows):

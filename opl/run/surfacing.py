@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from opl.errors import InputError
 from opl.geometry.inspection import inspect
 from opl.geometry.nurbs import DegenerateNormalError
 from opl.geometry.passes import PassesError, lay_passes
 from opl.job import keys
 from opl.job.load import Job
+from opl.motion.pass_order import quickest_order
 from opl.run.values import Surfaced
 from opl.run.watch import Stage, Watch
 
@@ -23,7 +26,8 @@ def cut_surface(job: Job, watch: Watch | None = None) -> Surfaced:
     """
     with (watch or Watch()).stage(Stage.CUTTER_POINTS):
         try:
-            laid = lay_passes(job.surface, job.passes)
+            order = partial(quickest_order, job.cell, job.process)
+            laid = lay_passes(job.surface, job.passes, order)
         except DegenerateNormalError as error:
             raise InputError(job.source.at(keys.SURFACE), str(error)) from error
         except PassesError as error:

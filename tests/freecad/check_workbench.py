@@ -81,6 +81,7 @@ def walked(desk, service, script, program=("freecadcmd",), **given):
         env={
             **os.environ,
             "HOME": str(desk),
+            "PYTHONPATH": str(WALK.parent),
             "OPL_WALK": json.dumps(whole),
             "QTWEBENGINE_DISABLE_SANDBOX": "1",  # FreeCAD's start page, where CI is root
         },
@@ -185,6 +186,8 @@ def red(path):
 def test_the_panel_is_no_wider_than_the_column_of_tasks(window):
     panel, column = window["width"]
     assert panel <= column
+    end_of_last, titles, panel = window["titles"]
+    assert end_of_last < titles <= panel
 
 
 def test_faces_that_are_clicked_on_become_a_job_in_the_panel(window):

@@ -1,20 +1,10 @@
-"""Walks through the workbench in FreeCAD without its window, as a user would; started by a test.
-
-Takes what it needs from the variable OPL_WALK, a JSON object, and writes what it saw to `told`.
-"""
-
-import json
-import os
-import sys
-import traceback
+"""Walks through the workbench in FreeCAD without its window, as a user would; started by a test."""
 
 import FreeCAD
 import Part
 from opl_workbench import cell_files, job_object, job_text, motion_object, running
 from opl_workbench.client import Client
-
-given = json.loads(os.environ["OPL_WALK"])
-told = {}
+from walking import given, set_up, tell, told
 
 
 def faces_outside(part):
@@ -34,12 +24,7 @@ def walk():
     part = document.Objects[-1]
     job = job_object.make_job(document, part, faces_outside(part))
     job.JobName = "V_STEP"
-    for name, rows in given["placements"].items():
-        setattr(job, name, job_object.placement(rows))
-    job.Flange = job.Flange.inverse()  # given as the part in the flange's frame
-    job.Gripper = [stem(document, job)]
-    for name, value in given["properties"].items():
-        setattr(job, name, value)
+    job.Gripper = [set_up(document, job)]
     document.recompute()
 
     states = []
@@ -80,20 +65,4 @@ def walk():
     told["of_cell_file"] = [job.Status, job.Message, solids, sorted(running.kept(job, "CellKept"))]
 
 
-def stem(document, job):
-    """Return the stem between flange and part, drawn where it holds the part."""
-    stem = document.addObject("Part::Cylinder", "Stem")
-    stem.Radius, stem.Height = 22.0, 100.0
-    stem.Placement = job.Flange
-    document.recompute()
-    return stem
-
-
-try:
-    walk()
-except Exception:
-    told["failed"] = traceback.format_exc()
-with open(given["told"], "w", encoding="utf-8") as file:
-    json.dump(told, file)
-sys.stdout.flush()
-os._exit(0)  # FreeCAD would wait for commands
+tell(walk)

@@ -1,23 +1,18 @@
 """Walks through the workbench with FreeCAD's window, as a user would; started by a test.
 
-Takes what it needs from the variable OPL_WALK, a JSON object, and writes what it saw to `told`;
-pictures of the window lie beside it.
+Pictures of the window lie beside what it tells.
 """
 
-import json
 import os
 import subprocess
-import sys
 import time
-import traceback
 
 import FreeCAD
 import FreeCADGui
 import Part
 from PySide import QtCore, QtGui
+from walking import given, set_up, tell, told
 
-given = json.loads(os.environ["OPL_WALK"])
-told = {}
 PATIENCE = 120.0  # [s] for a run
 
 
@@ -61,14 +56,7 @@ def walk():
     from opl_workbench import job_object, panel
 
     (job,) = job_object.jobs_of(document)
-    for name, rows in given["placements"].items():
-        setattr(job, name, job_object.placement(rows))
-    job.Flange = job.Flange.inverse()
-    stem = document.addObject("Part::Cylinder", "Stem")
-    stem.Radius, stem.Height, stem.Placement = 22.0, 100.0, job.Flange
-    for name, value in given["properties"].items():
-        setattr(job, name, value)
-    document.recompute()
+    stem = set_up(document, job)
     FreeCADGui.Selection.clearSelection()
     FreeCADGui.Selection.addSelection(stem)
     desk = panel.open_panel(job)
@@ -112,6 +100,8 @@ def walk():
     while not isinstance(column, QtGui.QScrollArea):
         column = column.parentWidget()
     told["width"] = [desk.form.width(), column.viewport().width()]
+    titles = desk.tabs.tabBar()
+    told["titles"] = [titles.tabRect(3).right(), titles.width(), desk.form.width()]
     for tab in range(4):
         desk.tabs.setCurrentIndex(tab)
         picture(f"tab_{tab}")
@@ -142,15 +132,4 @@ def walk():
     told["cancelled"] = job.Status
 
 
-def main():
-    try:
-        walk()
-    except BaseException:
-        told["failed"] = traceback.format_exc()
-    with open(given["told"], "w", encoding="utf-8") as file:
-        json.dump(told, file)
-    sys.stdout.flush()
-    os._exit(0)
-
-
-QtCore.QTimer.singleShot(500, main)
+QtCore.QTimer.singleShot(500, lambda: tell(walk))

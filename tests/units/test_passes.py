@@ -1,7 +1,10 @@
 import json
+from itertools import pairwise, permutations, product
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 from scipy.spatial import cKDTree
 
@@ -10,7 +13,7 @@ from opl.geometry.coverage import uncovered
 from opl.geometry.frames import rotation_angle
 from opl.geometry.machined import load_faces
 from opl.geometry.nurbs import NurbsSurface
-from opl.geometry.order import shortest_links
+from opl.geometry.order import MOST_EXACT, least_tour, shortest_links
 from opl.geometry.passes import Order, Passes, PassKind, lay_passes
 from opl.geometry.patchwork import Face, Patchwork
 from opl.geometry.scallop import row_pitch, scallop_pitch
@@ -226,27 +229,57 @@ def test_the_shortest_order_is_shorter_where_a_hole_splits_the_rows():
     assert ways[Order.SHORTEST] < 0.7 * ways[Order.ZIGZAG] < ways[Order.ONE_WAY]
 
 
-def test_the_shortest_order_of_scattered_passes_is_near_the_best_of_all():
-    from itertools import pairwise, permutations, product
+def tour_cost(links, home, tour):
+    """Return what a tour costs, from home to home."""
+    starts = [2 * index + (step < 0) for index, step in tour]
+    way = sum(links[a ^ 1, b] for a, b in pairwise(starts))
+    return home[starts[0]] + way + home[starts[-1] ^ 1]
 
+
+def every_tour(n):
+    for order in permutations(range(n)):
+        for signs in product((1, -1), repeat=n):
+            yield list(zip(order, signs, strict=True))
+
+
+@given(st.integers(1, 5), st.integers(0, 10**6))
+@settings(max_examples=15, deadline=None)
+def test_the_cheapest_of_few_passes_is_the_best_of_all_orders_and_directions(n, seed):
+    links, home = scattered(n, seed)
+    found = least_tour(links, home)
+    assert sorted(index for index, _ in found) == list(range(n))
+    best = min(tour_cost(links, home, tour) for tour in every_tour(n))
+    assert tour_cost(links, home, found) == pytest.approx(best, abs=1e-7)
+    assert found[0][0] <= found[-1][0]  # the same way back costs the same
+
+
+def scattered(n, seed):
+    """Return what links cost between the ends of passes in the plane, and to a home."""
+    rng = np.random.default_rng(seed)
+    ends = rng.random((2 * n, 2))
+    links = np.linalg.norm(ends[:, None] - ends, axis=-1)
+    return links, np.linalg.norm(ends - rng.random(2), axis=-1)
+
+
+def test_the_order_of_many_passes_is_no_worse_than_row_by_row_and_near_the_best():
+    links, home = scattered(MOST_EXACT + 2, 3)
+    found = tour_cost(links, home, least_tour(links, home))
+    by_rows = [(index, 1 if index % 2 == 0 else -1) for index in range(MOST_EXACT + 2)]
+    assert found < 0.7 * tour_cost(links, home, by_rows)
+    # one pass fewer cannot cost more where distances keep the triangle inequality
+    few = 2 * MOST_EXACT
+    least = least_tour(links[:few, :few], home[:few])
+    assert found > tour_cost(links, home, least) - 1e-9
+
+
+def test_shortest_links_leave_no_shorter_way_between_passes():
     rng = np.random.default_rng(5)
-    Ts = np.tile(np.eye(4), (5, 2, 1, 1))
-    Ts[..., :3, 3] = rng.random((5, 2, 3))
-
-    def way(order):
-        return sum(
-            np.linalg.norm(Ts[b, 0 if q > 0 else 1, :3, 3] - Ts[a, 1 if p > 0 else 0, :3, 3])
-            for (a, p), (b, q) in pairwise(order)
-        )
-
-    best = min(
-        way(list(zip(order, signs, strict=True)))
-        for order in permutations(range(5))
-        for signs in product((1, -1), repeat=5)
-    )
-    found = shortest_links(Ts)
-    assert sorted(index for index, _ in found) == list(range(5))
-    assert way(found) <= 1.1 * best
+    Ts = np.tile(np.eye(4), (4, 2, 1, 1))
+    Ts[..., :3, 3] = rng.random((4, 2, 3))
+    ends = Ts.reshape(8, 4, 4)[:, :3, 3]
+    links = np.linalg.norm(ends[:, None] - ends, axis=-1)
+    best = min(tour_cost(links, np.zeros(8), tour) for tour in every_tour(4))
+    assert tour_cost(links, np.zeros(8), shortest_links(Ts)) == pytest.approx(best, abs=1e-7)
 
 
 # lines of constant parameter

@@ -16,16 +16,22 @@ from .views import ICONS, JobView
 COMMANDS = ["Opl_NewJob", "Opl_OpenJob"]
 
 
-class NewJob:
-    """Makes a job of the faces that are picked, and opens its panel."""
+class _Command:
+    """What FreeCAD asks of a command."""
+
+    icon = text = tip = ""
 
     def GetResources(self) -> dict[str, str]:
         """Return icon and texts."""
-        return {
-            "Pixmap": os.path.join(ICONS, "job.svg"),
-            "MenuText": "New grinding job",
-            "ToolTip": "Make a job of the faces that are picked",
-        }
+        icon = os.path.join(ICONS, self.icon)
+        return {"Pixmap": icon, "MenuText": self.text, "ToolTip": self.tip}
+
+
+class NewJob(_Command):
+    """Makes a job of the faces that are picked, and opens its panel."""
+
+    icon, text = "job.svg", "New grinding job"
+    tip = "Make a job of the faces that are picked"
 
     def IsActive(self) -> bool:
         """Return whether there is a document."""
@@ -39,7 +45,7 @@ class NewJob:
             FreeCAD.Console.PrintWarning(f"opl: {error}\n")
             part, faces = None, []
         document = FreeCAD.ActiveDocument
-        document.openTransaction("New grinding job")
+        document.openTransaction(self.text)
         job = make_job(document, part, faces)
         JobView(job.ViewObject)
         document.recompute()
@@ -47,16 +53,11 @@ class NewJob:
         open_panel(job)
 
 
-class OpenJob:
+class OpenJob(_Command):
     """Opens the panel of a job."""
 
-    def GetResources(self) -> dict[str, str]:
-        """Return icon and texts."""
-        return {
-            "Pixmap": os.path.join(ICONS, "motion.svg"),
-            "MenuText": "Open grinding job",
-            "ToolTip": "Open the panel of the job that is picked: passes, run, motion, programs",
-        }
+    icon, text = "motion.svg", "Open grinding job"
+    tip = "Open the panel of the job that is picked: passes, run, motion, programs"
 
     def IsActive(self) -> bool:
         """Return whether it is clear which job is meant."""

@@ -71,12 +71,27 @@ FOUND = (
 V_CONTACT = ((0.007, 0.0, 1.0, 890.0), (1.0, 0.0, -0.007, 235.0), (0.0, 1.0, 0.0, 323.0))
 
 
-class Job:
-    """What FreeCAD asks of the object."""
+class Proxy:
+    """What FreeCAD asks of an object of the workbench; a document keeps which kind it is."""
+
+    def __init__(self, obj: Any, kind: str) -> None:
+        self.Type = kind
+        obj.Proxy = self
+
+    def __getstate__(self) -> str:
+        return self.Type
+
+    def __setstate__(self, state: str) -> None:
+        self.Type = state
+
+    dumps, loads = __getstate__, __setstate__  # their names from FreeCAD 0.21.2 on
+
+
+class Job(Proxy):
+    """What is asked for, and what became of it."""
 
     def __init__(self, obj: Any) -> None:
-        self.Type = KIND
-        obj.Proxy = self
+        super().__init__(obj, KIND)
         for name, kind, group, value, meaning in ASKED:
             obj.addProperty(f"App::Property{kind}", name, group, meaning)
             if value is not None:
@@ -101,14 +116,6 @@ class Job:
         if obj.Asked and obj.Status and asked_digest(obj) != obj.Asked:
             obj.Status = "changed"
 
-    def __getstate__(self) -> str:
-        return self.Type
-
-    def __setstate__(self, state: str) -> None:
-        self.Type = state
-
-    dumps, loads = __getstate__, __setstate__  # their names from FreeCAD 0.21.2 on
-
 
 def make_job(document: Any, part: Any = None, faces: Any = ()) -> Any:
     """Add a job to a document, for some faces of a part; return its object."""
@@ -124,12 +131,12 @@ def make_job(document: Any, part: Any = None, faces: Any = ()) -> Any:
 def jobs_of(document: Any) -> list[Any]:
     """Return the jobs of a document."""
     objects = document.Objects if document is not None else ()
-    return [obj for obj in objects if is_job(obj)]
+    return [obj for obj in objects if is_of(obj, KIND)]
 
 
-def is_job(obj: Any) -> bool:
-    """Return whether an object is a job."""
-    return getattr(getattr(obj, "Proxy", None), "Type", None) == KIND
+def is_of(obj: Any, kind: str) -> bool:
+    """Return whether an object of a document is one of the workbench, of a kind."""
+    return getattr(getattr(obj, "Proxy", None), "Type", None) == kind
 
 
 def placement(rows: Any) -> Any:

@@ -9,16 +9,16 @@ import math
 from typing import Any
 
 from .found import cell_of, motion_of
+from .job_object import Proxy, is_of
 
 KIND = "OplMotion"
 
 
-class MotionView:
-    """What FreeCAD asks of the object."""
+class MotionView(Proxy):
+    """The cell at a moment."""
 
     def __init__(self, obj: Any, job: Any) -> None:
-        self.Type = KIND
-        obj.Proxy = self
+        super().__init__(obj, KIND)
         add = obj.addProperty
         add("App::PropertyLink", "Job", "Motion", "The job whose motion this is")
         add("App::PropertyFloat", "Moment", "Motion", "Time since the start in s")
@@ -41,19 +41,11 @@ class MotionView:
         obj.Part = cell.part(q)
         obj.Posture = [math.degrees(angle) for angle in q]
 
-    def __getstate__(self) -> str:
-        return self.Type
-
-    def __setstate__(self, state: str) -> None:
-        self.Type = state
-
-    dumps, loads = __getstate__, __setstate__  # their names from FreeCAD 0.21.2 on
-
 
 def motion_view_of(job: Any) -> Any:
     """Return the object that shows the motion of a job, made if there is none."""
     for obj in job.InList:
-        if getattr(getattr(obj, "Proxy", None), "Type", None) == KIND:
+        if is_of(obj, KIND):
             return obj
     obj = job.Document.addObject("App::FeaturePython", "Motion")
     MotionView(obj, job)

@@ -60,6 +60,9 @@ class Panel:
 
     def _add_tabs(self) -> None:
         self.tabs = QtGui.QTabWidget()
+        # all four titles are seen where FreeCAD's column of tasks is narrow
+        self.tabs.setStyleSheet("QTabBar::tab { padding: 3px 2px; min-width: 0px; }")
+        self.tabs.setUsesScrollButtons(False)
         for title, names in TABS:
             page = QtGui.QWidget()
             form = QtGui.QFormLayout(page)
