@@ -19,6 +19,7 @@ from opl.verification.contact import contact_positions
 from opl.verification.triangles import Triangles
 from opl.verification.world import World
 
+AT_ONCE = 128  # corners whose frames are held in memory
 MOST_NAMED = 3  # corners of each kind of fault
 _NUDGE = 1e-3  # of a cutter point, for the way along a pass
 _NEWTON = 2  # steps to the place of a pass that an edge of the wheel grinds
@@ -134,8 +135,14 @@ def contact_errors(
     them. On an edge of the wheel a point that is too deep may be near its side: there the distance
     along the normal of the contact counts where it is larger.
     """
-    if not corners:
-        return np.zeros((0, len(DEPTHS)))
+    parts = [np.zeros((0, len(DEPTHS)))]
+    for first in range(0, len(corners), AT_ONCE):
+        parts.append(_errors(job, points, motion, corners[first : first + AT_ONCE]))
+    return np.concatenate(parts)
+
+
+def _errors(job: Job, points: CutterPoints, motion: Motion, corners: list[Rounding]) -> Array:
+    """Do `contact_errors` for one corner or more."""
     wheel = job.cell.wheel
     place = np.stack([corner.places(_lead_pace(job, points, corner)) for corner in corners])
     known = np.isfinite(place)

@@ -77,18 +77,10 @@ def prove(
     playback = reading.playback
     if playback is None:
         return Proof(tuple(files), reading.foreign, 0, None, None, reading.findings)
-    search = job.search
-    rule = Rule(
-        search.max_contact_error,
-        search.interpolation.max_contact_step,
-        job.process.approach_length,
-        job.process.approach_turn,
-        job.process.approach_run,
-        job.process.feed,
-    )
+    rule = rule_of(job)
     motion = playback.q, playback.duration, playback.stations
     found = recognise(job.cell, points, *motion, rule)
-    replayed = replay(job.cell, points, found.timed, search.max_contact_error, progress)
+    replayed = replay(job.cell, points, found.timed, job.search.max_contact_error, progress)
     astray = {"order", "contact"} & {one.kind for one in (*replayed.findings, *found.findings)}
     shift = common_shift(job.cell, points, *motion, rule) if astray else None
     findings = (
@@ -105,6 +97,19 @@ def prove(
     corners = corner_proof(job, points, found.timed.motion, playback)
     findings = (*findings, *corners.findings)
     return Proof(tuple(files), reading.foreign, moves, found.timed, replayed, findings, corners)
+
+
+def rule_of(job: Job) -> Rule:
+    """Return by what rule the moves over the wheel of a job's program are recognised."""
+    search, process = job.search, job.process
+    return Rule(
+        search.max_contact_error,
+        search.interpolation.max_contact_step,
+        process.approach_length,
+        process.approach_turn,
+        process.approach_run,
+        process.feed,
+    )
 
 
 def reader_of(job: Job) -> Reader:

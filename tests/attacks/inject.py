@@ -130,7 +130,7 @@ def _missed(kind, program, text):
     before, after = program.read(program.text).playback, program.read(text).playback
     if len(before.stations) != len(after.stations):
         return Outcome("missed", "other moves")
-    if len(before.q) != len(after.q):
+    if [move.straight for move in before.moves] != [move.straight for move in after.moves]:
         return Outcome("below", "straight, and replayed so")
     rows = np.flatnonzero(program.motion.on_wheel)
     moved = np.ptp([each.q[each.stations][rows] for each in (before, after)], axis=0).any()
