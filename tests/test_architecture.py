@@ -62,6 +62,7 @@ HOMES = {
     "sqlite3": {"store"},
     "numba": {
         "cell/wheel_distance",
+        "cell/wheel_triangle",
         "cell/separating",
         "search",
         "motion/fewest",
