@@ -41,15 +41,14 @@ def out_along(triangle, wheel, directions):
 
 
 def way_out_by_trying(random, triangle, wheel):
-    """Return minus the shortest way out of all directions, tried closer and closer to the best."""
-    tried = random.normal(size=(4000, 3))
-    for spread in (0.1, 0.03, 0.01, 0.003, 1e-3, 1e-4, 1e-5):
-        tried /= np.linalg.norm(tried, axis=1)[:, None]
-        best = tried[np.argsort(out_along(triangle, wheel, tried))[-20:]]
-        tried = np.concatenate([best + spread * random.normal(size=(200, 20, 3)), best[None]])
-        tried = tried.reshape(-1, 3)
-    tried /= np.linalg.norm(tried, axis=1)[:, None]
-    return out_along(triangle, wheel, tried).max()
+    """Return minus the shortest way out of all directions: 200 of them, each led to a best one."""
+    n = random.normal(size=(200, 3))
+    for spread in np.geomspace(0.3, 1e-6, 30):
+        tried = np.concatenate([n + spread * random.normal(size=(20, 200, 3)), n[None]])
+        tried /= np.linalg.norm(tried, axis=-1)[..., None]
+        out = out_along(triangle, wheel, tried.reshape(-1, 3)).reshape(21, 200)
+        n = tried[out.argmax(axis=0), np.arange(200)]
+    return out.max()
 
 
 def random_poses(random, n, reach):
