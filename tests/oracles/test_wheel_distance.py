@@ -41,13 +41,13 @@ def out_along(triangle, wheel, directions):
 
 
 def way_out_by_trying(random, triangle, wheel):
-    """Return minus the shortest way out of all directions: 200 of them, each led to a best one."""
-    n = random.normal(size=(200, 3))
-    for spread in np.geomspace(0.3, 1e-6, 30):
-        tried = np.concatenate([n + spread * random.normal(size=(20, 200, 3)), n[None]])
+    """Return minus the shortest way out of all directions: 100 of them, each led to a best one."""
+    n = random.normal(size=(100, 3))
+    for spread in np.geomspace(0.3, 1e-6, 100):
+        tried = np.concatenate([n + spread * random.normal(size=(20, 100, 3)), n[None]])
         tried /= np.linalg.norm(tried, axis=-1)[..., None]
-        out = out_along(triangle, wheel, tried.reshape(-1, 3)).reshape(21, 200)
-        n = tried[out.argmax(axis=0), np.arange(200)]
+        out = out_along(triangle, wheel, tried.reshape(-1, 3)).reshape(21, 100)
+        n = tried[out.argmax(axis=0), np.arange(100)]
     return out.max()
 
 
