@@ -40,6 +40,7 @@ def export_program(
     limit: StraightLimit,
     date: datetime,
     comments: Sequence[str] = (),
+    stops: frozenset[int] = frozenset(),
 ) -> tuple[Program, dict[str, str]]:
     """Return the program of a motion, with the times of its passes and of all, and its files.
 
@@ -51,6 +52,8 @@ def export_program(
         limit: How far straight moves may lead from the verified path.
         date: Date of the files.
         comments: Lines at the top.
+        stops: Indices of configurations off the wheel that the robot stops at, beside those of
+            `opl.program.stops`.
 
     Raises:
         OplError: If the controller does not take the program with the settings of the job.
@@ -59,6 +62,8 @@ def export_program(
     program = plan_moves(
         verified, name, robot.max_speed, comments, robot.joint_names, settings.actions
     )
+    moves = (replace(m, exact_stop=m.exact_stop or m.motion_index in stops) for m in program.moves)
+    program = replace(program, moves=tuple(moves))
     if settings.motion is MotionForm.STRAIGHT:
         program = with_straight_moves(program, robot, settings.led, limit.corners, limit.tolerance)
     written = post.write(program, robot, settings, date)

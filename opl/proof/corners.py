@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import PartTree, signed_wheel_distance
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
@@ -39,6 +40,8 @@ class CornerProof:
         at_ends: The same where the part meets and leaves the belt, which is told, not limited: a
             rounding begins to lift it off before the end of the pass.
         findings: What is wrong.
+        stops: Places in the files of the corners off the wheel that come too near to something:
+            without rounding they are as free as their moves.
     """
 
     rounded: int
@@ -48,6 +51,7 @@ class CornerProof:
     allowed: float
     at_ends: float
     findings: tuple[Finding, ...]
+    stops: tuple[str, ...] = ()
 
 
 def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playback) -> CornerProof:
@@ -81,7 +85,9 @@ def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playb
                     "mm would do",
                 )
             )
-    faults += _too_near(job, corners)
+    near = list(_too_near(job, corners))
+    faults += near[:MOST_NAMED]
+    faults += _too_deep(job, corners)
     most = int(worst.argmax()) if worst.max(initial=0.0) > 0.0 else None
     return CornerProof(
         len(corners),
@@ -99,6 +105,11 @@ def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playb
             )
             for corner, fault in faults
         ),
+        tuple(
+            playback.moves[corner.k].place
+            for corner, _ in near
+            if not motion.on_wheel[motion.positions[corner.k]]
+        ),
     )
 
 
@@ -113,15 +124,26 @@ def _place(motion: Motion, corner: Rounding) -> str:
 
 
 def too_wide(
-    job: Job, points: CutterPoints, zone: float, motion: Motion
+    job: Job, points: CutterPoints, part: PartTree, zone: float, motion: Motion
 ) -> Iterator[tuple[int, int, int]]:
     """Yield the corners on the wheel that a zone in [m] is too wide for, see `PositionRule`."""
     positions = motion.positions
     zones = np.where(motion.on_wheel[positions], zone, 0.0)
-    corners = list(roundings(motion, zones, tool_points_of(job)))
+    corners = [one for one in roundings(motion, zones, tool_points_of(job)) if all(one.grinds)]
+    if not corners:
+        return
     errors = contact_errors(job, points, motion, corners)[:, -1]
-    for corner, error in zip(corners, errors, strict=True):
-        if all(corner.grinds) and error > job.search.max_contact_error:
+    q = np.stack([_looked_at(corner) for corner in corners])
+    Ts_base_flange = forward_kinematics(job.cell.robot, q.reshape(-1, 6)).reshape(
+        *q.shape[:2], 4, 4
+    )
+    wheel, deepest = job.cell.wheel, -job.cell.planned_penetration
+    Ts_contact0_workpiece = (
+        inverse(wheel.T_base_contact0) @ Ts_base_flange @ job.cell.T_flange_workpiece
+    )
+    deep = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, deepest) < deepest
+    for corner, error, chords in zip(corners, errors, deep, strict=True):
+        if chords.any() or error > job.search.max_contact_error:
             before, here, after = positions[corner.k - 1 : corner.k + 2].tolist()
             yield before, here, after
 
@@ -206,35 +228,46 @@ def _with_bows(values: Array) -> Array:
 
 
 def _too_near(job: Job, corners: list[Rounding]) -> Iterator[tuple[Rounding, str]]:
-    """Yield corners that bring something too near, and what."""
+    """Yield corners that bring bodies too near to each other, and which."""
     with World(job.cell) as world:
-        triangles, named = Triangles(world), [0, 0]
+        triangles = Triangles(world)
         for corner in corners:
             found = triangles.too_near(*corner.triangle(), corner.free)
-            if found is not None and named[0] < MOST_NAMED:
-                named[0] += 1
+            if found is not None:
                 yield (
                     corner,
                     f"brings {found.names} to {1e3 * found.distance:.2f} mm, "
                     f"{1e3 * found.needed:g} mm needed",
                 )
-            deepest = _deepest(world, job, corner)
-            if deepest > job.cell.max_belt_penetration and named[1] < MOST_NAMED:
-                named[1] += 1
+
+
+def _too_deep(job: Job, corners: list[Rounding]) -> Iterator[tuple[Rounding, str]]:
+    """Yield the first corners that take the part too deep into the belt, and how deep."""
+    allowed, named = job.cell.max_belt_penetration, 0
+    with World(job.cell) as world:
+        for corner in corners:
+            deepest = _deepest(world, corner)
+            if deepest > allowed and named < MOST_NAMED:
+                named += 1
                 yield (
                     corner,
                     f"takes the part {1e3 * deepest:.3f} mm into the belt, "
-                    f"{1e3 * job.cell.max_belt_penetration:g} mm allowed",
+                    f"{1e3 * allowed:g} mm allowed",
                 )
 
 
-def _deepest(world: World, job: Job, corner: Rounding) -> float:
+def _deepest(world: World, corner: Rounding) -> float:
     """Return how deep the part is in the belt on some chords in [m], 0 where it must keep off."""
     if corner.free:
         return 0.0
-    gaps, on_chords = [], corner.configurations()
-    # their ends lie on the moves
-    for q in (*on_chords[-1, 4:-1:4], *on_chords[1, 8:-1:8]):
+    gaps = []
+    for q in _looked_at(corner):
         world.move_to(q)
         gaps.append(world.gap(0.0))
     return max(0.0, -min(gaps))
+
+
+def _looked_at(corner: Rounding) -> Array:
+    """Return configurations of some chords of a corner, whose ends lie on the moves: (10, 6)."""
+    on_chords = corner.configurations()
+    return np.concatenate([on_chords[-1, 4:-1:4], on_chords[1, 8:-1:8]])

@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import PartTree
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
@@ -67,6 +68,15 @@ class FileProof:
         """Whether the files say what was proven."""
         return not self.findings
 
+    def stops(self, program: Program) -> frozenset[int]:
+        """Return which positions must not be rounded, as their moves count the motion."""
+        near = () if self.corners is None else self.corners.stops
+        return frozenset(
+            move.motion_index
+            for move, place in zip(program.moves, self.places, strict=bool(self.places))
+            if place in near
+        )
+
 
 def in_file_digits(motion: Motion, job: Job) -> Motion:
     """Return a motion whose configurations the digits of the job's program can express.
@@ -82,7 +92,7 @@ def in_file_digits(motion: Motion, job: Job) -> Motion:
     return replace(motion, q=reader.rounded(motion.q, job.cell.robot, job.program))
 
 
-def position_rule(job: Job, points: CutterPoints) -> PositionRule:
+def position_rule(job: Job, points: CutterPoints, part: PartTree) -> PositionRule:
     """Return what the written positions of a job have to keep."""
     search, post = job.search, find_post(job.program.controller)
     corners = None if post.reader is None else post.reader.corners(job.program, job.cell.robot)
@@ -93,7 +103,7 @@ def position_rule(job: Job, points: CutterPoints) -> PositionRule:
         post.shortest_move,
         zone,
         tool_points_of(job),
-        partial(too_wide, job, points, zone),
+        partial(too_wide, job, points, part, zone),
     )
 
 

@@ -25,8 +25,13 @@ from opl.report.trace import motion_trace
 from opl.run.values import Prepared, Proven, Refused, Run
 
 
-def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
-    """Return the program of a verified motion; its files, table and trace by file name."""
+def render_program(
+    proven: Proven, stops: frozenset[int] = frozenset()
+) -> tuple[Program, Mapping[str, str]]:
+    """Return the program of a verified motion; its files, table and trace by file name.
+
+    The robot also stops at the configurations of the motion with the indices `stops`.
+    """
     job = proven.surfaced.job
     vertices = transform(job.cell.T_flange_workpiece, job.cell.part.vertices)
     # what the proven path leaves of the allowed contact error
@@ -34,7 +39,7 @@ def render_program(proven: Proven) -> tuple[Program, Mapping[str, str]]:
     limit = StraightLimit(box_corners(vertices), left)
     comments = ["OPL", inputs_mark(job.inputs), STAMP, *_home_moved(job)]
     program, files = export_program(
-        proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), comments
+        proven.motion, job.name, job.cell.robot, job.program, limit, job_date(), comments, stops
     )
     trace = motion_trace(proven.motion, job.name, job.cell.robot.joint_names)
     return program, {name: stamped(text) for name, text in files.items()} | {

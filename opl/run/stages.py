@@ -100,7 +100,7 @@ def _positions(prepared: Prepared, exact: Motion) -> tuple[Motion, Motion]:
     motion = in_file_digits(exact, job)
     if job.program.motion is not MotionForm.JOINT:
         return exact, motion
-    rule = position_rule(job, points)
+    rule = position_rule(job, points, prepared.problem.scene.part)
     for rounds_left in reversed(range(HALVINGS + 1)):
         motion = with_fewest_positions(prepared.problem.scene, points, motion, job.process, rule)
         corners = tuple(rule.too_wide(motion))
@@ -165,10 +165,17 @@ def write_program(proven: Proven, watch: Watch | None = None) -> Run:
     """
     watch = watch or Watch()
     surfaced, exact = proven.surfaced, proven.planned.exact
-    with watch.stage(Stage.EXPORT), keys_named(surfaced.job.source):
-        program, files = render_program(proven)
-    with watch.stage(Stage.READ_BACK):
-        found = read_back(surfaced.job, surfaced.points, exact, proven.motion, program, files)
+    stops: frozenset[int] = frozenset()
+    while True:
+        with watch.stage(Stage.EXPORT), keys_named(surfaced.job.source):
+            program, files = render_program(proven, stops)
+        with watch.stage(Stage.READ_BACK):
+            found = read_back(surfaced.job, surfaced.points, exact, proven.motion, program, files)
+        # in the air a corner that would come too near to something becomes a stop
+        near = frozenset() if found is None else found.stops(program) - stops
+        if not near:
+            break
+        stops |= near
     if found is not None and not found.proven:
         return Refused(proven, found, (), watch.seconds)
     with watch.stage(Stage.EXPORT):

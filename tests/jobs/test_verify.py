@@ -456,8 +456,8 @@ def test_a_job_for_another_maker_is_refused(tmp_path):
 def test_a_run_that_writes_something_else_writes_nothing(tmp_path, monkeypatch):
     honest = stages.render_program
 
-    def dishonest(proven):
-        program, files = honest(proven)
+    def dishonest(proven, stops):
+        program, files = honest(proven, stops)
         lines = files["V_SHAPE.JBI"].split("\r\n")
         k = next(k for k, line in enumerate(lines) if line.startswith("C00010="))
         s, rest = lines[k].removeprefix("C00010=").split(",", 1)
