@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from opl.cell.wheel_distance import part_tree, signed_wheel_distance
@@ -41,14 +42,22 @@ def out_along(triangle, wheel, directions):
 
 
 def way_out_by_trying(random, triangle, wheel):
-    """Return minus the shortest way out of all directions: 100 of them, each led to a best one."""
-    n = random.normal(size=(100, 3))
-    for spread in np.geomspace(0.3, 1e-6, 100):
-        tried = np.concatenate([n + spread * random.normal(size=(20, 100, 3)), n[None]])
-        tried /= np.linalg.norm(tried, axis=-1)[..., None]
-        out = out_along(triangle, wheel, tried.reshape(-1, 3)).reshape(21, 100)
-        n = tried[out.argmax(axis=0), np.arange(100)]
-    return out.max()
+    """Return minus the shortest way out: eight directions far apart, each led to the best near it.
+
+    By the simplex method of Nelder and Mead, which follows the ridges that ways out have.
+    """
+
+    def longer(n):
+        return -out_along(triangle, wheel, (n / np.linalg.norm(n))[None])[0]
+
+    tried = random.normal(size=(5000, 3))
+    tried /= np.linalg.norm(tried, axis=1)[:, None]
+    starts = []
+    for n in tried[np.argsort(-out_along(triangle, wheel, tried))]:
+        if len(starts) < 8 and all(n @ other < 0.98 for other in starts):
+            starts.append(n)
+    exact = {"xatol": 1e-9, "fatol": 1e-12, "maxiter": 2000}
+    return max(-minimize(longer, n, method="Nelder-Mead", options=exact).fun for n in starts)
 
 
 def random_poses(random, n, reach):
