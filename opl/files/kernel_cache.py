@@ -1,12 +1,16 @@
 """Where compiled kernels are kept, so that a start takes seconds: settled before numba is loaded.
 
-Kernels lie beside the code of opl, in a folder of the user, or where NUMBA_CACHE_DIR says. Where
-none of these can be written to, they are compiled anew at every start, and that is said.
+Kernels lie beside the code of opl, in a folder of the user, or where NUMBA_CACHE_DIR says; there in
+a folder of their own for each state of the code. Numba looks at the file of a kernel only, but what
+it compiled holds other kernels as well, so after a change of those it would go on with old ones.
+Where nothing can be written to, kernels are compiled anew at every start, and that is said.
 """
 
 from __future__ import annotations
 
 import atexit
+import contextlib
+import hashlib
 import logging
 import os
 import shutil
@@ -14,34 +18,32 @@ import tempfile
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
+_PASSING = "passing-kernels"
 
 
 def settle_kernel_cache(package: Path) -> None:
-    """Name a folder that can be written to in NUMBA_CACHE_DIR, unless numba finds one by itself.
+    """Name a folder that can be written to in NUMBA_CACHE_DIR.
 
     Args:
-        package: Folder of modules with kernels.
+        package: Folder of all code of opl.
     """
+    name = f"kernels-{_mark(package)}"
     given = os.environ.get(VARIABLE)
-    if given is not None:
-        if _can_be_written(Path(given)):
-            return
-        tried = [Path(given)]
-    else:
-        if _can_be_written(package / "__pycache__"):
-            return
-        tried = [package / "__pycache__"]
-        try:
+    if given is not None and Path(given).name in (name, _PASSING):
+        return
+    tried = [package / "__pycache__"] if given is None else [Path(given)]
+    with contextlib.suppress(RuntimeError):  # nobody's home
+        if given is None:
             own = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "opl"
-        except RuntimeError:  # nobody's home
-            pass
-        else:
-            if _can_be_written(own):
-                os.environ[VARIABLE] = str(own)
-                return
             tried.append(own)
-    passing = Path(tempfile.mkdtemp(prefix="opl-kernels-"))
-    atexit.register(shutil.rmtree, passing, ignore_errors=True)
+    for folder in tried:
+        if _can_be_written(folder / name):
+            os.environ[VARIABLE] = str(folder / name)
+            return
+    made = Path(tempfile.mkdtemp(prefix="opl-"))
+    atexit.register(shutil.rmtree, made, ignore_errors=True)
+    passing = made / _PASSING
+    passing.mkdir()
     os.environ[VARIABLE] = str(passing)  # for the processes of a batch, too
     os.environ.setdefault("MPLCONFIGDIR", str(passing))
     logging.getLogger(__name__).warning(
@@ -50,6 +52,16 @@ def settle_kernel_cache(package: Path) -> None:
         " and ".join(map(str, tried)),
         VARIABLE,
     )
+
+
+def _mark(package: Path) -> str:
+    """Return the digest of all modules of a package that compile, short."""
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        content = path.read_bytes()
+        if b"numba" in content:
+            digest.update(content)
+    return digest.hexdigest()[:12]
 
 
 def _can_be_written(folder: Path) -> bool:

@@ -200,6 +200,20 @@ def _along(axes, T0, q, places, targets, freedom, room, allowed, pace, i, j, sha
 
 
 @njit(cache=True)
+def _bow(before, here, after, allowed, k):  # type: ignore[no-untyped-def]
+    """Return the vertex of the parabola through errors at place k and both of its neighbours.
+
+    As a multiple of what is allowed there; 0 if it is not between them.
+    """
+    slope, bend = 0.5 * (after - before), before - 2.0 * here + after
+    if bend >= 0.0 or abs(slope) >= -bend:
+        return 0.0
+    share = abs(slope) / -bend
+    beside = allowed[k + 1] if slope > 0.0 else allowed[k - 1]
+    return (here - 0.5 * slope * slope / bend) / (allowed[k] + share * (beside - allowed[k]))
+
+
+@njit(cache=True)
 def straight_off(  # type: ignore[no-untyped-def]
     axes, T0, q, places, targets, freedom, room, allowed, pace, i, j, suspect, T, work
 ):
@@ -213,15 +227,19 @@ def straight_off(  # type: ignore[no-untyped-def]
         )
         if error > 2.0 * allowed[suspect]:
             return np.inf, suspect
-    worst = last = 0.0
-    for k in range(i + 1, j):
-        before = last
-        last, error = _pass_by(
-            axes, T0, q, places, targets, freedom, room, pace, i, j, k, last, T, work
-        )
+    worst = last = one = other = 0.0  # errors at the last place and at the one before it
+    for k in range(i + 1, j + 1):
+        before, error = last, 0.0
+        if k < j:
+            last, error = _pass_by(
+                axes, T0, q, places, targets, freedom, room, pace, i, j, k, last, T, work
+            )
         worst = max(worst, error / allowed[k])
-        if worst > 1.0 or not _keeps_pace(pace, i, j, k, last - before):
-            return np.inf, k
+        if k > i + 1:
+            worst = max(worst, _bow(other, one, error, allowed, k - 1))
+        if worst > 1.0 or (k < j and not _keeps_pace(pace, i, j, k, last - before)):
+            return np.inf, min(k, j - 1)
+        other, one = one, error
     if j > i + 1 and not _keeps_pace(pace, i, j, j, 1.0 - last):
         return np.inf, -1
     return worst, -1

@@ -29,9 +29,9 @@ from opl.motion.timing import on_wheel, time_motion
 from opl.planning.scene import PlanningScene
 from opl.planning.speed_steps import with_moves_cut
 
-# Part of the allowed contact error that is used: between the places that are looked at, and in the
+# Part of the allowed contact error that is used, bows between places included: in the
 # proof, which looks at others, a little more is found.
-USED = 0.95
+USED = 0.97
 # The same of rounded corners, which are looked at as the proof does, at fewer places.
 USED_AT_CORNERS = 0.99
 # Times that moves are halved next to a corner that is too wide: what is left then is for the proof.

@@ -4,4 +4,4 @@ from pathlib import Path
 
 from opl.files.kernel_cache import settle_kernel_cache
 
-settle_kernel_cache(Path(__file__).parent)
+settle_kernel_cache(Path(__file__).parents[1])

@@ -219,10 +219,11 @@ def test_two_points_exchanged_are_found(written):
     assert refuses(proof, "contact at pass 1, cutter point")
 
 
-def test_a_point_in_the_place_of_the_next_is_found(written):
+def test_points_in_the_place_of_the_one_before_are_found(written):
     text, other = Text(written), written.needed
-    proof = proof_of(written, text.put(other, text.pulses(other - 1)))
-    assert refuses(proof, "at pass 1, cutter point")
+    # one alone may be there for the speed, or for the corners
+    text = text.put(other, text.pulses(other - 1)).put(other + 1, text.pulses(other - 1))
+    assert refuses(proof_of(written, text), "at pass 1, cutter point")
 
 
 def test_a_point_ground_twice_is_found(written):
@@ -235,7 +236,8 @@ def test_a_point_ground_twice_is_found(written):
 def test_a_missing_point_is_found(written):
     rest = [k for k in range(written.last + 1) if k != written.needed]
     proof = proof_of(written, Text(written).reorder(rest))
-    assert refuses(proof, "contact at pass 1, cutter point")
+    # off the contact on the long move, or where its corners are rounded
+    assert refuses(proof, "at pass 1, cutter point")
 
 
 def test_a_dropped_pass_is_found(written):

@@ -29,12 +29,32 @@ def blocked(path):
     return path / "below"
 
 
-def test_beside_the_code_or_in_the_home_is_no_matter(tmp_path, caplog):
+def test_beside_the_code_or_in_the_home_is_no_matter(tmp_path, caplog, monkeypatch):
     settle_kernel_cache(tmp_path)
-    assert "NUMBA_CACHE_DIR" not in os.environ
+    assert Path(os.environ["NUMBA_CACHE_DIR"]).parent == tmp_path / "__pycache__"
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
     settle_kernel_cache(blocked(tmp_path / "installed"))
-    assert os.environ["NUMBA_CACHE_DIR"] == str(tmp_path / "home" / ".cache" / "opl")
+    assert Path(os.environ["NUMBA_CACHE_DIR"]).parent == tmp_path / "home" / ".cache" / "opl"
     assert caplog.text == ""
+
+
+def test_kernels_of_other_code_are_not_taken(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "given"))
+    package = tmp_path / "package"
+    package.mkdir()
+
+    def place(kernel, other):
+        (package / "kernel.py").write_text(f"from numba import njit\n{kernel}")
+        (package / "other.py").write_text(other)
+        monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "given"))
+        settle_kernel_cache(package)
+        settle_kernel_cache(package)  # as the next room does
+        return Path(os.environ["NUMBA_CACHE_DIR"])
+
+    first = place("a = 1", "b = 1")
+    assert first.parent == tmp_path / "given"
+    assert place("a = 1", "b = 2") == first
+    assert place("a = 2", "b = 2") != first
 
 
 @pytest.mark.parametrize("given", [False, True])
