@@ -209,6 +209,8 @@ def _lead_pace(job: Job, points: CutterPoints, corner: Rounding) -> float:
     if sum(corner.grinds) != 1:
         return 0.0
     lead, way = (corner.after, 1) if corner.grinds[0] else (corner.before, -1)
+    if np.isnan(lead.place[0]):  # the belt is left elsewhere than at a written position
+        return 0.0
     here = round(float(lead.place[0]))
     step = abs(points.arc_length[here] - points.arc_length[here - way])
     p_flange = forward_kinematics(job.cell.robot, lead.q)[:, :3, 3]

@@ -22,6 +22,7 @@ from opl.cell.robot import forward_kinematics
 from opl.errors import OplError
 from opl.files.digests import keeps_stamp
 from opl.geometry.frames import inverse, transform
+from opl.proof.corners import CornerProof
 from opl.proof.digest import changed_since
 from opl.proof.prove import prove
 from opl.verification.replay import Verification
@@ -35,6 +36,7 @@ SPEED = 0.02
 WORDS = ("caught", "below", "missed", "proven", "refused", "-")
 ALL_KINDS = tuple(KINDS.values())
 NOTHING = Verification("", 0, 0, 0.0, 0.0, 0, (), None)
+NO_CORNERS = CornerProof(0, 0, 0.0, "", 0.0, 0.0, ())
 
 
 INTRODUCTION = """# Faults that are caught, and what cannot be
@@ -97,14 +99,15 @@ def case_of(program):
 def findings_of(program, text):
     """Return the kinds of what is found, the cheap half of the proof first."""
     files = {program.name: text.encode("utf-8")}
-    real = proving.replay
+    real = proving.replay, proving.corner_proof
     proving.replay = lambda *arguments: NOTHING
+    proving.corner_proof = lambda *arguments: NO_CORNERS
     try:
         found = prove(program.job, program.points, files).findings
     except OplError as error:
         return ["refused"], str(error)
     finally:
-        proving.replay = real
+        proving.replay, proving.corner_proof = real
     found = found or prove(program.job, program.points, files).findings
     return [one.kind for one in found], str(found[0]) if found else ""
 
