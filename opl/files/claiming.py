@@ -143,7 +143,12 @@ def _lock(place: Path, name: Path) -> int:
     """Lock a folder by a file in it; the system ends the lock with the process that holds it."""
     path = place / LOCK
     while True:
-        lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+        try:
+            lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+        except FileNotFoundError:
+            if place.is_dir():  # another run has just exchanged it for a new one
+                continue
+            raise
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # whoever held it before may have removed the file
