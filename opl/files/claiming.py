@@ -139,6 +139,13 @@ def _missing(place: Path) -> list[Path]:
     return missing
 
 
+def _is_at(lock: int, path: Path) -> bool:
+    """Return whether an open file is the one at a path."""
+    with suppress(FileNotFoundError):
+        return os.path.samestat(os.fstat(lock), path.lstat())
+    return False
+
+
 def _lock(place: Path, name: Path) -> int:
     """Lock a folder by a file in it; the system ends the lock with the process that holds it."""
     path = place / LOCK
@@ -152,7 +159,7 @@ def _lock(place: Path, name: Path) -> int:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # whoever held it before may have removed the file
-            if path.exists() and os.path.samestat(os.fstat(lock), path.lstat()):
+            if _is_at(lock, path):
                 with suppress(OSError):  # a full disk hinders the message of others only
                     os.ftruncate(lock, 0)
                     os.write(lock, f"{os.getpid()}\n".encode())
