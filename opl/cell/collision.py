@@ -6,6 +6,7 @@ Part against wheel is not checked here: that pair may touch, and has a closed fo
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Iterator
 from copy import copy
 
@@ -15,13 +16,7 @@ import pinocchio as pin
 
 from opl.cell.robot import collision_shapes, forward_kinematics
 from opl.cell.separation import Bodies, Separation
-from opl.cell.workcell import (
-    PART,
-    SECOND_OPINION,
-    SECOND_OPINION_OF_A_LINK,
-    WHEEL,
-    WorkCell,
-)
+from opl.cell.workcell import PART, SECOND_OPINION, SECOND_OPINION_OF_A_LINK, WHEEL, WorkCell
 from opl.geometry.frames import Array, inverse, transform
 from opl.geometry.mesh import TriangleMesh, winding_number
 from opl.geometry.shapes import Body, Box, Cylinder
@@ -71,6 +66,7 @@ class CollisionScene:
             request.enable_contact = False
             # the default of 1 mm goes on to measure distances of pairs nearly in contact
             request.break_distance = 0.0
+        _begin_anew(self._geometry_data)
         # coal looks only at pairs that are not certainly farther apart than this
         self._enough = np.array(margins) + ROUND_OFF
         self._enough[list(unchecked)] = -np.inf
@@ -183,15 +179,6 @@ class CollisionScene:
         """Indices of the pairs that have to keep a distance, not only not to touch."""
         return np.flatnonzero(self._needed > 0.0)
 
-    def anew(self) -> CollisionScene:
-        """Return the scene without what its measures left in it, which the next would begin from.
-
-        Distances then are the same to the last digit, whatever was measured before.
-        """
-        scene = copy(self)
-        scene._prepare(self._margins, range(0))
-        return scene
-
     def pair(self, index: int) -> BodyPair:
         """Return the names of a pair."""
         return self._pairs[index]
@@ -260,6 +247,19 @@ class CollisionScene:
         if index < self._n_links:
             return str(self._model.frames[geometry.parentFrame].name)
         return str(geometry.name)
+
+
+def _begin_anew(data: pin.GeometryData) -> None:
+    """Have coal begin each look as if it was the first.
+
+    pinocchio has it begin where the last one ended, and the last digits of an answer then depend on
+    what was looked at before: a configuration at its margin was free once and in collision once.
+    """
+    with warnings.catch_warnings():
+        # there is no other switch yet for what pinocchio has switched on
+        warnings.simplefilter("ignore", DeprecationWarning)
+        for request in (*data.collisionRequests, *data.distanceRequests):
+            request.enable_cached_gjk_guess = False
 
 
 def enclosing_bodies(cell: WorkCell, q: Array) -> list[BodyPair]:

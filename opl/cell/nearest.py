@@ -41,7 +41,6 @@ def nearest_pairs(scene: CollisionScene, q: Array) -> Nearest:
         q: Configurations in [rad], the fewer pairs are measured the nearer they follow each other,
             shape (n, 6).
     """
-    scene = scene.anew()
     kept = scene.kept_apart
     separation = scene.separation(kept)
     least = separation.apart

@@ -7,6 +7,7 @@ import pinocchio as pin
 import pytest
 
 from opl.cell.collision import CollisionScene
+from opl.cell.nearest import nearest_pairs
 from opl.cell.robot import forward_kinematics, load_robot
 from opl.geometry.frames import pose
 from opl.geometry.shapes import Body, Box, Cylinder
@@ -30,6 +31,34 @@ def configurations_of_interest(cell, n=300, seed=0):
 
 def unordered(pairs):
     return {tuple(sorted(pair)) for pair in pairs}
+
+
+def at_the_margin(scene, free, colliding):
+    """Return configurations to either side of where one that is free begins to collide."""
+    while np.abs(colliding - free).max() > 1e-7:
+        middle = (free + colliding) / 2.0
+        if scene.collides(middle[None])[0]:
+            colliding = middle
+        else:
+            free = middle
+    return np.linspace(free, colliding, 9)
+
+
+def test_what_was_looked_at_before_changes_no_answer():
+    cell = v_job().cell
+    scene = CollisionScene(cell)
+    around = configurations_of_interest(cell)
+    hits = scene.collides(around)
+    pairs = zip(around[~hits][:20], around[hits][:20], strict=True)
+    margins = np.concatenate([at_the_margin(scene, *pair) for pair in pairs])
+    first = CollisionScene(cell).collides(margins)
+    distances = nearest_pairs(CollisionScene(cell), margins).distance
+    for before in np.split(around, 30):
+        scene.collides(before)
+        np.testing.assert_array_equal(scene.collides(margins), first)
+        nearest_pairs(scene, before)
+        np.testing.assert_array_equal(nearest_pairs(scene, margins).distance, distances)
+    assert [bool(scene.colliding_pairs(q)) for q in margins] == first.tolist()
 
 
 @pytest.mark.parametrize("clearance", [0.0, 0.005, 0.02])
