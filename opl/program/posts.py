@@ -13,11 +13,13 @@ are written and not read back, and nothing claims more.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import Enum
-from importlib.metadata import entry_points
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
 import numpy as np
@@ -134,9 +136,15 @@ class Post:
         return PERIODS_OF_A_MOVE * self.period
 
 
+@cache
+def _installed(path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """Return the posts of the packages on a path of modules, read once: it opens them all."""
+    return tuple(entry_points(group=GROUP))
+
+
 def known_posts() -> list[str]:
-    """Return the names of the posts that are installed."""
-    return sorted({entry.name for entry in entry_points(group=GROUP)})
+    """Return the names of the posts that were installed when this process first asked."""
+    return sorted({entry.name for entry in _installed(tuple(sys.path))})
 
 
 def find_post(name: str) -> Post:
@@ -145,7 +153,7 @@ def find_post(name: str) -> Post:
     Raises:
         SettingError: If there is none, or it cannot be loaded.
     """
-    found = [entry for entry in entry_points(group=GROUP) if entry.name == name]
+    found = [entry for entry in _installed(tuple(sys.path)) if entry.name == name]
     if not found:
         known = ", ".join(known_posts())
         raise SettingError("controller", f"unknown controller {name!r}; known: {known}")
