@@ -1,10 +1,15 @@
-"""Golden files: compared byte for byte, rewritten only on demand (pytest --rewrite-golden)."""
+"""Golden files, compared byte for byte; processes that start warm; workers that share the cores."""
 
+import os
 from pathlib import Path
 
 import pytest
 
 GOLDEN = Path(__file__).parent / "golden"
+
+# the workers of a run share the cores; settled before numba is loaded
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("NUMBA_NUM_THREADS", "1")
 
 
 def pytest_addoption(parser):
@@ -29,3 +34,11 @@ def assert_golden(request):
         assert text == path.read_bytes().decode("ascii")
 
     return compare
+
+
+@pytest.fixture
+def warm_processes(monkeypatch):
+    """Let strangers' files be read in processes that start warm."""
+    from tests.support.warm_processes import STAND_IN
+
+    monkeypatch.setattr("opl.files.apart.subprocess", STAND_IN)

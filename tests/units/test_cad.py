@@ -105,6 +105,7 @@ def test_faces_are_exact_and_face_outward(tmp_path, shape, kind, distance, area)
     assert 1e6 * samples.areas.sum() == pytest.approx(area, rel=2e-3)
 
 
+@pytest.mark.usefixtures("warm_processes")
 def test_a_hole_breaks_the_passes_and_a_fillet_joins_them(tmp_path):
     path = write_step(block(), tmp_path / "block.step")
     faces = cad.load_cad_faces(path)
@@ -188,6 +189,7 @@ def test_the_meshes_of_cad_parts_do_not_cross_themselves(tmp_path):
             assert load_mesh(stl, "mm").volume > 0.0
 
 
+@pytest.mark.usefixtures("warm_processes")
 def test_a_cut_file_or_one_with_a_face_of_no_area_ends_with_status_2(tmp_path):
     step = write_step(block(), tmp_path / "block.step").read_text()
     writer = IGESControl_Writer()
@@ -212,6 +214,7 @@ def test_a_cut_file_or_one_with_a_face_of_no_area_ends_with_status_2(tmp_path):
     assert "workpiece.surface" in ended.err
 
 
+@pytest.mark.usefixtures("warm_processes")
 @pytest.mark.parametrize("size", [30.0 * 1000.0, 30.0 / 1000.0])
 def test_a_step_file_a_thousand_times_off_ends_with_status_2(tmp_path, size):
     write_step(BRepPrimAPI_MakeBox(2 * size, size, size).Shape(), tmp_path / "box.step")
@@ -223,6 +226,7 @@ def test_a_step_file_a_thousand_times_off_ends_with_status_2(tmp_path, size):
     assert "workpiece.surface: is" in ended.err and "unit" in ended.err
 
 
+@pytest.mark.usefixtures("warm_processes")
 def test_bad_files_are_refused(tmp_path):
     path = write_step(block(), tmp_path / "block.step")
     text = path.read_text()

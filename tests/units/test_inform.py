@@ -215,6 +215,7 @@ def test_tool_the_controller_does_not_have_is_refused(tool):
 # templates
 
 
+@pytest.mark.usefixtures("warm_processes")
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

@@ -340,6 +340,7 @@ DAMAGE = [
 ]
 
 
+@pytest.mark.usefixtures("warm_processes")
 @pytest.mark.parametrize(
     ("controller", "old", "new", "message"),
     [(name, *damage) for *damage, names in DAMAGE for name in names],
