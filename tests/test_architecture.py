@@ -61,6 +61,7 @@ HOMES = {
     "distributed": {"work/cluster"},
     "sqlite3": {"store"},
     "numba": {
+        "cell/chain",
         "cell/wheel_distance",
         "cell/wheel_triangle",
         "cell/separating",

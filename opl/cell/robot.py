@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
+from opl.cell.chain import Chain
 from opl.cell.full_turns import angular_distance
 from opl.cell.inverse_kinematics import Arm, inverse_kinematics
 from opl.cell.parallel_axes import ParallelAxesArm
@@ -151,15 +152,8 @@ def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
 
 def forward_kinematics(robot: Robot, q: Array) -> Array:
     """Return the flange poses Ts_base_flange, (..., 4, 4), of configurations in [rad], (..., 6)."""
-    model = _model(robot.urdf)
-    data = model.createData()
-    base, flange = model.getFrameId("base"), model.getFrameId("tool0")
     configurations = np.asarray(q, dtype=float).reshape(-1, N_JOINTS)
-    Ts_base_flange = np.empty((len(configurations), 4, 4))
-    for T_base_flange, configuration in zip(Ts_base_flange, configurations, strict=True):
-        pin.framesForwardKinematics(model, data, configuration)
-        T_base_flange[:] = data.oMf[base].actInv(data.oMf[flange]).homogeneous
-    return Ts_base_flange.reshape(*np.shape(q)[:-1], 4, 4)
+    return _chain(robot.urdf).poses(configurations).reshape(*np.shape(q)[:-1], 4, 4)
 
 
 def controller_poses(robot: Robot, q: Array) -> Array:
@@ -191,6 +185,14 @@ def _model(urdf: Path) -> pin.Model:
     return pin.buildModelFromUrdf(str(urdf))
 
 
+@lru_cache(maxsize=16)
+def _chain(urdf: Path) -> Chain:
+    chain = Chain.of(_model(urdf), "base", "tool0")
+    if chain is None:
+        raise InputError(str(urdf), "must have its joints one after the other, from base to tool0")
+    return chain
+
+
 def _check_urdf(robot: Robot) -> None:
     """Refuse a URDF that has other joints, or lacks a frame."""
     try:
@@ -205,6 +207,7 @@ def _check_urdf(robot: Robot) -> None:
     missing = [frame for frame in ("base", "tool0") if not model.existFrame(frame)]
     if missing:
         raise InputError(str(robot.urdf), f"must have links base and tool0, lacks {missing[0]}")
+    _chain(robot.urdf)
 
 
 def _arm_fits_urdf(robot: Robot) -> bool:
