@@ -65,6 +65,7 @@ OF_PROGRAM = {
     "controller": "program.controller",
     "tool": "program.tool",
     "user_frame": "program.user_frame.number",
+    "corner_radius": "program.corner_radius_mm",
     "accepted_pulses": "program.accept_unverified_pulses",
     "pulses_per_radian": "program.pulse_ratios",
 }

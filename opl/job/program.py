@@ -17,7 +17,7 @@ from opl.geometry.frames import Array
 from opl.job import keys
 from opl.job.actions import ActionSection
 from opl.job.bodies import Matrix, pose_of
-from opl.job.move_kinds import Percents, PositionLevels
+from opl.job.move_kinds import CornerRadii, Percents, PositionLevels
 from opl.job.refusals import keys_named
 from opl.job.source import Source
 from opl.job.stationary_tool import (
@@ -33,7 +33,6 @@ from opl.program.led import StationaryTool
 from opl.program.posts import Post, StationaryTools, find_post, known_posts
 from opl.program.ratios import with_ratios
 from opl.program.settings import (
-    ByKind,
     Load,
     MotionForm,
     PositionForm,
@@ -43,7 +42,8 @@ from opl.program.settings import (
 _MAY_COUNT_PULSES = ("Yaskawa", "unknown")  # makers
 _YASKAWA_ONLY = (
     *("positions", "user_frame"),
-    *("position_levels", "acceleration_percent", "deceleration_percent", "one_job_per_pass"),
+    *("position_levels", "corner_radius_mm", "acceleration_percent", "deceleration_percent"),
+    "one_job_per_pass",
 )
 
 
@@ -102,6 +102,11 @@ class ProgramSection(Document):
     position_levels: PositionLevels = Field(
         default=PositionLevels(),
         description="Position level (PL) of each kind of move. For Yaskawa controllers.",
+    )
+    corner_radius_mm: CornerRadii = Field(
+        default=CornerRadii(),
+        description="Corner radius (CR) of straight moves instead of a position level. For Yaskawa "
+        "controllers, with `motion: straight`.",
     )
     acceleration_percent: Percents = Field(
         default=Percents(),
@@ -207,7 +212,7 @@ class ProgramSection(Document):
     def _settings(
         self, source: Source, post: Post, at_wheel: StationaryTool, load: Load | None
     ) -> ProgramSettings:
-        levels, tool = self.position_levels, self.T_flange_tool_mm
+        tool = self.T_flange_tool_mm
         frame, stationary = None, None
         if is_led_past_one(self.stationary_tool, post, self._form(post)):
             stationary, frame = stationary_tool_of(self.user_frame, post, at_wheel)
@@ -223,7 +228,8 @@ class ProgramSection(Document):
             stationary=stationary,
             positions=PositionForm(self.positions),
             user_frame=frame,
-            levels=ByKind(levels.on_wheel, levels.lead, levels.free_move),
+            levels=self.position_levels.in_si(),
+            corner_radii=self.corner_radius_mm.in_si(),
             acceleration=self.acceleration_percent.in_si(),
             deceleration=self.deceleration_percent.in_si(),
             actions=Actions(*(tuple(action.in_si() for action in some) for some in actions)),
@@ -265,6 +271,11 @@ class ProgramSection(Document):
                     source.at("program.positions"),
                     f"must be pulses: poses of {self.controller} name a configuration as that of "
                     f"an arm with a spherical wrist, which {robot.title} has not",
+                )
+            if form is not MotionForm.STRAIGHT and (keys_given := [*self.corner_radius_mm.given()]):
+                raise InputError(
+                    source.at(f"program.corner_radius_mm.{keys_given[0]}"),
+                    "goes with motion: straight only; joint moves take position_levels",
                 )
             return
         in_frame = post.stationary_tools is StationaryTools.IN_FRAME

@@ -46,7 +46,7 @@ def json_schema(kind: Literal["job", "cell"] = "job") -> Schema:
     definitions = made["$defs"]
     for one in (made, *definitions.values()):
         for key, value in one["properties"].items():
-            unit, allowed = unit_of(key, value), _allowed(_inner(value))
+            unit, allowed = unit_of(key, value), _allowed_of(value)
             default = _default(value, key in one.get("required", []))
             facts = [f"[{unit}]"] if unit else []
             facts += [f"Default: {default}."] if default not in ("required", "-") else []
@@ -104,19 +104,24 @@ def _table(one: Schema, definitions: dict[str, Schema]) -> Iterator[str]:
     for key, value in one["properties"].items():
         cells = [
             f"`{key}`",
-            _type(_inner(value), definitions),
+            " or ".join(_type(option, definitions) for option in _options(value)),
             unit_of(key, value) or "-",
             _default(value, key in one.get("required", [])),
-            _allowed(_inner(value)) or "-",
+            _allowed_of(value) or "-",
             _meaning(value, definitions),
         ]
         yield f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |"
 
 
-def _inner(value: Schema) -> Schema:
-    """Return the schema of a value that may also be left out."""
+def _options(value: Schema) -> list[Schema]:
+    """Return the schemas that a value may have if it is not left out."""
     options = [option for option in value.get("anyOf", []) if option.get("type") != "null"]
-    return options[0] if options else value
+    return options or [value]
+
+
+def _inner(value: Schema) -> Schema:
+    """Return the schema of a value that may also be left out, the first of several."""
+    return _options(value)[0]
 
 
 def _reference(value: Schema) -> str | None:
@@ -155,6 +160,11 @@ def _default(value: Schema, required: bool) -> str:
     if default is None or _reference(value) is not None:
         return "-"
     return f"`{json.dumps(default)}`".replace('"', "")
+
+
+def _allowed_of(value: Schema) -> str:
+    """Return what is allowed of any of the types that a value may have."""
+    return " or ".join(filter(None, map(_allowed, _options(value))))
 
 
 def _allowed(inner: Schema) -> str:

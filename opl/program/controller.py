@@ -36,6 +36,7 @@ class ControllerProfile:
         timer: Times in [s].
         ramp_percent: Smallest and largest ACC and DEC.
         position_levels: Highest PL.
+        corner_radius: CR in [mm].
         highest_tool: Highest tool number; the lowest is 0.
         highest_user_frame: Highest number of a user frame; the lowest is 1.
         highest_signal: Highest number of an input or output; the lowest is 1.
@@ -59,6 +60,7 @@ class ControllerProfile:
     timer: SpeedRange
     ramp_percent: tuple[int, int]
     position_levels: int
+    corner_radius: SpeedRange
     highest_tool: int
     highest_user_frame: int
     highest_signal: int

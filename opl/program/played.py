@@ -8,8 +8,8 @@ every written point, and each move says how far its end may be rounded (`opl.pro
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -80,23 +80,29 @@ class Corner:
         text: As in the file.
         reach: How far in [m] the tool point is from the written position at the most where the
             robot leaves its move, infinite where nobody knows.
+        arc: Whether `reach` is the radius of an arc between two straight moves instead.
     """
 
     size: float
     text: str
     reach: float = np.inf
+    arc: bool = False
 
     @property
     def zone(self) -> float:
         """How far in [m] from the written position the robot may leave its move, 0 for a stop."""
         return 0.0 if self.exact_stop else self.reach
 
-    @property
-    def told(self) -> str:
-        """The corner and its zone, for people."""
-        if np.isinf(self.zone):
+    def told(self, zone: float) -> str:
+        """Return the corner and what is taken for its zone in [m], for people."""
+        if np.isinf(zone):
             return f"{self.text} (zone not known, half of each move taken)"
-        return f"{self.text} (zone {1e3 * self.zone:g} mm)"
+        return f"{self.text} (zone {1e3 * zone:g} mm)"
+
+    def within(self, limit: Corner, slack: float) -> bool:
+        """Return whether it is no larger than another of its measure, but for a fraction of it."""
+        same = self.exact_stop or self.arc is limit.arc
+        return same and self.size <= limit.size * (1.0 + slack)
 
     @property
     def exact_stop(self) -> bool:
@@ -106,17 +112,21 @@ class Corner:
 
 @dataclass(frozen=True)
 class Corners:
-    """The largest corners a job allows; for each kind of move, and where the robot has to stop."""
+    """The largest corners a job allows; for each kind of move, and where the robot has to stop.
+
+    Straight moves of some kinds may have others.
+    """
 
     stop: Corner
     on_wheel: Corner
     lead: Corner
     air: Corner
+    straight: Mapping[Purpose, Corner] = field(default_factory=dict)
 
-    def of(self, kind: Purpose) -> Corner:
+    def of(self, kind: Purpose, straight: bool = False) -> Corner:
         """Return the largest corner after a move of a kind."""
         corner: Corner = getattr(self, kind.value)
-        return corner
+        return self.straight.get(kind, corner) if straight else corner
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,6 +66,8 @@ DX200 = ControllerProfile(
     ramp_percent=(20, 100),
     # PL=0 (stop in position) to PL=8
     position_levels=8,
+    # summaries of the INFORM manual of YRC1000; other generations, and the decimals: unseen
+    corner_radius=SpeedRange(0.1, 6553.5, 1),
     # 64 tools and 63 user frames in DX200 and YRC1000; 24 and 24 before (DT of NX100)
     highest_tool=63,
     highest_user_frame=63,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -90,6 +91,8 @@ class ProgramSettings:
         positions: How positions are written.
         user_frame: The frame of positions in a user frame, or that of a stationary tool.
         levels: How far corners may be rounded where the robot does not stop (PL of a Yaskawa).
+        corner_radii: Radii in [m] of the corners between straight moves, by kind of move (CR of a
+            Yaskawa); kinds that are not in it have levels.
         acceleration: Of each kind of move in percent of the controller's own ramp.
         deceleration: The same for slowing down.
         actions: What is done around the passes.
@@ -111,6 +114,7 @@ class ProgramSettings:
     user_frame: UserFrame | None = None
     # the finest level that does not stop: a pass must not, or the belt digs in
     levels: ByKind = ByKind(on_wheel=1, lead=1, air=1)
+    corner_radii: Mapping[Purpose, float] = field(default_factory=dict)
     acceleration: ByKind = ByKind()
     deceleration: ByKind = ByKind()
     actions: Actions = NO_ACTIONS

@@ -15,7 +15,7 @@ from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion
 from opl.program.played import Playback
-from opl.proof.roundings import DEPTHS, Rounding, roundings
+from opl.proof.roundings import DEPTHS, Rounding, roundings, zones_of
 from opl.verification.contact import contact_positions
 from opl.verification.triangles import Triangles
 from opl.verification.world import World
@@ -66,8 +66,8 @@ def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playb
         motion: What the program does, with its meaning, a written configuration for each move.
         playback: The moves.
     """
-    zones = np.array([move.corner.zone for move in playback.moves])
     allowed, tool_points = job.search.max_contact_error, tool_points_of(job)
+    zones = zones_of(playback.moves, playback.q[playback.stations], tool_points)
     corners = list(roundings(motion, zones, tool_points))
     errors = contact_errors(job, points, motion, corners)
     inner = np.array([all(corner.grinds) for corner in corners], dtype=bool)
@@ -77,12 +77,16 @@ def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playb
         if worst[one] > allowed:
             part = np.interp(allowed, np.append(0.0, errors[one]), np.append(0.0, DEPTHS))
             fits = 1e3 * part * corners[one].reach(tool_points)
+            what = "zone"
+            written, zone = playback.moves[corners[one].k].corner, zones[corners[one].k]
+            if written.arc and np.isfinite(zone):
+                what, fits = "corner radius", fits * written.reach / zone
             faults.append(
                 (
                     corners[one],
                     f"leaves the ground point {1e3 * worst[one]:.3f} mm from the wheel's surface, "
-                    f"{1e3 * allowed:g} mm allowed; a zone of {np.floor(100.0 * fits) / 100.0:g} "
-                    "mm would do",
+                    f"{1e3 * allowed:g} mm allowed; a {what} of "
+                    f"{np.floor(100.0 * fits) / 100.0:g} mm would do",
                 )
             )
     near = list(_too_near(job, corners))
@@ -101,7 +105,7 @@ def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playb
                 Level.ERROR,
                 "corner",
                 f"{_place(motion, corner)} ({playback.moves[corner.k].place})",
-                f"{playback.moves[corner.k].corner.told} {fault}",
+                f"{playback.moves[corner.k].corner.told(zones[corner.k])} {fault}",
             )
             for corner, fault in faults
         ),

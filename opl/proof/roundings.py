@@ -14,7 +14,7 @@ cutter points keep their order on each of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from opl.geometry.frames import Array
 from opl.motion.motion import Motion, Phase
+from opl.program.played import ReadMove
 
 DEPTHS = np.array([0.25, 0.5, 0.75, 1.0])  # of the triangle, at which chords are looked at
 ACROSS = np.linspace(0.0, 1.0, 33)  # places on each chord
@@ -149,6 +150,35 @@ class Rounding:
         """Return what is left of one move and begun of the other, shape (DEPTHS, ACROSS)."""
         left = DEPTHS[:, None] * (1.0 - ACROSS) * self.cuts[0]
         return left, DEPTHS[:, None] * ACROSS * self.cuts[1]
+
+
+def zones_of(moves: Sequence[ReadMove], q: Array, tool_points: Callable[[Array], Array]) -> Array:
+    """Return how far from each written position in [m] its moves may be left, see `roundings`.
+
+    An arc touches two straight moves its radius times the tangent of half their turn from the
+    corner. Whether controllers count radii so is not settled: the radius itself is taken where that
+    is more. Next to other moves nobody knows.
+
+    Args:
+        moves: The moves to the positions.
+        q: The positions in [rad], shape (written, 6).
+        tool_points: See `roundings`.
+    """
+    zones = np.array([move.corner.zone for move in moves])
+    for k, move in enumerate(moves[:-1]):
+        if not move.corner.arc or k == 0:
+            continue
+        ways = np.diff(tool_points(q[k - 1 : k + 2]), axis=0)
+        lengths = np.linalg.norm(ways, axis=1)
+        if not moves[k + 1].straight or lengths.min() == 0.0:
+            zones[k] = np.inf
+            continue
+        (x, y), (back, on) = lengths, ways
+        turn = 2.0 * np.arctan2(
+            np.linalg.norm(on / y - back / x), np.linalg.norm(on / y + back / x)
+        )
+        zones[k] *= max(1.0, float(np.tan(turn / 2.0)))
+    return zones
 
 
 def roundings(

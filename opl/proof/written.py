@@ -74,10 +74,11 @@ def _rounded_ends(
         reader.corners(job.program, job.cell.robot),
         motion.ends_phase & ~motion.on_wheel,
     )
-    runs_on = corners.on_wheel.size > 0.0
     for k, move in enumerate(playback.moves):
-        limit = corners.stop if stops[k] else corners.of(Purpose.of(motion.phase[k]))
-        if move.corner.size > limit.size * (1.0 + ROUND_OFF):
+        own = corners.of(Purpose.of(motion.phase[k]), move.straight)
+        limit = corners.stop if stops[k] else own
+        runs_on = not corners.of(Purpose.WHEEL, move.straight).exact_stop
+        if not move.corner.within(limit, ROUND_OFF):
             message = f"must be {limit.text} at most, got {move.corner.text}"
             yield _error("level", f"{motion.place(k)} ({move.place})", message)
         if move.corner.exact_stop and runs_on and motion.on_wheel[k]:

@@ -144,7 +144,10 @@ def _assumed(report: Report, robot: Robot) -> Iterator[str]:
     if robot.position_level_zones is not None:
         zones = ", ".join(f"{MM * zone:g}" for zone in robot.position_level_zones)
         yield f"corner zones of position levels 1 to 8: {zones} mm, as its file has them"
-    else:
+    file = report.verification.file if report.verification is not None else None
+    if robot.position_level_zones is None or (
+        file is not None and file.corners is not None and file.corners.zones_unknown
+    ):
         yield "corner zones: where nobody says how wide, half of a move is taken"
     yield "rounded corners: no move is left before half-way, none overshot"
     yield "calibration: wheel, gripper and part are where the job says"

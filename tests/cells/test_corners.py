@@ -1,5 +1,6 @@
 """Corners as a controller may round them, against closed forms and dense samples of blends."""
 
+import re
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -15,8 +16,9 @@ from opl.motion.fewest import ChainRule, fewest
 from opl.motion.line_error import line_errors, screws_of
 from opl.motion.motion import Motion, MoveKind
 from opl.planning.positions import PositionRule, on_wheel_runs
-from opl.proof.corners import contact_errors, tool_points_of
-from opl.proof.roundings import MOST_CUT, roundings
+from opl.program.played import Corner, Playback, ReadMove, SpeedUnit, WrittenSpeed
+from opl.proof.corners import contact_errors, corner_proof, tool_points_of
+from opl.proof.roundings import MOST_CUT, roundings, zones_of
 from opl.verification.contact import contact_positions
 from opl.verification.triangles import FINEST, Triangles
 from opl.verification.world import World
@@ -132,6 +134,56 @@ def test_narrower_zones_leave_less():
     assert wide.keys() == narrow.keys()
     assert all(narrow[k] <= wide[k] + 2e-6 for k in wide)
     assert any(narrow[k] < 0.8 * wide[k] for k in wide)
+
+
+def straight_moves(radius, count):
+    """Return straight moves, each with an arc at its end."""
+    corner = Corner(1e3 * radius, f"CR={1e3 * radius:.1f}", radius, arc=True)
+    speed = WrittenSpeed(SpeedUnit.TOOL_POINT, 0.02, "V=20.0")
+    return [
+        ReadMove(np.zeros(6), True, speed, corner, "0", f"line {k}", np.zeros(6))
+        for k in range(count)
+    ]
+
+
+@pytest.mark.parametrize(("turn", "factor"), [(5, 1), (90, 1), (120, 3**0.5), (150, 2 + 3**0.5)])
+def test_an_arc_touches_its_lines_no_farther_from_the_corner_than_is_taken(turn, factor):
+    q = np.zeros((3, 6))
+    angle = np.deg2rad(turn)
+    q[1, 0], q[2, :2] = 2.0, [2.0 + 3.0 * np.cos(angle), 3.0 * np.sin(angle)]
+    moves = straight_moves(0.3, 3)
+    found = zones_of(moves, q, lambda configurations: configurations[..., :3])
+    np.testing.assert_allclose(found[1], 0.3 * factor)
+    moves[2] = replace(moves[2], straight=False)  # next to a joint move nobody knows
+    assert np.isinf(zones_of(moves, q, lambda configurations: configurations[..., :3])[1])
+
+
+def test_a_radius_too_wide_is_refused_with_the_error_and_the_radius_that_would_do():
+    job, points, motion = small_job(), small_problem().points, few_positions()
+    positions = motion.positions
+    on_wheel = motion.on_wheel[positions]
+    stop = Corner(0.0, "PL=0")
+
+    def proof(radius):
+        moves = [
+            move if on else replace(move, corner=stop)
+            for move, on in zip(straight_moves(radius, len(positions)), on_wheel, strict=True)
+        ]
+        q = motion.q[positions]
+        playback = Playback(q, np.zeros(len(q)), np.arange(len(q)), tuple(moves))
+        found = corner_proof(job, points, motion, playback)
+        told = {one.where: one.message for one in found.findings if "ground point" in one.message}
+        return found, told
+
+    found, told = proof(1.0)
+    first, *_ = told.values()
+    assert first.startswith("CR=1000.0 (zone 1000 mm) leaves the ground point ")
+    assert f" {1e3 * found.max_contact_error:.3f} mm from the wheel" in first
+    assert f"{1e3 * found.allowed:g} mm allowed; a corner radius of" in first
+    radii = [float(re.search(r"radius of ([0-9.]+) mm would do", one)[1]) for one in told.values()]
+    narrower, others = proof(1e-3 * min(radii))
+    assert narrower.max_contact_error < found.max_contact_error
+    assert not told.keys() & others.keys()
 
 
 @pytest.mark.parametrize("seed", range(6))

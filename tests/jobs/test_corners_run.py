@@ -111,3 +111,67 @@ def test_wide_zones_are_chosen_for(narrow, tmp_path):
     )
     assert few["program"]["moves"] < more["program"]["moves"]
     assert more["verification"]["file"]["corners"]["max_contact_error_mm"] <= 0.1
+
+
+def moves(folder):
+    """Return the moves of the written V program, word and corner each."""
+    lines = (folder / "V_SHAPE.JBI").read_bytes().decode("ascii").split("\r\n")
+    split = [line.split() for line in lines if line.startswith("MOV")]
+    return [(words[0], words[3] if len(words) > 3 else "") for words in split]
+
+
+def figures(corners):
+    """Leave out the place: where between two cutter points it is, is recognised to a thousandth."""
+    return {key: value for key, value in corners.items() if key != "max_contact_error_at"}
+
+
+def corners_of(folder):
+    found = json.loads((folder / "result.json").read_text())["verification"]["file"]["corners"]
+    return figures(found)
+
+
+def verified_corners(job, folder):
+    ended = opl("verify", job, folder / "V_SHAPE.JBI", "--json")
+    assert ended.status == 0, ended.err
+    return figures(json.loads(ended.out)["corners"])
+
+
+def test_without_a_level_half_of_each_move_is_taken_whatever_zones_are_known(narrow, tmp_path):
+    levels = {"on_wheel": "none", "lead": "none", "free_move": 3}
+    changes = {"program.pulse_ratios": "own.yaml", "program.position_levels": levels}
+    job = write_job(tmp_path, {**SHORT, **changes}, quick=False)
+    ratios(tmp_path, NARROW)
+    assert opl("run", job, "--out", tmp_path / "out").status == 0
+    written = moves(tmp_path / "out")
+    stops = [(word, corner) for word, corner in written if corner]
+    assert set(stops) == {("MOVJ", "PL=0")} and 4 <= len(stops) < len(written) - 20
+    corners = corners_of(tmp_path / "out")
+    assert corners["zones_unknown"] == corners["rounded"] > 20
+    assert corners["max_contact_error_mm"] <= 0.1
+    assert verified_corners(job, tmp_path / "out") == corners
+    # half of each move needs more positions than zones of half a millimetre
+    assert len(written) > len(moves(narrow / "out"))
+
+
+def test_straight_moves_have_the_corner_radius_of_their_kind(tmp_path):
+    changes = {"program.motion": "straight", "program.corner_radius_mm": {"on_wheel": 5}}
+    job = write_job(tmp_path, {**SHORT, **changes}, quick=False)
+    ended = opl("run", job, "--out", tmp_path / "out")
+    assert ended.status == 0, ended.err
+    written = moves(tmp_path / "out")
+    assert set(written) == {
+        ("MOVJ", "PL=0"), ("MOVL", "PL=0"), ("MOVL", "PL=1"), ("MOVL", "CR=5.0")
+    }  # fmt: skip
+    corners = corners_of(tmp_path / "out")
+    # nobody knows the zones of the leads, those of radii everybody
+    assert corners["zones_unknown"] == written.count(("MOVL", "PL=1"))
+    assert corners["rounded"] == sum(corner != "PL=0" for _, corner in written)
+    assert verified_corners(job, tmp_path / "out") == corners
+    program = tmp_path / "out" / "V_SHAPE.JBI"
+    text = program.read_bytes().decode("ascii")
+    for other, kind in (("CR=5.1", "level"), ("PL=1", "level"), ("CR=5.0 PL=1", "program")):
+        program.write_bytes(text.replace("CR=5.0", other, 1).encode("ascii"))
+        ended = opl("verify", job, program, "--json")
+        assert ended.status == 4
+        found = [one for one in json.loads(ended.out)["findings"] if one["kind"] == kind]
+        assert len(found) == 1 and (kind == "program" or "must be CR=5.0 at most" in str(found))

@@ -19,6 +19,7 @@ from opl.program.actions import Actions, Call, Dwell, Remark, SetOutput, WaitInp
 from opl.program.export import try_out
 from opl.program.inform import TEMPLATE
 from opl.program.led import StationaryTool
+from opl.program.moves import Purpose
 from opl.program.settings import ByKind, MotionForm, PositionForm, ProgramSettings
 from tests.support.program_samples import HOME, ROBOT, UNVERIFIED
 
@@ -43,7 +44,7 @@ def test_nothing_asked_for_is_a_pulse_job_of_joint_moves(tmp_path):
         "DX200", MotionForm.JOINT, PositionForm.PULSES
     )  # fmt: skip
     assert found.levels == ByKind(1, 1, 1) and found.acceleration == ByKind()
-    assert found.accepted_pulses == () and found.template is None
+    assert found.accepted_pulses == () and found.template is None and found.corner_radii == {}
     np.testing.assert_array_equal(found.T_flange_tool, np.eye(4))
 
 
@@ -59,7 +60,8 @@ def test_every_key_reaches_the_program_in_si(tmp_path):
         positions: user
         user_frame: {{number: 2, T_base_user_mm: {EYE}}}
         accept_unverified_pulses: [T]
-        position_levels: {{on_wheel: 2, free_move: 8}}
+        position_levels: {{on_wheel: 2, lead: none, free_move: 8}}
+        corner_radius_mm: {{on_wheel: 2.5}}
         acceleration_percent: {{on_wheel: 50}}
         deceleration_percent: {{free_move: 30}}
         comment: PART 4711
@@ -75,7 +77,8 @@ def test_every_key_reaches_the_program_in_si(tmp_path):
     assert found.T_flange_tool[2, 3] == 0.18
     assert found.user_frame.number == 2 and found.user_frame.T_base_user[2, 3] == 0.18
     assert (found.tool, found.title) == (3, "PART 4711")
-    assert found.levels == ByKind(2, 1, 8)
+    assert found.levels == ByKind(2, None, 8)
+    assert found.corner_radii == {Purpose.WHEEL: 0.0025}
     assert (found.acceleration, found.deceleration) == (ByKind(on_wheel=50), ByKind(air=30))
     assert found.actions.at_start == (Remark("BELT MUST RUN"),)
     assert found.actions.before_pass == (SetOutput(12, True), WaitInput(3, False, 2.5))
@@ -133,7 +136,25 @@ def test_stationary_tool_stands_at_the_wheel_or_in_the_user_frame_of_the_job(tmp
         ("at_end: [{}]", "needs exactly one of"),
         ("at_end: [{dwell_s: 1, timeout_s: 2}]", "timeout_s goes with wait_input only"),
         ("at_end: [{dwell: 1}]", "unknown key; known here: call, comment, dwell_s"),
-        ("position_levels: {on_wheel: 9}", "position_levels.on_wheel: must be at most 8, got 9"),
+        ("position_levels: {on_wheel: 9}", "levels.on_wheel: must be a whole .* none, got 9"),
+        ("position_levels: {lead: true}", "levels.lead: must be a whole .* 8, or none, got true"),
+        ("position_levels: {lead: null}", "levels.lead: must be a whole .* 8, or none, got null"),
+        (
+            "corner_radius_mm: {lead: 5}",
+            "corner_radius_mm.lead: goes with motion: straight only; joint moves take position_lev",
+        ),
+        (
+            "motion: straight\ncorner_radius_mm: {free_move: 5}",
+            "corner_radius_mm: free_move: is for straight moves, those in the air are joint moves",
+        ),
+        (
+            "motion: straight\ncorner_radius_mm: {on_wheel: 0.05}",
+            "corner_radius_mm: must be 0.1 to 6553.5 mm, got 0.05",
+        ),
+        (
+            "controller: RAPID\nmotion: straight\ncorner_radius_mm: {on_wheel: 5}",
+            "corner_radius_mm: is for Yaskawa controllers, not for ABB",
+        ),
         (f"T_flange_tool_mm: {EYE.replace('[1, 0', '[2, 0')}", "away from a rotation"),
     ],
 )

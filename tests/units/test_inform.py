@@ -224,9 +224,9 @@ def test_tool_the_controller_does_not_have_is_refused(tool):
         ("={{ step.values }}", "=0,0,0,0,0,0", r"position 1: must be C00000=0,-38000"),
         ("{{ step.word }}", "MOVL", r"move 1: must be MOVJ C00000 VJ=5.00 PL=0, is MOVL"),
         ("{{ step.speed }}", "VJ=100.00", "move 1: must be MOVJ C00000 VJ=5.00"),
-        (" PL={{ step.level }}", "", "is MOVJ C00000 VJ=5.00$"),
+        ("{{ step.corner }}", "", "is MOVJ C00000 VJ=5.00$"),
         ("{{ step.word }}", "COMM MOVJ", "move 1: .* is missing"),
-        ("PL={{ step.level }}", "PL={{ step.level }} UNTIL IN#(1)=ON", "move 1: .* UNTIL"),
+        ("{{ step.corner }}", "{{ step.corner }} UNTIL IN#(1)=ON", "move 1: .* UNTIL"),
         ("NOP\n", "NOP\nMOVJ P001 VJ=1.00\n", "move 1: .* is MOVJ P001"),
         ("NOP\n", "NOP\nSFTON P001\n", "SFTON shifts"),
         ("NOP\n", "NOP\nIMOV P001 V=10.0 RF\n", "move 1: .* is IMOV P001"),
@@ -270,7 +270,7 @@ def test_template_whose_master_skips_a_part_is_refused(tmp_path):
 def test_template_may_add_what_does_not_move_the_robot(tmp_path):
     own = tmp_path / "own.jbi.j2"
     text = TEMPLATE.read_text().replace("NOP\n", "NOP\nDOUT OT#(1) ON\nCALL JOB:BELT-ON\n")
-    own.write_text(text.replace("PL={{ step.level }}", "PL={{ step.level }} ACC=50  //NOTE"))
+    own.write_text(text.replace("{{ step.corner }}", "{{ step.corner }} ACC=50  //NOTE"))
     job = parse(render(sample(), ROBOT, DATE, template=own))
     assert job.calls == ("BELT-ON",)
 
@@ -310,6 +310,9 @@ def test_legal_job_has_no_faults():
         ({"steps": "MOVL C00000 V=1500.1"}, "V must be 0.1 to 1500.0"),
         ({"steps": "MOVJ C00000 VJ=1.00  +MOVJ EC00000 VJ=200.00"}, "VJ must be 0.01 to 100.0"),
         ({"steps": "MOVJ C00000 VJ=1.00 PL=9"}, "PL must be 0 to 8, got 9"),
+        ({"steps": "MOVL C00000 V=1.0 CR=0.0"}, "CR must be 0.1 to 6553.5, got 0.0"),
+        ({"steps": "MOVL C00000 V=1.0 CR=1.25"}, "CR takes 1 decimals, got 1.25"),
+        ({"steps": "MOVJ C00000 VJ=1.00 CR=5.0"}, "CR is for straight moves, not for MOVJ"),
         ({"steps": "'" + 33 * "x"}, "comment has 33 characters"),
         ({"steps": "NOP  //" + 33 * "x"}, "comment has 33 characters"),
         ({"steps": "'ö"}, "must be printable ASCII, got 'ö'"),

@@ -156,14 +156,17 @@ def _word_faults(step: Instruction, profile: ControllerProfile) -> Iterator[str]
 
 
 def _move_faults(move: Instruction, profile: ControllerProfile) -> Iterator[str]:
-    speeds = {
+    if move.tag("CR") is not None and move.word.endswith("J"):
+        yield f"line {move.line}: CR is for straight moves, not for {move.word}"
+    spans = {
         "VJ": profile.joint_speed,
         "V": profile.linear_speed,
         "VR": profile.angular_speed,
+        "CR": profile.corner_radius,
     }
     ramp, levels = profile.ramp_percent, (0, profile.position_levels)
     whole = {"ACC": ramp, "DEC": ramp, "PL": levels}
-    for name in (*speeds, *whole):
+    for name in (*spans, *whole):
         text = move.tag(name)
         if text is None or _VARIABLE.fullmatch(text):
             continue
@@ -172,7 +175,7 @@ def _move_faults(move: Instruction, profile: ControllerProfile) -> Iterator[str]
             if text not in map(str, range(low, high + 1)):
                 yield f"line {move.line}: {name} must be {low} to {high}, got {text}"
             continue
-        allowed = speeds[name]
+        allowed = spans[name]
         # controllers write all decimals, and take fewer
         if not re.fullmatch(rf"[0-9]{{1,9}}(?:\.[0-9]{{1,{allowed.decimals}}})?", text):
             yield f"line {move.line}: {name} takes {allowed.decimals} decimals, got {text}"

@@ -28,7 +28,7 @@ VARIABLES = {
     "step.rconf": "numbers of RCONF where they change, else none",
     "step.word": "MOVJ or MOVL",
     "step.speed": "of the move, e.g. VJ=5.00, V=20.0 or VR=3.0",
-    "step.level": "position level (PL)",
+    "step.corner": "PL or CR with a space before, empty where the job wants neither",
     "step.ramps": "ACC and DEC with a space before each, empty where the job sets none",
     "step.comment": "line before the move, or none",
     "step.actions": "instructions after the move: outputs, waits, calls, comments",
@@ -45,7 +45,7 @@ class JobStep:
     rconf: str | None
     word: str
     speed: str
-    level: str
+    corner: str
     ramps: str
     comment: str | None
     actions: tuple[str, ...]
@@ -53,7 +53,7 @@ class JobStep:
     @property
     def move(self) -> str:
         """The move, as one line."""
-        return f"{self.word} {self.label} {self.speed} PL={self.level}{self.ramps}"
+        return f"{self.word} {self.label} {self.speed}{self.corner}{self.ramps}"
 
 
 @dataclass(frozen=True)

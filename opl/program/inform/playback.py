@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -10,11 +11,13 @@ from opl.cell.robot import Robot
 from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.frames import Array
+from opl.program.controller import ControllerProfile
 from opl.program.events import Event
 from opl.program.inform.heads import head_findings
 from opl.program.inform.job import InformJob
 from opl.program.inform.sequence import Doing, Visit, first_job, visits
 from opl.program.inform.times import job_configurations, written_speed
+from opl.program.inform.words import STOP_LEVEL, radius_tag
 from opl.program.moves import SAME_CONFIGURATION, START_SPEED
 from opl.program.played import (
     Corner,
@@ -68,14 +71,23 @@ def play_jobs(
     return None, [*found, *(doubtful if moves else [])]
 
 
-def corners(settings: ProgramSettings, robot: Robot) -> Corners:
-    """Return the position levels a job allows."""
-    levels = (0, settings.levels.on_wheel, settings.levels.lead, settings.levels.air)
-    return Corners(*(_corner(None if level is None else str(level), robot) for level in levels))
+def corners(settings: ProgramSettings, robot: Robot, profile: ControllerProfile) -> Corners:
+    """Return the position levels and corner radii a job allows."""
+    levels = (STOP_LEVEL, settings.levels.on_wheel, settings.levels.lead, settings.levels.air)
+    stop, on_wheel, lead, air = (
+        _corner(None if level is None else str(level), None, robot) for level in levels
+    )
+    tags = {kind: radius_tag(kind, settings, profile) for kind in settings.corner_radii}
+    radii = {kind: tag.removeprefix("CR=") for kind, tag in tags.items() if tag is not None}
+    straight = {kind: _corner(None, radius, robot) for kind, radius in radii.items()}
+    return Corners(stop, on_wheel, lead, air, straight)
 
 
-def _corner(level: str | None, robot: Robot) -> Corner:
-    """Return what a position level allows; without one it is the controller's affair."""
+def _corner(level: str | None, radius: str | None, robot: Robot) -> Corner:
+    """Return what PL or CR allow; without either it is the controller's affair."""
+    if radius is not None:
+        length = float(radius) if re.fullmatch(r"[0-9]{1,9}(\.[0-9]{1,9})?", radius) else np.inf
+        return Corner(length, f"CR={radius}", 1e-3 * length, arc=True)
     if level is None or not level.isdecimal():
         return Corner(np.inf, "no PL" if level is None else f"PL={level}")
     zones, number = robot.position_level_zones, int(level)
@@ -90,7 +102,7 @@ def _move(visit: Visit, target: Array, resolution: Array, starts: bool, robot: R
         target=target,
         straight=step.word == "MOVL",
         speed=written_speed(step),
-        corner=_corner(step.tag("PL"), robot),
+        corner=_corner(step.tag("PL"), step.tag("CR"), robot),
         tool=str(_tool(visit)),
         place=_place(visit),
         resolution=resolution,

@@ -157,7 +157,7 @@ def post_of(profile: ControllerProfile) -> Post:
         lambda files, robot, settings: _read(files, robot, settings, profile),
         lambda q, robot, settings: rounded_to_job(q, robot, settings, profile),
         lambda robot: START,
-        corners,
+        lambda settings, robot: corners(settings, robot, profile),
         describe_file,
         file_differences,
         lambda q, robot, settings, margin: (

@@ -21,7 +21,13 @@ from opl.program.inform.heads import attributes, frame
 from opl.program.inform.job_layout import JobLayout, JobStep, differences
 from opl.program.inform.parse import parse
 from opl.program.inform.positions import write_positions, write_speeds
-from opl.program.inform.words import ACTIONS, ramps, require_accepted_action
+from opl.program.inform.words import (
+    ACTIONS,
+    corner,
+    radius_tag,
+    ramps,
+    require_accepted_action,
+)
 from opl.program.layout import fill
 from opl.program.moves import Program
 from opl.program.settings import PositionForm, ProgramSettings
@@ -30,7 +36,6 @@ from opl.program.split import short_name, split
 FILE_SUFFIX = ".JBI"
 TEMPLATE = resources.folder("templates") / "inform" / "job.jbi.j2"
 
-_STOP_LEVEL = 0
 # Of a template that goes wrong on every line, a few faults tell as much as all.
 _FAULTS_SHOWN = 10
 
@@ -122,7 +127,7 @@ def _steps(
             rconf=rconfs[number + 1] if rconfs[number + 1] != rconfs[number] else None,
             word=speeds[number][0],
             speed=speeds[number][1],
-            level=str(_STOP_LEVEL if move.exact_stop else settings.levels.of(move.kind)),
+            corner=corner(move, speeds[number][0] == "MOVL", settings, profile),
             ramps=ramps(move.kind, settings),
             comment=move.comment,
             actions=actions[number],
@@ -148,6 +153,8 @@ def _require_legal(
     if frame is not None and not 1 <= frame.number <= profile.highest_user_frame:
         allowed = f"1 to {profile.highest_user_frame}"
         raise SettingError("user_frame", f"must be {allowed}, got {frame.number}")
+    for kind in settings.corner_radii:
+        radius_tag(kind, settings, profile)
     for name in (layout.name, *layout.calls):
         if fault := profile.name_fault(name):
             raise InputError("program name", fault)

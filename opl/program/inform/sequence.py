@@ -19,7 +19,7 @@ from opl.program.inform.job import InformJob, Instruction, read_label
 _WAITS = frozenset(["TIMER", "WAIT", "PAUSE"])
 _PASSING = frozenset(["DOUT", "DIN", "PULSE", "AOUT", "MSG", "CLS"])
 _SPEEDS = {"MOVJ": ("VJ",), "MOVL": ("V", "VR")}
-_MOVE_TAGS = frozenset({"VJ", "V", "VR", "PL", "ACC", "DEC"})
+_MOVE_TAGS = frozenset({"VJ", "V", "VR", "PL", "CR", "ACC", "DEC"})
 _NUMBER = re.compile(r"[0-9]{1,9}(?:\.[0-9]{1,9})?")
 
 
@@ -162,6 +162,8 @@ def _move_fault(step: Instruction, places: Mapping[tuple[str, int], int]) -> str
     tags = [name for name, _ in step.tags]
     if step.coupled or label is None or not set(tags) <= _MOVE_TAGS or len(set(tags)) < len(tags):
         return f"nobody can tell from the file where this {step.word} leads"
+    if {"PL", "CR"} <= set(tags):
+        return "has PL and CR, and nobody can tell which of them holds"
     if label[0] != "C" or label not in places:
         return f"moves to {step.operands[0]}, which is no position of the job"
     speeds = [name for name in tags if name in ("VJ", "V", "VR")]

@@ -1,12 +1,12 @@
-"""Actions and ramps in INFORM."""
+"""Actions, corners and ramps in INFORM."""
 
 from __future__ import annotations
 
-from opl.errors import InputError
+from opl.errors import InputError, SettingError
 from opl.program.actions import Action, Call, Dwell, Remark, SetOutput, WaitInput
 from opl.program.controller import ControllerProfile
 from opl.program.dialect import ActionTexts
-from opl.program.moves import Purpose
+from opl.program.moves import Move, Purpose
 from opl.program.settings import ProgramSettings
 
 ACTIONS = ActionTexts(
@@ -23,6 +23,37 @@ ACTIONS = ActionTexts(
     call="CALL JOB:{name}",
     remark="'{text}",
 )
+
+
+STOP_LEVEL = 0
+
+
+def corner(
+    move: Move, straight: bool, settings: ProgramSettings, profile: ControllerProfile
+) -> str:
+    """Return the tag that says how the end of a move is rounded, after a space; "" for none."""
+    if move.exact_stop:
+        return f" PL={STOP_LEVEL}"
+    radius = radius_tag(move.kind, settings, profile) if straight else None
+    if radius is not None:
+        return f" {radius}"
+    level = settings.levels.of(move.kind)
+    return "" if level is None else f" PL={level}"
+
+
+def radius_tag(kind: Purpose, settings: ProgramSettings, profile: ControllerProfile) -> str | None:
+    """Return the corner radius of the straight moves of a kind, None where they have a level.
+
+    Raises:
+        SettingError: If the controller takes no such radius.
+    """
+    if kind not in settings.corner_radii:
+        return None
+    radius, allowed = 1e3 * settings.corner_radii[kind], profile.corner_radius
+    if not allowed.lowest <= radius <= allowed.highest:
+        message = f"must be {allowed.lowest:g} to {allowed.highest:g} mm, got {radius:g}"
+        raise SettingError("corner_radius", message)
+    return f"CR={allowed.text(radius)}"
 
 
 def ramps(kind: Purpose, settings: ProgramSettings) -> str:
