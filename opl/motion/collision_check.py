@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from opl.cell.collision import CollisionScene
 from opl.cell.robot import forward_kinematics
@@ -36,6 +37,9 @@ class CollidingMove:
     at_end: bool
 
 
+Faults = list[CollidingMove]
+
+
 def densify(q: Array, resolution: float) -> tuple[Array, np.ndarray]:
     """Put configurations on the joint lines between configurations.
 
@@ -59,18 +63,58 @@ def _in_parts(q: Array, counts: np.ndarray) -> tuple[Array, np.ndarray]:
     return np.concatenate([q[:1], dense]), np.concatenate([[0], move])
 
 
+class MoveCheck:
+    """`colliding_moves` of motions that share moves: those of the last one are not looked at again.
+
+    What is found of a move depends on nothing but its configurations, those of the move before it,
+    at whose end it begins, and whether the two are free moves.
+    """
+
+    def __init__(self, cell: WorkCell, scene: CollisionScene, part: PartTree) -> None:
+        self._looked_at = cell, scene, part
+        self._known: dict[bytes, CollidingMove | None] = {}
+
+    def colliding(self, motion: Motion, asked: NDArray[np.bool_] | None = None) -> Faults:
+        """Return which moves of a motion collide, of those asked for, once each, in order.
+
+        `asked` are flags of the moves by the configurations that they end at, shape (n,).
+        """
+        moves = range(len(motion)) if asked is None else np.flatnonzero(asked).tolist()
+        free = motion.free
+        keys = {
+            move: motion.q[max(move - 2, 0) : move + 1].tobytes()
+            + free[max(move - 1, 0) : move + 1].tobytes()
+            for move in moves
+        }
+        new = np.zeros(len(motion), dtype=bool)
+        new[[move for move, key in keys.items() if key not in self._known]] = True
+        found = {one.move: one for one in colliding_moves(*self._looked_at, motion, new)}
+        self._known = {
+            key: found.get(move) if new[move] else self._known[key] for move, key in keys.items()
+        }
+        faults = ((move, self._known[key]) for move, key in keys.items())
+        return [replace(fault, move=move) for move, fault in faults if fault is not None]
+
+
 def colliding_moves(
-    cell: WorkCell, scene: CollisionScene, part: PartTree, motion: Motion
-) -> list[CollidingMove]:
+    cell: WorkCell,
+    scene: CollisionScene,
+    part: PartTree,
+    motion: Motion,
+    asked: NDArray[np.bool_] | None = None,
+) -> Faults:
     """Return every move of a motion that collides, once each, in order.
 
     The part may sink into the belt by its largest penetration while it is on the wheel, on
-    approaches and on retracts; on free moves it keeps its clearance from the wheel.
+    approaches and on retracts; on free moves it keeps its clearance from the wheel. Only moves that
+    are asked for are looked at, flags by the configurations that they end at, shape (n,).
     """
-    sunk, sunk_at_end = _at_wheel(cell, part, motion)
+    if asked is None:
+        asked = np.ones(len(motion), dtype=bool)
+    sunk, sunk_at_end = _at_wheel(cell, part, motion, asked)
     q, move = densify(motion.q, RESOLUTION)
     # a move that is refused for the wheel need not be checked further
-    unrefused = ~sunk[move]
+    unrefused = (asked & ~sunk)[move]
     hits = np.zeros(len(q), dtype=bool)
     hits[unrefused] = scene.collides(q[unrefused])
     faults = []
@@ -85,7 +129,9 @@ def colliding_moves(
     return faults
 
 
-def _at_wheel(cell: WorkCell, part: PartTree, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+def _at_wheel(
+    cell: WorkCell, part: PartTree, motion: Motion, asked: NDArray[np.bool_]
+) -> tuple[np.ndarray, np.ndarray]:
     """Return which moves bring the part too near to the wheel, and which of them end there.
 
     Where it may touch the wheel, a place between two that are looked at is nearer by half the way
@@ -110,13 +156,18 @@ def _at_wheel(cell: WorkCell, part: PartTree, motion: Motion) -> tuple[np.ndarra
     q, move = _in_parts(motion.q, counts)
     needed = np.where(motion.free, cell.part_from_wheel, -cell.planned_penetration)[move]
     half = np.concatenate([[0.0], moved / counts / 2.0])[move]
-    found = distance(q, needed + half)
+    # a move begins where the one before it ends
+    looked_at = asked[move]
+    looked_at[:-1] |= looked_at[1:]
+    found = np.full(len(q), np.inf)
+    found[looked_at] = distance(q[looked_at], (needed + half)[looked_at])
     sunk = np.zeros(len(motion), dtype=bool)
     sunk[move[found < needed]] = True
+    sunk &= asked
     at_end = (found < needed)[np.concatenate([[0], np.cumsum(counts)])]
     near = found < needed + half
     near[1:] |= near[:-1]
-    unsure = np.flatnonzero(near & (half > 0.0) & ~sunk[move])
+    unsure = np.flatnonzero(near & (half > 0.0) & (asked & ~sunk)[move])
     between = np.arange(1, FINER)[:, None] / FINER
     finer = (q[unsure - 1, None] + between * (q[unsure] - q[unsure - 1])[:, None]).reshape(-1, 6)
     at = np.repeat(unsure, FINER - 1)

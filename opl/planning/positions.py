@@ -19,7 +19,6 @@ from opl.errors import UnsafeError
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import MM_PER_M, ContactWheel
-from opl.motion.collision_check import colliding_moves
 from opl.motion.fewest import ChainRule, fewest
 from opl.motion.gradual import PLANNED_RATIO
 from opl.motion.line_error import LEVER, ROLLS, SLIDES, Run, Screws, line_errors, screws_of
@@ -192,9 +191,7 @@ def _freedom(wheel: ContactWheel, t: Array) -> tuple[NDArray[np.int64], Array]:
 def _colliding_lines(scene: PlanningScene, motion: Motion) -> Sequence[tuple[int, int]]:
     """Return the lines on the wheel that hit something, by the indices of their ends."""
     written = motion.take(motion.positions)
-    faults = colliding_moves(scene.cell, scene.collision, scene.part, written)
     return [
         (int(motion.positions[fault.move - 1]), int(motion.positions[fault.move]))
-        for fault in faults
-        if written.grinding[fault.move]
+        for fault in scene.moves.colliding(written, written.grinding)
     ]

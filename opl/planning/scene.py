@@ -8,6 +8,7 @@ from functools import cached_property
 from opl.cell.collision import CollisionScene
 from opl.cell.wheel_distance import PartTree, part_tree
 from opl.cell.workcell import WorkCell
+from opl.motion.collision_check import MoveCheck
 from opl.motion.free_move_search import FreeMoveSearch
 
 
@@ -29,6 +30,11 @@ class PlanningScene:
     def free_moves(self) -> FreeMoveSearch:
         """Free moves of this scene, and what has been learnt of them."""
         return FreeMoveSearch(self.cell, self.collision, self.part)
+
+    @cached_property
+    def moves(self) -> MoveCheck:
+        """The check of motions in this scene, and what was found of the last one."""
+        return MoveCheck(self.cell, self.collision, self.part)
 
 
 def planning_scene(cell: WorkCell) -> PlanningScene:

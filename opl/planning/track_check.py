@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.motion.collision_check import CollidingMove, colliding_moves
+from opl.motion.collision_check import CollidingMove
 from opl.motion.lead_runs import free_runs
 from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
@@ -77,7 +77,7 @@ def check_path(problem: GrindingProblem, path: GrindingPath) -> Free | Blocked:
         motion = whole_motion(cell, points, path, process, runs)
     except UnreachableApproachError as error:
         return NoMotion(error)
-    faults = colliding_moves(scene.cell, scene.collision, scene.part, motion)
+    faults = scene.moves.colliding(motion)
     # free moves are led around what blocks them, unless it is where an approach begins
     faults = [
         fault

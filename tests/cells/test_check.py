@@ -12,7 +12,7 @@ from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import part_tree, signed_wheel_distance
-from opl.motion.collision_check import RESOLUTION, colliding_moves, densify
+from opl.motion.collision_check import RESOLUTION, MoveCheck, colliding_moves, densify
 from opl.motion.motion import MoveKind
 from tests.support.bare_cells import bare_cell, block, free_move, with_obstacle
 from tests.support.fcl_scene import FclScene
@@ -146,6 +146,36 @@ def test_the_deepest_place_of_a_long_line_counts_wherever_it_is():
                 ("part", "wheel")
             ] * found
     assert tried > 3
+
+
+def test_what_is_known_of_the_last_motion_changes_no_fault():
+    problem, motion = small_problem(), small_motion()
+    scene, asked = problem.scene, motion.grinding
+    check = MoveCheck(scene.cell, scene.collision, scene.part)
+    random = np.random.default_rng(0)
+    faulty = 0
+    for _ in range(6):
+        q = motion.q.copy()
+        for index in random.choice(len(q), 4):
+            # out of the wheel or into it, a little or a lot
+            q[index] += random.normal(0.0, random.choice([1e-4, 1e-3, 0.1]), 6)
+        moved = replace(motion, q=q)
+        faults = colliding_moves(scene.cell, scene.collision, scene.part, moved)
+        assert check.colliding(moved) == faults
+        assert check.colliding(moved, asked) == [one for one in faults if asked[one.move]]
+        faulty += len(faults)
+        motion = moved if random.random() < 0.5 else motion
+    assert faulty > 20
+
+
+def test_a_move_that_is_known_is_not_looked_at_again():
+    problem, motion = small_problem(), small_motion()
+    scene = problem.scene
+    check = MoveCheck(scene.cell, scene.collision, scene.part)
+    check.colliding(motion)
+    before = scene.collision.queries
+    check.colliding(motion)
+    assert scene.collision.queries == before
 
 
 def test_a_free_move_keeps_the_clearance_from_the_wheel():

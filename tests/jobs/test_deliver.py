@@ -228,7 +228,7 @@ def test_an_obstacle_in_the_way_is_named_with_what_hits_it(tmp_path):
 
 
 def test_what_the_planner_overlooks_pybullet_finds_and_no_program_is_written(tmp_path, monkeypatch):
-    monkeypatch.setattr("opl.planning.track_check.colliding_moves", lambda *arguments: [])
+    monkeypatch.setattr("opl.motion.collision_check.MoveCheck.colliding", lambda *arguments: [])
     monkeypatch.setattr("opl.planning.track_check.linked", lambda motion, links: motion)
     leave_earlier_run(tmp_path / "out")
     obstacles = [*document()["obstacles"], POST]

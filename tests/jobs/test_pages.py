@@ -128,7 +128,7 @@ def test_a_refused_job_begins_where_it_is_blocked(blocked):
 
 
 def test_a_motion_that_the_replay_refuses_begins_at_its_first_finding(tmp_path, monkeypatch):
-    monkeypatch.setattr("opl.planning.track_check.colliding_moves", lambda *arguments: [])
+    monkeypatch.setattr("opl.motion.collision_check.MoveCheck.colliding", lambda *arguments: [])
     monkeypatch.setattr("opl.planning.track_check.linked", lambda motion, links: motion)
     obstacles = [*document()["obstacles"], POST]
     run = opl.run_job(opl.load_job(write_job(tmp_path, {"obstacles": obstacles})))
