@@ -131,28 +131,28 @@ def _passed(
 
     Not where one keeps to it from sample to sample: a flat part of a surface on the flat.
     """
-    found = [np.empty(0)]
     p_workpiece = points.Ts_workpiece_cutter[:, :3, 3]
-    for k in np.flatnonzero(np.isin(np.ceil(at[1:]).astype(int) - 1, close)):
-        start, end = Ts_contact0_workpiece[k : k + 2]
-        off = np.abs(wheel.signed_distance(transform(start, p_workpiece)))
-        around = np.flatnonzero(off <= STEP + NEAR * allowed)
-        Ts = points.Ts_workpiece_cutter[around]
-        middle = (start @ Ts + end @ Ts) / 2.0
-        t = contact_positions(wheel, middle)
-        Ts_contact0_contact = wheel.T_contact0_contact(t)
-        free = np.where(np.abs(t) > wheel.flat_end, 4, 0)
-        first, last = (_off(Ts_contact0_contact, T @ Ts) for T in (start, end))
-        for one in (first, last):
-            one[np.arange(len(around)), free] = 0.0
-        way = last - first
-        length = np.square(way).sum(axis=1)
-        share = -(first * way).sum(axis=1) / np.where(length > 0.0, length, 1.0)
-        nearest = np.linalg.norm(first + share[:, None] * way, axis=1)
-        kept = np.maximum(np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1)) <= allowed
-        good = (share > APART) & (share < 1.0 - APART) & (nearest <= NEAR * allowed) & ~kept
-        found.append(at[k] + share[good] * (at[k + 1] - at[k]))
-    return np.concatenate(found)
+    samples, around = [np.empty(0, dtype=np.intp)], [np.empty(0, dtype=np.intp)]
+    for number in np.flatnonzero(np.isin(np.ceil(at[1:]).astype(int) - 1, close)):
+        off = np.abs(wheel.signed_distance(transform(Ts_contact0_workpiece[number], p_workpiece)))
+        around.append(np.flatnonzero(off <= STEP + NEAR * allowed))
+        samples.append(np.full(len(around[-1]), number))
+    k = np.concatenate(samples)
+    Ts = points.Ts_workpiece_cutter[np.concatenate(around)]
+    start, end = Ts_contact0_workpiece[k] @ Ts, Ts_contact0_workpiece[k + 1] @ Ts
+    t = contact_positions(wheel, (start + end) / 2.0)
+    Ts_contact0_contact = wheel.T_contact0_contact(t)
+    free = np.where(np.abs(t) > wheel.flat_end, 4, 0)
+    first, last = (_off(Ts_contact0_contact, one) for one in (start, end))
+    for one in (first, last):
+        one[np.arange(len(k)), free] = 0.0
+    way = last - first
+    length = np.square(way).sum(axis=1)
+    share = -(first * way).sum(axis=1) / np.where(length > 0.0, length, 1.0)
+    nearest = np.linalg.norm(first + share[:, None] * way, axis=1)
+    kept = np.maximum(np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1)) <= allowed
+    good = (share > APART) & (share < 1.0 - APART) & (nearest <= NEAR * allowed) & ~kept
+    return np.asarray(at[k[good]] + share[good] * (at[k[good] + 1] - at[k[good]]))
 
 
 def _off(Ts_contact0_contact: Array, Ts_contact0_cutter: Array) -> Array:
