@@ -42,3 +42,11 @@ def warm_processes(monkeypatch):
     from tests.support.warm_processes import STAND_IN
 
     monkeypatch.setattr("opl.files.apart.subprocess", STAND_IN)
+
+
+@pytest.fixture(scope="module")
+def no_pictures():
+    """Leave the pictures of runs out: they take as long as all the rest of a small one."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
+        yield

@@ -21,6 +21,8 @@ from opl.job.load import load_job
 from tests.support.jobs import GONE, QUICK, opl, write_job
 from tests.support.schema_check import schema_faults
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 WORKPIECES = folder("workpieces")
 CELL = WORKPIECES / "cells" / "belt_cell.yaml"
 CONTACT0 = [

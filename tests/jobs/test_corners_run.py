@@ -9,6 +9,8 @@ import yaml
 from tests.jobs.test_verify import SHORT, refuses
 from tests.support.jobs import opl, write_job
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 NARROW = [0.5, 25, 50, 100, 200, 300, 400, 500]  # of the position levels, in [mm]
 
 

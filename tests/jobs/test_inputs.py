@@ -13,6 +13,8 @@ from opl.version import VERSION
 from tests.support.jobs import V_JOB, document, opl, write_job, write_robot
 from tests.support.surfaces import load_surface
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 SHORT = {
     "search.method": "recursive",
     "passes.end_margin_mm": 70,
@@ -24,9 +26,7 @@ SHORT = {
 def home(tmp_path_factory):
     """Return a folder with job.yaml and out/."""
     folder = tmp_path_factory.mktemp("inputs")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
-        ended = opl("run", write_job(folder, SHORT), "--out", folder / "out")
+    ended = opl("run", write_job(folder, SHORT), "--out", folder / "out")
     assert ended.status == 0, ended.err
     return folder
 

@@ -22,6 +22,8 @@ from tests.support.corners import needed
 from tests.support.example_post import install_example_post
 from tests.support.jobs import GONE, opl, write_job
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 SHORT = {
     "search.method": "recursive",
     "passes.end_margin_mm": 70,
@@ -189,9 +191,7 @@ def written(request, tmp_path_factory):
         changes["process.feed_mm_s"] = 60.0
     path = write_job(home, changes)
     job = load_job(path)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
-        ended = opl("run", path, "--out", home / "out")
+    ended = opl("run", path, "--out", home / "out")
     assert ended.status == 0, ended.err
     file = home / "out" / (job.name + find_post(request.param).reader.suffix)
     points = cut_surface(job).points

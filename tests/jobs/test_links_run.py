@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import forward_kinematics, load_robot
@@ -20,6 +21,8 @@ from opl.run.stages import run_job
 from opl.run.surfacing import cut_surface
 from tests.support.fcl_scene import margin_along
 from tests.support.jobs import document, opl, write_job
+
+pytestmark = pytest.mark.usefixtures("no_pictures")
 
 # a plate of the machine's frame above the wheel, across the straight move from home
 HOOD = {"name": "hood", "box_mm": [456, 245, 30], "at_mm": [827, 277, 734]}

@@ -12,6 +12,8 @@ from opl.run.surfacing import cut_surface
 from tests.support.jobs import POST, opl, write_job, write_trough
 from tests.support.planned import v_job
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 
 def test_a_narrower_wheel_opens_a_trough_and_is_told(tmp_path):
     # 30 mm wide, 15 mm deep: the flat of 50 mm cannot get in, a narrower one can

@@ -13,14 +13,9 @@ from opl.run.result import to_json
 from opl.verification.replay import Verification
 from tests.support.jobs import POST, write_job
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 QUICK = {"search.method": "recursive"}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _no_pictures():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -13,17 +13,12 @@ from opl.job.load import load_job
 from opl.program.inform import parse
 from tests.support.jobs import GONE, document, opl, write_job
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 USER = {"program.positions": "user", "program.accept_unverified_pulses": GONE}
 # what the wheel was moved by when the frame was touched up, in [mm] and [deg]
 SHIFT_MM = np.array([3.0, -2.0, 4.0])
 SHIFT = Rotation.from_rotvec([0.2, -0.3, 0.25], degrees=True)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _no_pictures():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
-        yield
 
 
 @cache
@@ -113,6 +108,7 @@ def test_one_job_per_pass_is_proven_in_order_and_the_load_stands_in_the_tool_dat
     changes = {
         **USER,
         "passes.rows": 2,
+        "search.method": "recursive",
         "program.one_job_per_pass": True,
         "program.tool": 4,
         "program.T_flange_tool_mm": np.eye(4).tolist(),

@@ -29,6 +29,8 @@ from opl.run.stages import run_job
 from opl.run.surfacing import cut_surface
 from tests.support.jobs import V_SHAPE, opl, write_job, write_robot
 
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
 # two rows of the V, few contact positions, long steps, and a home near the wheel
 FEW = {
     "passes.rows": 2,
@@ -41,14 +43,6 @@ FEW = {
 SHORT = {**FEW, "passes.rows": 1}
 COARSE = {key: FEW[key] for key in ("search.method", "process.home_deg")}
 HOMES = []
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _no_pictures():
-    """Leave the pictures out: they take longer than the proof."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("opl.run.stages.draw_charts", lambda *_: {})
-        yield
 
 
 @cache
