@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.cell.robot import forward_kinematics
-from opl.cell.wheel_distance import PartTree, signed_wheel_distance
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
@@ -127,31 +126,6 @@ def _place(motion: Motion, corner: Rounding) -> str:
     return motion.place(int(motion.positions[corner.k]))
 
 
-def too_wide(
-    job: Job, points: CutterPoints, part: PartTree, zone: float, motion: Motion
-) -> Iterator[tuple[int, int, int]]:
-    """Yield the corners on the wheel that a zone in [m] is too wide for, see `PositionRule`."""
-    positions = motion.positions
-    zones = np.where(motion.on_wheel[positions], zone, 0.0)
-    corners = [one for one in roundings(motion, zones, tool_points_of(job)) if all(one.grinds)]
-    if not corners:
-        return
-    errors = contact_errors(job, points, motion, corners)[:, -1]
-    q = np.stack([_looked_at(corner) for corner in corners])
-    Ts_base_flange = forward_kinematics(job.cell.robot, q.reshape(-1, 6)).reshape(
-        *q.shape[:2], 4, 4
-    )
-    wheel, deepest = job.cell.wheel, -job.cell.planned_penetration
-    Ts_contact0_workpiece = (
-        inverse(wheel.T_base_contact0) @ Ts_base_flange @ job.cell.T_flange_workpiece
-    )
-    deep = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, deepest) < deepest
-    for corner, error, chords in zip(corners, errors, deep, strict=True):
-        if chords.any() or error > job.search.max_contact_error:
-            before, here, after = positions[corner.k - 1 : corner.k + 2].tolist()
-            yield before, here, after
-
-
 def contact_errors(
     job: Job, points: CutterPoints, motion: Motion, corners: list[Rounding]
 ) -> Array:
@@ -267,13 +241,13 @@ def _deepest(world: World, corner: Rounding) -> float:
     if corner.free:
         return 0.0
     gaps = []
-    for q in _looked_at(corner):
+    for q in looked_at(corner):
         world.move_to(q)
         gaps.append(world.gap(0.0))
     return max(0.0, -min(gaps))
 
 
-def _looked_at(corner: Rounding) -> Array:
+def looked_at(corner: Rounding) -> Array:
     """Return configurations of some chords of a corner, whose ends lie on the moves: (10, 6)."""
     on_chords = corner.configurations()
     return np.concatenate([on_chords[-1, 4:-1:4], on_chords[1, 8:-1:8]])

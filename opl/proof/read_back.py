@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -26,9 +25,10 @@ from opl.planning.positions import PositionRule
 from opl.program.moves import SAME_CONFIGURATION, Program
 from opl.program.played import Playback
 from opl.program.posts import find_post
-from opl.proof.corners import CornerProof, corner_proof, too_wide, tool_points_of
+from opl.proof.corners import CornerProof, corner_proof, tool_points_of
 from opl.proof.events import name_findings
 from opl.proof.prove import prove
+from opl.proof.too_wide import TooWide
 from opl.proof.written import written_findings
 from opl.verification.kinematic_checks import limit_findings
 
@@ -102,7 +102,7 @@ def position_rule(job: Job, points: CutterPoints, part: PartTree) -> PositionRul
         post.shortest_move,
         zone,
         tool_points_of(job),
-        partial(too_wide, job, points, part, zone),
+        TooWide(job, points, part, zone),
     )
 
 

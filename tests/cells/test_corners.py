@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import opl.proof.too_wide
 from opl.cell.robot import forward_kinematics, load_robot
 from opl.geometry.frames import inverse
 from opl.motion.fewest import ChainRule, fewest
@@ -134,6 +135,38 @@ def test_narrower_zones_leave_less():
     assert wide.keys() == narrow.keys()
     assert all(narrow[k] <= wide[k] + 2e-6 for k in wide)
     assert any(narrow[k] < 0.8 * wide[k] for k in wide)
+
+
+def test_what_is_known_of_the_last_motion_changes_no_corner(monkeypatch):
+    job, points, part = small_job(), small_problem().points, small_problem().scene.part
+    motion, random = few_positions(), np.random.default_rng(0)
+    looks = []
+    contact = opl.proof.too_wide.contact_errors
+    monkeypatch.setattr(
+        opl.proof.too_wide,
+        "contact_errors",
+        lambda *given: looks.append(len(given[-1])) or contact(*given),
+    )
+
+    def seen(tell, tried):
+        looks.clear()
+        return list(tell(tried)), sum(looks)
+
+    kept = opl.proof.too_wide.TooWide(job, points, part, np.inf)
+    found = []
+    for turn in range(6):
+        written = np.array(motion.written)
+        others = np.flatnonzero(motion.on_wheel & ~written)
+        written[random.choice(others, turn)] = True
+        tried = replace(motion, written=written)
+        corners, looked_at = seen(kept, tried)
+        anew, all_of_them = seen(opl.proof.too_wide.TooWide(job, points, part, np.inf), tried)
+        assert corners == anew
+        assert looked_at == all_of_them if turn == 0 else looked_at < all_of_them
+        assert seen(kept, tried) == (corners, 0)
+        found.append(tuple(corners))
+    assert all(found)
+    assert len(set(found)) > 1
 
 
 def straight_moves(radius, count):
