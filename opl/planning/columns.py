@@ -11,7 +11,6 @@ or the part deeper in the wheel than any point of it can move within the cell.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,29 +26,12 @@ from opl.planning.cut_cells import cells_of, cut_finer
 from opl.planning.enclosed import ROUND_OFF, EnclosedCells, enclosing
 from opl.planning.images import Images
 from opl.planning.obstructed import Obstructions
-from opl.search.walls import Image, Line, Piece, Wall
+from opl.search.walls import Image, Line, Piece, Sweep, Wall
 
 MOST_CUTS = 3  # of such cells, each finer than the one before
 ROW_PARTS = 16  # cells between two places of a wall along a contact position
 PART_OF_A_WALL = 0.3  # of the work for one: a cell cut finer
 FINER = 8  # cells that one is cut into where a proof needs it
-
-
-@dataclass(frozen=True)
-class Sweep:
-    """Where the contact moves over the wheel between two places.
-
-    Attributes:
-        before: A place that a motion passes before.
-        after: One that it passes after, on the same pass.
-        contact_position: Which it crosses between them.
-        upwards: Whether from lower contact positions to higher ones.
-    """
-
-    before: float
-    after: float
-    contact_position: float
-    upwards: bool
 
 
 class ColumnWalls:
@@ -129,7 +111,7 @@ class ColumnWalls:
             pieces += row
             pieces += [part for piece in column[high].pieces for part in piece.above(t)]
             index = int(self._points.pass_index[int(s.before)])
-            found.append(Wall(index, (s.before + s.after) / 2.0, tuple(pieces)))
+            found.append(Wall(index, (s.before + s.after) / 2.0, tuple(pieces), s))
         return found
 
     def _rows(self, grids: list[Array], contact_positions: list[float]) -> list[list[Piece]]:

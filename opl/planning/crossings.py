@@ -11,9 +11,9 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.box_columns import Columns, ColumnSampler
-from opl.planning.columns import Sweep
 from opl.planning.rows import Bulges
 from opl.search.box import JointBox
+from opl.search.walls import Sweep
 
 PLACE_DIGITS = 5  # of places, in cutter points
 

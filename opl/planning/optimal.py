@@ -73,7 +73,6 @@ class OptimalSearch:
         self, problem: GrindingProblem, settings: OptimalSettings, fallback: Plan | None
     ) -> None:
         self._problem = problem
-        self._points = problem.points
         self._settings = settings
         seams = seams_of(problem.field.q[few_columns(problem.points.pass_index)])
         robot = problem.cell.robot
@@ -94,8 +93,7 @@ class OptimalSearch:
         self._proven = self._least_hope = 0.0
         self._given_up = 0
         self._early = 0.0  # work on early motions
-        gap = PROOF_SHARE * settings.widen
-        self.proof = BoxProof(self._walls.images.of, self._walls.finer, largest, gap)
+        self.proof = BoxProof(images.of, self._walls.finer, largest, PROOF_SHARE * settings.widen)
         self._places: set[float] = set()
         self._work = Work(problem.scene.collision, self._walls, self._families, self._tracks)
         self._work.begin_again(self.proof)
@@ -114,6 +112,11 @@ class OptimalSearch:
     def work_share(self) -> float:
         """How much of the work allowed is done."""
         return self._work.done / self._settings.max_subproblems
+
+    @property
+    def minds_collisions(self) -> bool:
+        """Whether the proof rests on where the robot collides as well."""
+        return self._sampler.collisions
 
     @property
     def open_because(self) -> str | None:

@@ -114,6 +114,23 @@ class Image:
 
 
 @dataclass(frozen=True)
+class Sweep:
+    """Where the contact moves over the wheel between two places.
+
+    Attributes:
+        before: A place that a motion passes before.
+        after: One that it passes after, on the same pass.
+        contact_position: Which it crosses between them.
+        upwards: Whether from lower contact positions to higher ones.
+    """
+
+    before: float
+    after: float
+    contact_position: float
+    upwards: bool
+
+
+@dataclass(frozen=True)
 class Wall:
     """One wall.
 
@@ -121,8 +138,10 @@ class Wall:
         pass_index: The pass that crosses it.
         place: Where: the cutter point, fractional between two.
         pieces: Where it can be crossed; none if it cannot.
+        sweep: What it stands in the way of; None for all contact positions of one place.
     """
 
     pass_index: int
     place: float
     pieces: tuple[Piece, ...]
+    sweep: Sweep | None = None

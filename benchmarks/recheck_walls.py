@@ -1,0 +1,442 @@
+"""Encloses the walls of a certificate, for `benchmarks.recheck`.
+
+Lengths are in [m], angles in [rad], contact positions t in belt units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from itertools import pairwise, product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.intervals import (
+    ROUND_OFF,
+    Array,
+    Interval,
+    Jet,
+    Vector,
+    angle_of,
+    cross,
+    dot,
+    exactly,
+    outwards,
+    still,
+    unit,
+)
+
+TURN = 2.0 * np.pi
+SURE = 1e-9  # more than the round-off of sums of some hundred numbers about 1
+UNKNOWN = 50.0  # more than joints turn
+COARSE = 2e-5  # [rad] sum of the pads of a cell that is looked at first
+SMALLEST = 1.0 / 1024.0  # cell that is not cut further then
+HALVINGS = 12
+ROW_PARTS = 16  # cells between two cutter points at one contact position
+WITNESSES = 16  # triangles of the part in which a point deep in the wheel is sought
+DEPTH = 8  # how often they are cut into four
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Arm:
+    """The closed form of an arm with a spherical wrist, upright with all angles zero.
+
+    In the notation of Brandstoetter, Angerer and Hofbaur (2014).
+    """
+
+    a1: float
+    a2: float
+    b: float
+    c1: float
+    c2: float
+    c3: float
+    c4: float
+    offsets: Sequence[float]
+    signs: Sequence[int]
+
+    def postures(self, x: Vector, y: Vector, z: Vector, p: Vector) -> Iterator[Posture]:
+        """Yield shoulder and elbow both ways, the wrist to one side."""
+        cells = p[0].value.low
+
+        def number(value: float) -> Jet:
+            return still(value, cells)
+
+        wrist = [p[k] - number(self.c4) * z[k] for k in range(3)]
+        forearm, tilt0 = float(np.hypot(self.a2, self.c3)), float(np.arctan2(self.a2, self.c3))
+        around = wrist[0] * wrist[0] + wrist[1] * wrist[1]
+        beside = around - number(self.b**2)
+        for ahead in (beside.root(), -beside.root()):
+            theta1 = angle_of(wrist[1], wrist[0]) - angle_of(number(self.b), ahead)
+            cos1 = (wrist[0] * ahead + wrist[1] * number(self.b)) / around
+            sin1 = (wrist[1] * ahead - wrist[0] * number(self.b)) / around
+            forward, up = ahead - number(self.a1), wrist[2] - number(self.c1)
+            away = forward * forward + up * up
+            cosine = (away - number(self.c2**2 + forearm**2)) / number(2.0 * self.c2 * forearm)
+            out = (beside.value.high < -SURE) | (cosine.value.low > 1.0 + SURE)
+            out |= cosine.value.high < -1.0 - SURE
+            sine = (number(1.0) - cosine * cosine).root()
+            for bent in (sine, -sine):
+                along, across = number(self.c2) + number(forearm) * cosine, number(forearm) * bent
+                sin2 = (forward * along - up * across) / away
+                cos2 = (up * along + forward * across) / away
+                theta2, bend = angle_of(sin2, cos2), angle_of(bent, cosine)
+                sin_link = (forward - number(self.c2) * sin2) / number(forearm)
+                cos_link = (up - number(self.c2) * cos2) / number(forearm)
+                c, s = number(np.cos(tilt0)), number(np.sin(tilt0))
+                sin_tilt, cos_tilt = sin_link * c - cos_link * s, cos_link * c + sin_link * s
+                e1 = [cos_tilt * cos1, cos_tilt * sin1, -sin_tilt]
+                e3 = [sin_tilt * cos1, sin_tilt * sin1, cos_tilt]
+                z1, z2 = dot(e1, z), cos1 * z[1] - sin1 * z[0]
+                theta = (
+                    theta1,
+                    theta2,
+                    bend - number(tilt0),
+                    angle_of(z2, z1),
+                    angle_of((z1 * z1 + z2 * z2).root(), dot(e3, z)),
+                    angle_of(dot(e3, y), -dot(e3, x)),
+                )
+                joints = zip(theta, self.offsets, self.signs, strict=True)
+                q = [(one + number(o)) if k > 0 else -(one + number(o)) for one, o, k in joints]
+                yield Posture(q, out)
+
+    def flip(self) -> tuple[Array, Array]:
+        """Return sign and shift that make the wrist to the other side of one to this."""
+        sign, shift = np.ones(6), np.zeros(6)
+        sign[4], shift[4] = -1.0, 2.0 * self.offsets[4] * self.signs[4]
+        shift[3] = shift[5] = np.pi
+        return sign, shift
+
+
+@dataclass(frozen=True)
+class Posture:
+    """Joint positions over cells, and where there is none."""
+
+    q: list[Jet]
+    out_of_reach: Flags
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Postures over cells of a wall: near the chord from start to end, up to pads, shape (n, 6)."""
+
+    family: NDArray[np.int64]
+    place: Array
+    start: Array
+    end: Array
+    pad_low: Array
+    pad_high: Array
+
+    @property
+    def low(self) -> Array:
+        """Lower faces of boxes around them."""
+        return np.minimum(self.start, self.end) + self.pad_low
+
+    @property
+    def high(self) -> Array:
+        """Upper faces."""
+        return np.maximum(self.start, self.end) + self.pad_high
+
+    def pick(self, which: NDArray[Any]) -> Cells:
+        """Return some of them."""
+        return Cells(*(getattr(self, field.name)[which] for field in fields(self)))
+
+    def moved(self, sign: Array, shift: Array, family: int) -> Cells:
+        """Return them elsewhere: sign * q + shift, in another family."""
+        mirrored = sign < 0.0
+        return Cells(
+            self.family + family,
+            self.place,
+            self.start * sign + shift,
+            self.end * sign + shift,
+            np.where(mirrored, -self.pad_high, self.pad_low),
+            np.where(mirrored, -self.pad_low, self.pad_high),
+        )
+
+
+def joined(cells: Sequence[Cells]) -> Cells:
+    """Return several as one."""
+    every = [[getattr(one, field.name) for one in cells] for field in fields(Cells)]
+    return Cells(*(np.concatenate(parts) for parts in every))
+
+
+class Machine:
+    """Encloses the postures on the walls of a certificate.
+
+    Args:
+        certificate: As `benchmarks.certificate` writes it.
+        fine: Sum of the pads in [rad] of a cell that is not cut further.
+    """
+
+    def __init__(self, certificate: dict[str, Any], fine: float) -> None:
+        self._fine = fine
+        self._smallest = SMALLEST * min(np.sqrt(fine / COARSE), 1.0)
+        robot, wheel = certificate["robot"], certificate["wheel"]
+        self.arm = Arm(**robot["arm"])
+        self._lower, self._upper = np.array(robot["lower"]), np.array(robot["upper"])
+        self._width, self._radius = wheel["width"], wheel["radius"]
+        self._T_base_contact0 = np.array(wheel["T_base_contact0"])
+        self._flat = 500.0 * self._width
+        self._last = self._flat + np.rad2deg(wheel["max_roll"])
+        self._allowed = certificate["penetration"]
+        self._T_workpiece_flange = np.linalg.inv(np.array(certificate["T_flange_workpiece"]))
+        self._triangles = np.array(certificate["triangles"])  # shape (n, 3, 3)
+        self._Ts_workpiece_cutter = np.array(certificate["Ts_workpiece_cutter"])
+
+    def wall(self, wall: dict[str, float]) -> Cells:
+        """Return the cells of a wall, those left out in which nothing is allowed."""
+        if "contact_position" not in wall:
+            return self._column(wall["place"], -self._last, self._last)
+        before, after, t = wall["before"], wall["after"], wall["contact_position"]
+        low, high = (after, before) if wall["upwards"] else (before, after)
+        parts = [self._column(low, -self._last, t), self._row(before, after, t)]
+        parts.append(self._column(high, t, self._last))
+        for k, part in enumerate(parts):
+            part.place[:] += 1e4 * k  # one after the other
+        return joined(parts)
+
+    def _frame(self, place: float) -> Array:
+        """Return a cutter frame between two, as the path is defined there."""
+        before = min(int(place), len(self._Ts_workpiece_cutter) - 2)
+        a, b = self._Ts_workpiece_cutter[before : before + 2]
+        T = a + (place - before) * (b - a)
+        z = T[:3, 2] / np.linalg.norm(T[:3, 2])
+        x = T[:3, 0] - z * (z @ T[:3, 0])
+        x /= np.linalg.norm(x)
+        T[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+        return np.asarray(T)
+
+    def _column(self, place: float, first: float, last: float) -> Cells:
+        """Return a place at the contact positions between two."""
+        T_cutter_workpiece = np.linalg.inv(self._frame(place))
+        stops = [first, *(t for t in (-self._flat, self._flat) if first < t < last), last]
+        runs = [np.linspace(a, b, int(np.ceil(b - a)) + 1) for a, b in pairwise(stops)]
+        low = np.concatenate([run[:-1] for run in runs])
+        high = np.concatenate([run[1:] for run in runs])
+        low, high = self._touching(T_cutter_workpiece, low, high)
+        K = T_cutter_workpiece @ self._T_workpiece_flange
+
+        def flange(low: Array, high: Array) -> list[Vector]:
+            T = self._contact(low, high)
+            base = [[still(self._T_base_contact0[r, c], low) for c in range(4)] for r in range(3)]
+            C = [[dot(base[r], [T[k][c] for k in range(3)]) for c in range(4)] for r in range(3)]
+            held = [[still(K[r, c], low) for c in range(4)] for r in range(3)]
+            axes = [[dot(C[r], [held[k][c] for k in range(3)]) for r in range(3)] for c in range(4)]
+            axes[3] = [axes[3][r] + C[r][3] + base[r][3] for r in range(3)]
+            return axes
+
+        return self._enclosed(flange, low, high)
+
+    def _contact(self, low: Array, high: Array) -> list[list[Jet]]:
+        """Return the contact frame in contact frame 0 over cells on the flat or on an edge."""
+        one, zero = np.ones_like(low), np.zeros_like(low)
+        rolled = (low + high) / 2.0 - np.clip((low + high) / 2.0, -self._flat, self._flat) != 0.0
+        edge = np.where(rolled, np.clip(low, -self._flat, self._flat), 0.0)
+        a, b = (np.deg2rad(np.where(rolled, t - edge, 0.0)) for t in (low, high))
+        crest = np.where((a <= 0.0) & (b >= 0.0), 1.0, np.maximum(np.cos(a), np.cos(b)))
+        cosine = outwards(np.minimum(np.cos(a), np.cos(b)) - ROUND_OFF, crest + ROUND_OFF)
+        sine = outwards(np.sin(a) - ROUND_OFF, np.sin(b) + ROUND_OFF)
+        rate = np.where(rolled, np.deg2rad(1.0), 0.0)
+        speed, square = outwards(rate, rate), outwards(-(rate**2), -(rate**2))
+        c = Jet(cosine, -(sine * speed), cosine * square)
+        s = Jet(sine, cosine * speed, sine * square)
+        value = Interval(np.where(rolled, edge, low), np.where(rolled, edge, high))
+        drift = outwards(-np.where(rolled, 0.0, 1e-3), -np.where(rolled, 0.0, 1e-3))
+        slide = Jet(value * outwards(-1e-3 * one, -1e-3 * one), drift, exactly(zero))
+        nothing, whole = still(0.0, low), still(1.0, low)
+        return [
+            [c, nothing, s, slide],
+            [nothing, whole, nothing, nothing],
+            [-s, nothing, c, nothing],
+        ]
+
+    def _row(self, before: float, after: float, t: float) -> Cells:
+        """Return the places between two at one contact position."""
+        stops = np.unique([before, *np.arange(np.ceil(before), np.floor(after) + 1.0), after])
+        at = np.full(1, t)
+        T = np.eye(4)
+        contact = self._contact(at, at)
+        for r, c in product(range(3), range(4)):
+            T[r, c] = contact[r][c].value.low[0] / 2.0 + contact[r][c].value.high[0] / 2.0
+        T_base_contact = self._T_base_contact0 @ T
+        K = self._T_workpiece_flange
+        found = []
+        for a, b in pairwise(stops):
+            first = int(a)
+            one, other = self._Ts_workpiece_cutter[first : first + 2]
+
+            def flange(
+                low: Array, high: Array, one: Array = one, other: Array = other, n: int = first
+            ) -> list[Vector]:
+                share = Jet(
+                    outwards(low - n, high - n),
+                    exactly(np.ones_like(low)),
+                    exactly(np.zeros_like(low)),
+                )
+                x, _, z, p = (
+                    [
+                        still(one[k, c], low) + share * still(other[k, c] - one[k, c], low)
+                        for k in range(3)
+                    ]
+                    for c in range(4)
+                )
+                z = unit(z)
+                lean = dot(x, z)
+                x = unit([x[k] - z[k] * lean for k in range(3)])
+                y = cross(z, x)
+                axes = []
+                for c in range(4):
+                    v = [still(K[k, c], low) for k in range(3)]
+                    v = [v[k] - p[k] for k in range(3)] if c == 3 else v
+                    local = (dot(x, v), dot(y, v), dot(z, v))
+                    base = [[still(T_base_contact[r, k], low) for k in range(4)] for r in range(3)]
+                    turned = [dot(base[r], local) for r in range(3)]
+                    axes.append([turned[r] + base[r][3] if c == 3 else turned[r] for r in range(3)])
+                return axes
+
+            grid = np.linspace(a, b, ROW_PARTS + 1)
+            found.append(self._enclosed(flange, grid[:-1], grid[1:]))
+        return joined(found)
+
+    def _enclosed(
+        self, flange: Callable[[Array, Array], list[Vector]], low: Array, high: Array
+    ) -> Cells:
+        """Return the cells of a run; those whose pads are wide are cut further."""
+        for halving in range(HALVINGS + 1):
+            whole, starts, ends = (
+                list(self.arm.postures(*flange(a, b)))
+                for a, b in ((low, high), (low, low), (high, high))
+            )
+            found, wide = [], np.zeros(len(low), dtype=bool)
+            for family, (over, first, last) in enumerate(zip(whole, starts, ends, strict=True)):
+                cells = chords(family, over, first, last, low, high)
+                here = ~over.out_of_reach & self._within_limits(cells)
+                spread = (cells.pad_high - cells.pad_low).sum(axis=1)
+                wide |= here & (spread > self._fine)
+                found.append(cells.pick(here))
+            wide &= high - low > self._smallest
+            if halving == HALVINGS or not wide.any():
+                break
+            low, high = halves(low, high, wide)
+        return joined(found)
+
+    def _within_limits(self, cells: Cells) -> Flags:
+        """Return which some full turns, with the wrist to either side, bring within the limits."""
+        kept = np.zeros(len(cells.place), dtype=bool)
+        for sign, shift in ((np.ones(6), np.zeros(6)), self.arm.flip()):
+            moved = cells.moved(sign, shift, 0)
+            up = TURN * np.ceil((self._lower - moved.high) / TURN - SURE)
+            kept |= (moved.low + up <= self._upper + SURE).all(axis=1)
+        return kept
+
+    def _touching(self, T_cutter_workpiece: Array, low: Array, high: Array) -> tuple[Array, Array]:
+        """Return the cells in which the part is nowhere sure to be too deep in the wheel."""
+        deep, middle = self._too_deep(T_cutter_workpiece, low, high)
+        for _ in range(HALVINGS):
+            edge = np.zeros(len(low), dtype=bool)
+            beside = (middle[1:] != middle[:-1]) & (low[1:] == high[:-1])
+            edge[1:] |= beside
+            edge[:-1] |= beside
+            edge |= middle
+            edge &= ~deep & (high - low > self._smallest)
+            if not edge.any():
+                break
+            fresh_low, fresh_high = halves(low[edge], high[edge], np.ones(edge.sum(), dtype=bool))
+            fresh = self._too_deep(T_cutter_workpiece, fresh_low, fresh_high)
+            low, high = np.append(low[~edge], fresh_low), np.append(high[~edge], fresh_high)
+            deep, middle = np.append(deep[~edge], fresh[0]), np.append(middle[~edge], fresh[1])
+            order = np.argsort(low, kind="stable")
+            low, high, deep, middle = low[order], high[order], deep[order], middle[order]
+        return low[~deep], high[~deep]
+
+    def _too_deep(self, T_cutter_workpiece: Array, low: Array, high: Array) -> tuple[Flags, Flags]:
+        """Return where a point of the part is too deep all over a cell, and where in its middle."""
+        deep, middle = np.zeros(len(low), dtype=bool), np.zeros(len(low), dtype=bool)
+        cutter = self._triangles @ T_cutter_workpiece[:3, :3].T + T_cutter_workpiece[:3, 3]
+        for k, t in enumerate((low + high) / 2.0):
+            slide = np.clip(t, -self._flat, self._flat)
+            roll = np.deg2rad(t - slide)
+            point, depth = self._deepest(cutter, np.cos(roll), np.sin(roll), 1e-3 * slide)
+            middle[k] = depth > self._allowed
+            if middle[k]:
+                cell = self._contact(low[k : k + 1], high[k : k + 1])
+                x, y, z = (
+                    (dot(cell[r], [still(v, low[:1]) for v in point]) + cell[r][3]).value
+                    for r in range(3)
+                )
+                side = np.maximum(np.abs(x.low), np.abs(x.high))
+                height = z - exactly(np.full(1, self._radius))
+                across, along = (np.maximum(np.abs(v.low), np.abs(v.high)) for v in (y, height))
+                least = np.minimum(self._width / 2.0 - side, self._radius - np.hypot(across, along))
+                deep[k] = (least > self._allowed + SURE)[0]
+        return deep, middle
+
+    def _deepest(
+        self, triangles: Array, cosine: float, sine: float, slide: float
+    ) -> tuple[Array, float]:
+        """Return a point of triangles that is deep in the wheel, and how deep."""
+        best, depth = triangles[0, 0], -np.inf
+        for _ in range(DEPTH + 1):
+            x = cosine * triangles[..., 0] + sine * triangles[..., 2] - slide
+            z = cosine * triangles[..., 2] - sine * triangles[..., 0] - self._radius
+            y = triangles[..., 1]
+            corners = np.minimum(self._width / 2.0 - np.abs(x), self._radius - np.hypot(y, z))
+            found = np.unravel_index(int(np.argmax(corners)), corners.shape)
+            if corners[found] > depth:
+                best, depth = triangles[found], float(corners[found])
+            # both depths are concave: below the least |x|, and below the slope at the middle
+            beside = np.where(np.ptp(np.sign(x), axis=1) > 1.0, 0.0, np.abs(x).min(axis=1))
+            my, mz = y.mean(axis=1, keepdims=True), z.mean(axis=1, keepdims=True)
+            away = np.maximum(np.hypot(my, mz), 1e-9)
+            radial = self._radius - ((y * my + z * mz) / away).min(axis=1)
+            hope = np.minimum(self._width / 2.0 - beside, radial)
+            worth = np.flatnonzero(hope > max(depth, self._allowed))
+            worth = worth[np.argsort(-hope[worth], kind="stable")[:WITNESSES]]
+            if not len(worth):
+                break
+            a, b, c = np.moveaxis(triangles[worth], 1, 0)
+            ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
+            quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+            triangles = np.concatenate([np.stack(corner, axis=1) for corner in quarters])
+        return best, depth
+
+
+def halves(low: Array, high: Array, which: Flags) -> tuple[Array, Array]:
+    """Return cells, some of them cut in two."""
+    middle = (low[which] + high[which]) / 2.0
+    first, last = np.append(low, middle), np.append(high, high[which])
+    last[: len(high)][which] = middle
+    order = np.argsort(first, kind="stable")
+    return first[order], last[order]
+
+
+def chords(
+    family: int, over: Posture, first: Posture, last: Posture, low: Array, high: Array
+) -> Cells:
+    """Return cells as chords with pads, from what is known all over them and at their ends."""
+    n = len(low)
+    start, end, pad_low, pad_high = (np.empty((n, 6)) for _ in range(4))
+    eighth = (high - low) ** 2 / 8.0
+    with np.errstate(invalid="ignore"):
+        for j in range(6):
+            q, a, b = over.q[j], first.q[j].value, last.q[j].value
+            start[:, j] = (a.low + a.high) / 2.0
+            step = (b.low + b.high) / 2.0 - start[:, j]
+            end[:, j] = start[:, j] + step - TURN * np.round(step / TURN)
+            doubt = SURE + (a.high - a.low) + (b.high - b.low)
+            pad_low[:, j] = np.minimum(0.0, -eighth * q.second.high) - doubt
+            pad_high[:, j] = np.maximum(0.0, -eighth * q.second.low) + doubt
+            fast = np.maximum(np.abs(q.first.low), np.abs(q.first.high)) * (high - low)
+            # no derivative: the angle itself, if that is known
+            rough = ~np.isfinite(pad_low[:, j] + pad_high[:, j] + start[:, j] + end[:, j])
+            rough |= ~(fast < np.pi / 2.0)
+            middle, wide = (q.value.low + q.value.high) / 2.0, (q.value.high - q.value.low) / 2.0
+            known = np.isfinite(middle) & (wide < 0.5)
+            start[rough, j] = end[rough, j] = np.where(known, middle, 0.0)[rough]
+            pad_high[rough, j] = np.where(known, wide + SURE, UNKNOWN)[rough]
+            pad_low[rough, j] = -pad_high[rough, j]
+    families = np.full(n, family, dtype=np.int64)
+    return Cells(families, (low + high) / 2.0, start, end, pad_low, pad_high)
