@@ -33,7 +33,8 @@ def feed_and_cycle(report: opl.Report, robot: str) -> Iterator[str]:
         yield (
             "the belt is met and left in motion; from move to move the speed along the surface "
             f"changes by a factor of {feed.largest_speed_ratio:.2f} at most (less than a fifth of "
-            "the feed counts as that; not where pivoting alone makes it slower)"
+            "the feed counts as that, a slow move under 0.04 s the less the shorter it is; not "
+            "where pivoting makes the ground point slower than 0.4 of the feed)"
         )
     if cycle is None:
         return

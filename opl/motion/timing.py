@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from opl.cell.robot import Robot, forward_kinematics
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.gradual import LEAST_COUNTED, gradual, largest_ratio
+from opl.motion.gradual import counted, gradual, largest_ratio
 from opl.motion.motion import Motion, Phase, TimedMotion
 from opl.motion.process_settings import ProcessSettings
 from opl.motion.rounded import rounded_line
@@ -93,9 +93,7 @@ def time_motion(
     p_flange = forward_kinematics(robot, motion.q)[:, :3, 3]
     moved = np.linalg.norm(np.diff(p_flange, axis=0, prepend=p_flange[:1]), axis=1)
     distance = np.where(grinding, surface_distance, moved)
-    # pivoting alone may leave the ground point next to no speed
-    pivoting = least * LEAST_COUNTED * process.feed > distance
-    speed_counts = ~(grinding & pivoting)
+    counts = np.where(grinding, counted(surface_distance, least, process.feed), 1.0)
     wanted = np.maximum(fastest / process.air_speed, np.where(motion.free, SHORTEST_FREE, 0.0))
     wanted[grinding] = least[grinding]
 
@@ -112,10 +110,10 @@ def time_motion(
         if not len(kept):
             continue
         rows = np.concatenate([[moves[0] - 1], kept])
-        way, counts = distance[kept], speed_counts[kept]
+        way, weight = distance[kept], counts[kept]
         found = duration[kept]
         for _ in range(MOST_ROUNDS):
-            even = gradual(way, found, counts, process.feed)
+            even = gradual(way, found, weight, process.feed)
             law = _law(motion.q[rows], even, robot)
             needed = np.diff(law.node_times)
             slowed = needed > FOLLOWED * even
@@ -124,14 +122,14 @@ def time_motion(
             by_acceleration[kept[slowed]] = accelerating[slowed]
             followed_there = np.maximum(needed, even)
             # what joints slow down, slows its neighbours
-            found = gradual(way, followed_there, counts, process.feed)
+            found = gradual(way, followed_there, weight, process.feed)
             by_neighbour[kept] = found > FOLLOWED * duration[kept]
             if _suddenness(motion.q[rows], found, robot) <= SUDDEN:
                 break
         else:
             found = followed_there
         duration[kept] = found
-        speed_ratio = max(speed_ratio, largest_ratio(way, found, counts, process.feed))
+        speed_ratio = max(speed_ratio, largest_ratio(way, found, weight, process.feed))
     cause = [Cause.NONE] * len(motion)
     for move in np.flatnonzero(grinding):
         if duration[move] * process.feed > FOLLOWED * distance[move]:

@@ -35,9 +35,9 @@ USED = 0.97
 USED_AT_CORNERS = 0.99
 # Times that moves are halved next to a corner that is too wide: what is left then is for the proof.
 HALVINGS = 3
-# Speeds of neighbouring lines may differ by two steps of `opl.motion.gradual`, and the faster one
+# Speeds of neighbouring lines may differ by three steps of `opl.motion.gradual`, and the faster one
 # is slowed then: a position for every step would cost more than the time it saves.
-STEPS_AT_ONCE = PLANNED_RATIO**2
+STEPS_AT_ONCE = PLANNED_RATIO**3
 
 
 @dataclass(frozen=True)

@@ -20,17 +20,18 @@ from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
-from opl.motion.motion import Motion, TimedMotion, VerifiedMotion
+from opl.motion.motion import Motion, VerifiedMotion
 from opl.planning.positions import PositionRule
 from opl.program.moves import SAME_CONFIGURATION, Program
 from opl.program.played import Playback
 from opl.program.posts import find_post
 from opl.proof.corners import CornerProof, corner_proof, tool_points_of
 from opl.proof.events import name_findings
-from opl.proof.prove import prove
+from opl.proof.prove import prove, rule_of
 from opl.proof.too_wide import TooWide
 from opl.proof.written import written_findings
-from opl.verification.kinematic_checks import limit_findings
+from opl.verification.kinematic_checks import limit_findings, missing_points
+from opl.verification.recognise import recognise
 
 EXACT = 1e-9  # [rad] of round-off between a configuration and itself, read back
 
@@ -152,14 +153,19 @@ def read_back(
         proof = prove(job, points, files)
         findings, corners = (*findings, *proof.findings), proof.corners
     else:
-        named = np.isin(np.arange(len(verified.motion)), configurations)
-        motion = replace(verified.motion, written=named)
-        corners = corner_proof(job, points, motion, kept)
+        # what the moves mean is recognised anew, as `opl verify` does it: the same findings
+        found = recognise(
+            job.cell, points, playback.q, playback.duration, playback.stations, rule_of(job)
+        )
+        motion = found.timed.motion
+        corners = corner_proof(job, points, motion, playback)
         findings = (
             *findings,
+            *found.findings,
+            *missing_points(points, motion),
             *corners.findings,
-            *limit_findings(job.cell, TimedMotion(motion.take(configurations), kept.duration)),
-            *written_findings(job, points, motion, kept, reader),
+            *limit_findings(job.cell, found.timed),
+            *written_findings(job, points, motion, playback, reader),
             *name_findings(job, reading.name),
         )
     apart = _apart(job, q, proven) if difference > EXACT else 0.0

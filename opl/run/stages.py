@@ -8,7 +8,6 @@ from opl.job.load import Job
 from opl.job.refusals import dwell_refusal, keys_named
 from opl.motion.feed import slow_stretches
 from opl.motion.motion import Motion, TimedMotion
-from opl.motion.timing import time_motion
 from opl.planning.borders import Nameable
 from opl.planning.plan import Plan
 from opl.planning.positions import HALVINGS, with_fewest_positions, with_shorter_moves
@@ -17,6 +16,7 @@ from opl.planning.survey import survey_nodes
 from opl.program.posts import find_post
 from opl.program.settings import MotionForm
 from opl.proof.read_back import in_file_digits, position_rule, read_back
+from opl.proof.recognised_times import recognised_times
 from opl.run.exporting import draw_charts, job_date, render_program
 from opl.run.page_data import nearest_along
 from opl.run.preparing import prepare
@@ -83,7 +83,7 @@ def _plan(surfaced: Surfaced, watch: Watch) -> Planned | Refused:
     with watch.stage(Stage.MOTION):
         exact = with_speed_steps(found.plan.motion, surfaced.points, job.process, job.cell.robot)
         exact, motion = _positions(prepared, exact)
-        timing = time_motion(motion, surfaced.points, job.process, job.cell.robot)
+        timing = recognised_times(job, surfaced.points, motion)
         slow = slow_stretches(timing, job.process)
     timed = TimedMotion.passing(motion, timing.timed.duration)
     pictured = Beside(lambda: _pictured(prepared, found.plan, timed))

@@ -262,7 +262,7 @@ def test_two_points_exchanged_are_found(written):
     here, there = written.move, written.move + 1
     text = written.with_target(here, written.target(there))
     proof = written.proof(written.with_target(there, written.target(here), text))
-    assert refuses(proof, "contact at pass 1, cutter point")
+    assert refuses(proof, "at pass 1, cutter point")
 
 
 def test_a_dropped_point_is_found(written):

@@ -18,15 +18,18 @@ from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import transform
 from opl.job.load import load_job
+from opl.motion.timing import time_motion
 from opl.program.inform.parse import decode, read_jobs
 from opl.program.inform.playback import play_jobs
 from opl.program.inform.post import write_jobs
 from opl.program.profiles import DX200
 from opl.program.pulses import PulseScale
 from opl.proof.digest import digests_in, read_result
+from opl.proof.prove import reader_of, rule_of
 from opl.run import stages
 from opl.run.stages import run_job
 from opl.run.surfacing import cut_surface
+from opl.verification.recognise import recognise
 from tests.support.jobs import V_SHAPE, opl, write_job, write_robot
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -467,3 +470,24 @@ def test_a_run_that_writes_something_else_writes_nothing(tmp_path, monkeypatch):
         "result.json",
     ]
     assert json.loads((tmp_path / "out" / "result.json").read_text())["status"] == "unsafe"
+
+
+def test_times_are_asked_for_by_the_places_that_are_recognised_in_the_file():
+    home = planned(short=False)
+    job = load_job(home / "job.yaml")
+    run = run_job(job)
+    points = run.proven.surfaced.points
+    reader = reader_of(job)
+    playback = reader.read(
+        {name: text.encode() for name, text in run.files.items() if name.endswith(reader.suffix)},
+        job.cell.robot,
+        job.program,
+    ).playback
+    found = recognise(
+        job.cell, points, playback.q, playback.duration, playback.stations, rule_of(job)
+    )
+    asked = time_motion(found.timed.motion, points, job.process, job.cell.robot).timed
+    times = run.proven.planned.timing.timed
+    # what the digits of the speeds leave
+    np.testing.assert_allclose(asked.duration, times.duration, rtol=1e-3, atol=1e-4)
+    assert [str(kind) for kind in asked.motion.kind] == [str(kind) for kind in times.motion.kind]

@@ -1,0 +1,36 @@
+"""Times of a motion to be written, by the places that a proof of its program recognises.
+
+A plan knows where each configuration grinds to what its moves leave of it, up to the largest
+contact error; a program is judged by where a reader finds that it grinds. On the way over the edge
+of the wheel both may be hundredths of a millimetre apart, which is much of a short move. So the
+times that are written are those of the recognised places.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from opl.geometry.toolpath import CutterPoints
+from opl.job.load import Job
+from opl.motion.motion import Motion
+from opl.motion.timing import Timing, time_motion
+from opl.proof.prove import rule_of
+from opl.verification.recognise import recognise
+
+
+def recognised_times(job: Job, points: CutterPoints, motion: Motion) -> Timing:
+    """Return the times of a motion to be written, with the places that a proof will recognise.
+
+    Args:
+        job: What is requested.
+        points: Its cutter points.
+        motion: What is planned, in the digits of the program.
+
+    Raises:
+        UnsafeError: If the time law does not keep the limits it was given.
+    """
+    timing = time_motion(motion, points, job.process, job.cell.robot)
+    written, duration = timing.timed.motion, timing.timed.duration
+    stations = np.arange(len(written))
+    found = recognise(job.cell, points, written.q, duration, stations, rule_of(job))
+    return time_motion(found.timed.motion, points, job.process, job.cell.robot)
