@@ -36,11 +36,11 @@ def input_digests(
     Raises:
         InputError: If a file that it names cannot be read.
     """
-    found = {"job": _said(content), **_files_in(source, content)}
+    found = {"job": _of_content(content), **_files_in(source, content)}
     cell = content.get("cell") if isinstance(content, Mapping) else None
     if isinstance(cell, str):
         inside = content_of(source.file(cell))
-        found[cell] = _said(inside)
+        found[cell] = _of_content(inside)
         of_cell = _files_in(Source.of_file(source.file(cell)), inside)
         found |= {f"{cell}: {name}": one for name, one in of_cell.items()}
     found |= {f"robot: {name}": _of_file(path) for name, path in _robot_files(robot)}
@@ -50,7 +50,7 @@ def input_digests(
     return dict(sorted(found.items()))
 
 
-def _said(content: object) -> str:
+def _of_content(content: object) -> str:
     return digest(json.dumps(content, sort_keys=True, default=str).encode())
 
 

@@ -15,16 +15,16 @@ from opl.program.posts import Post, StationaryTools
 from opl.program.settings import MotionForm, UserFrame
 
 
-def is_led_past_one(asked: bool | None, post: Post, motion: MotionForm) -> bool:
+def is_led_past_one(wanted: bool | None, post: Post, motion: MotionForm) -> bool:
     """Return whether straight moves lead the part past a tool that stands.
 
     Args:
-        asked: What the key says, None where it is not there.
+        wanted: What the key says, None where it is not there.
         post: Of the controller.
         motion: How moves on the wheel are written.
     """
     usual = post.stationary_tools is StationaryTools.USUAL
-    return (usual if asked is None else asked) and motion is MotionForm.STRAIGHT
+    return (usual if wanted is None else wanted) and motion is MotionForm.STRAIGHT
 
 
 def stationary_tool_of(

@@ -25,12 +25,12 @@ from opl.planning.symmetry import SAME_SUM
 from opl.planning.track_check import Free, check_path
 
 CLEAR_OF_LIMITS = np.deg2rad(5.0)  # of every joint; motions that keep it come before all others
-SAME_TIME = 1e-6  # [s] ways that differ by less are equally long
-MOST_CHECKS = 12  # of motions, the shortest ways first
+SAME_TIME = 1e-6  # [s] choices that differ by less are equally long
+MOST_CHECKS = 12  # of motions, the shortest choices first
 
 
 @dataclass(frozen=True)
-class _Way:
+class _Choice:
     """A choice of images.
 
     Attributes:
@@ -47,7 +47,7 @@ class _Way:
 
     @property
     def rank(self) -> tuple[bool, int, int, int, list[int]]:
-        """What the better of two has the smaller value of; never the same for two ways."""
+        """What the better of two has the smaller value of; never the same for two choices."""
         turned = int(np.abs(self.turns).sum())
         time = round(self.seconds / SAME_TIME)
         return self.near_limit, time, self.flip, turned, self.turns.ravel().tolist()
@@ -71,45 +71,45 @@ def quickest_of_equals(
         nameable: Which configurations the program names without doubt; None for all.
     """
     best, least = plan, (len(plan.path.q) + 1, True, np.inf)
-    ways = []
-    for way in _ways(problem, plan, keeps_ranges):
-        path = _image(problem, plan.path, way)
+    choices = []
+    for choice in _choices(problem, plan, keeps_ranges):
+        path = _image(problem, plan.path, choice)
         unnamed = 0 if nameable is None else int(np.count_nonzero(~nameable(path.q, TOUCH_UP)))
-        ways.append((unnamed, way.rank, way, path))
-    ways.sort(key=lambda item: item[:2])
-    for unnamed, _, way, path in ways[:MOST_CHECKS]:
-        if (unnamed, way.near_limit, way.seconds + SAME_TIME) > least:
+        choices.append((unnamed, choice.rank, choice, path))
+    choices.sort(key=lambda item: item[:2])
+    for unnamed, _, choice, path in choices[:MOST_CHECKS]:
+        if (unnamed, choice.near_limit, choice.seconds + SAME_TIME) > least:
             break
         found = check_path(problem, path)
         if not isinstance(found, Free):
             continue
         seconds = air_seconds(found.motion, problem.cell.robot, problem.process)
-        if (unnamed, way.near_limit, seconds + SAME_TIME) < least:
+        if (unnamed, choice.near_limit, seconds + SAME_TIME) < least:
             best = replace(plan, path=path, motion=found.motion)
-            least = unnamed, way.near_limit, seconds
+            least = unnamed, choice.near_limit, seconds
     return best
 
 
-def _image(problem: GrindingProblem, path: GrindingPath, way: _Way) -> GrindingPath:
+def _image(problem: GrindingProblem, path: GrindingPath, choice: _Choice) -> GrindingPath:
     """Return the same path elsewhere in joint space."""
-    sign, shift = wrist_flips(problem.cell.robot.arm)[way.flip]
-    q = path.q * sign + shift + 2.0 * np.pi * way.turns[path.pass_index]
+    sign, shift = wrist_flips(problem.cell.robot.arm)[choice.flip]
+    q = path.q * sign + shift + 2.0 * np.pi * choice.turns[path.pass_index]
     # with the wrist flipped, the slot of the inverse kinematics is one of the other four
-    return replace(path, ik_branch=path.ik_branch ^ (4 * way.flip), q=q)
+    return replace(path, ik_branch=path.ik_branch ^ (4 * choice.flip), q=q)
 
 
-def _ways(problem: GrindingProblem, plan: Plan, keeps_ranges: bool) -> Iterator[_Way]:
-    """Yield the shortest way for each image that all passes may share, or that may not matter."""
+def _choices(problem: GrindingProblem, plan: Plan, keeps_ranges: bool) -> Iterator[_Choice]:
+    """Yield the shortest choice for each image that all passes may share, or may not."""
     for flip, (sign, shift) in enumerate(wrist_flips(problem.cell.robot.arm)):
         passes = _Passes(problem, plan, sign, shift)
         shared = [passes.alike(turn) for turn in passes.turns[0]]
         for alike in (alike for alike in shared if alike is not None):
-            yield passes.way(flip, alike)
+            yield passes.choice(flip, alike)
             allowed = passes.inside(alike) if keeps_ranges else passes.all_states
             for clear in (True, False):
                 chosen = passes.shortest(allowed, clear)
                 if chosen is not None:
-                    yield passes.way(flip, chosen)
+                    yield passes.choice(flip, chosen)
             if not keeps_ranges:
                 break  # the same would be found again
 
@@ -199,14 +199,14 @@ class _Passes:
             chosen.insert(0, int(before[chosen[0]]))
         return [int(one[k]) for one, k in zip(allowed, chosen, strict=True)]
 
-    def way(self, flip: int, chosen: list[int]) -> _Way:
+    def choice(self, flip: int, chosen: list[int]) -> _Choice:
         """Return a choice of images with its time."""
         ends = [self._at(index, np.array([one])) for index, one in enumerate(chosen)]
         visited = np.concatenate([[self._home], *(q for pair in ends for q in pair), [self._home]])
         seconds = self._seconds(visited[:-1:2], visited[1::2]).sum()
         near = any(near[one] for near, one in zip(self._near_limit, chosen, strict=True))
         turns = np.array([turns[one] for turns, one in zip(self.turns, chosen, strict=True)])
-        return _Way(bool(near), float(seconds), flip, turns)
+        return _Choice(bool(near), float(seconds), flip, turns)
 
     def _at(self, index: int, states: np.ndarray) -> tuple[Array, Array]:
         """Return where a pass begins and ends off the wheel, shape (k, 6) each."""

@@ -1,6 +1,6 @@
 """How two programs differ, for people: what changed everywhere in one line, then move by move.
 
-A language gives what a program says as a list of `Said`, in order: moves with their targets in
+A language gives what a program says as a list of `Line`, in order: moves with their targets in
 degrees and millimetres and their settings, and everything else as a text that does not change with
 spaces, dates, comments, labels and zeros at the end of a number. Here the two lists are laid side
 by side.
@@ -38,7 +38,7 @@ class Coordinate:
 
 
 @dataclass(frozen=True)
-class Said:
+class Line:
     """One thing that a program says.
 
     Attributes:
@@ -67,11 +67,11 @@ class Said:
         return " ".join([*(f"{name} {value}" for name, value in self.settings), "to", numbers])
 
 
-_Pair = tuple[Said, Said]
-_Row = tuple[Said | None, Said | None]
+_Pair = tuple[Line, Line]
+_Row = tuple[Line | None, Line | None]
 
 
-def changed_lines(before: Sequence[Said], after: Sequence[Said]) -> list[str]:
+def changed_lines(before: Sequence[Line], after: Sequence[Line]) -> list[str]:
     """Return how two programs differ, one line each; empty if they do the same.
 
     Args:
@@ -82,7 +82,7 @@ def changed_lines(before: Sequence[Said], after: Sequence[Said]) -> list[str]:
     if all(a is not None and b is not None and a.text == b.text for a, b in rows):
         return []
     pairs = [(a, b) for a, b in rows if a is not None and b is not None and a.moves and b.moves]
-    said, everywhere = _everywhere(pairs)
+    in_all, everywhere = _everywhere(pairs)
     table, others = [], []
     number = count(1)
     for a, b in rows:
@@ -96,19 +96,19 @@ def changed_lines(before: Sequence[Said], after: Sequence[Said]) -> list[str]:
                 table.append((index, a, b, what))
     return [
         *_summary(before, after, rows, pairs),
-        *said,
+        *in_all,
         *_rows(table),
         *_others(others),
     ]
 
 
-def _side_by_side(before: Sequence[Said], after: Sequence[Said], level: int = 0) -> Iterator[_Row]:
+def _side_by_side(before: Sequence[Line], after: Sequence[Line], level: int = 0) -> Iterator[_Row]:
     """Give what belongs together, in order: at first what is the same, then what is alike."""
     if level == len(_LIKENESS):
         yield from ((a, None) for a in before)
         yield from ((None, b) for b in after)
         return
-    first, second = ([_LIKENESS[level](said) for said in some] for some in (before, after))
+    first, second = ([_LIKENESS[level](one) for one in some] for some in (before, after))
     if first == second:  # matching blocks of equal keys would be slow to find
         yield from zip(before, after, strict=True)
         return
@@ -122,17 +122,20 @@ def _side_by_side(before: Sequence[Said], after: Sequence[Said], level: int = 0)
 
 
 # In what two things are alike, strictest first.
-_LIKENESS: tuple[Callable[[Said], Hashable], ...] = (
-    lambda said: said.text,
-    lambda said: said.target or said.text,
-    lambda said: tuple(c.name for c in said.target) or said.text.partition(" ")[0],
+_LIKENESS: tuple[Callable[[Line], Hashable], ...] = (
+    lambda one: one.text,
+    lambda one: one.target or one.text,
+    lambda one: tuple(c.name for c in one.target) or one.text.partition(" ")[0],
 )
 
 
 def _summary(
-    before: Sequence[Said], after: Sequence[Said], rows: Sequence[_Row], pairs: Sequence[_Pair]
+    before: Sequence[Line],
+    after: Sequence[Line],
+    rows: Sequence[_Row],
+    pairs: Sequence[_Pair],
 ) -> Iterator[str]:
-    had, has = (sum(said.moves for said in some) for some in (before, after))
+    had, has = (sum(one.moves for one in some) for some in (before, after))
     changed = sum(a.text != b.text for a, b in pairs)
     moves = f"{had} moves" if had == has else f"{had} moves against {has}"
     parts = [f"{changed} differ"]
@@ -142,7 +145,7 @@ def _summary(
     others = sum(
         a is None or b is None or a.text != b.text
         for a, b in rows
-        if not any(said is not None and said.moves for said in (a, b))
+        if not any(one is not None and one.moves for one in (a, b))
     )
     if others:
         yield f"{others} other {'line differs' if others == 1 else 'lines differ'}"
@@ -202,7 +205,7 @@ def _values_everywhere(name: str, values: Sequence[tuple[str | None, str | None]
             return
 
 
-def _what(a: Said | None, b: Said | None, everywhere: set[str]) -> str:
+def _what(a: Line | None, b: Line | None, everywhere: set[str]) -> str:
     """Say in what two moves differ that did not change everywhere, or which one is not there."""
     if a is None or b is None:
         only = a or b
@@ -214,7 +217,7 @@ def _what(a: Said | None, b: Said | None, everywhere: set[str]) -> str:
         if shift is None:
             parts.append(f"{name} in one only")
         elif shift.value and name not in everywhere:
-            old, new = (next(c.value for c in said.target if c.name == name) for said in (a, b))
+            old, new = (next(c.value for c in one.target if c.name == name) for one in (a, b))
             digits = _digits(shift.value)
             parts.append(f"{name} {old:.{digits}f} -> {new:.{digits}f} {shift.unit}")
     first, second = dict(a.settings), dict(b.settings)
@@ -231,7 +234,7 @@ def _what(a: Said | None, b: Said | None, everywhere: set[str]) -> str:
     return ", ".join(parts)
 
 
-def _shift(a: Said, b: Said, name: str) -> Coordinate | None:
+def _shift(a: Line, b: Line, name: str) -> Coordinate | None:
     """Return how far a coordinate moved, None where one of the moves has none in that unit."""
     old = next((c for c in a.target if c.name == name), None)
     new = next((c for c in b.target if c.name == name), None)
@@ -246,7 +249,9 @@ def _digits(shift: float) -> int:
     return _DIGITS + sum(1 for _ in finer)
 
 
-def _rows(table: Sequence[tuple[int | None, Said | None, Said | None, str]]) -> Iterator[str]:
+def _rows(
+    table: Sequence[tuple[int | None, Line | None, Line | None, str]],
+) -> Iterator[str]:
     if not table:
         return
     yield ""
@@ -267,7 +272,7 @@ def _others(rows: Sequence[_Row]) -> Iterator[str]:
         yield ""
     for same in groups.values():
         times = f", {len(same)} times" if len(same) > 1 else ""
-        for mark, said in zip("-+", same[0], strict=True):
-            if said is not None:
-                place = f" line {said.place}" if said.place else ""
-                yield f"{mark}{place}{times}: {said.text}"
+        for mark, one in zip("-+", same[0], strict=True):
+            if one is not None:
+                place = f" line {one.place}" if one.place else ""
+                yield f"{mark}{place}{times}: {one.text}"

@@ -11,7 +11,7 @@ from opl.cell.robot import Robot, controller_poses
 from opl.errors import InputError
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, roll_pitch_yaw
-from opl.program.changes import Coordinate, Said, changed_lines
+from opl.program.changes import Coordinate, Line, changed_lines
 from opl.program.digits import Rounding
 from opl.program.played import (
     Corners,
@@ -107,13 +107,13 @@ def _described(listing: Listing, robot: Robot) -> list[str]:
     return lines
 
 
-def _meaning(listing: Listing, robot: Robot) -> list[Said]:
+def _meaning(listing: Listing, robot: Robot) -> list[Line]:
     """Return what a program says; dates, comments, spaces and zeros at the end do not count."""
-    said = [Said("", listing.name)]
+    said = [Line("", listing.name)]
     for one in listing.statements:
         move = one.move
         if move is None:
-            said.append(Said(str(one.line), one.meaning))
+            said.append(Line(str(one.line), one.meaning))
             continue
         if move.target.shape == (4, 4):
             target = pose_coordinates(pose_values(move.target))
@@ -122,7 +122,7 @@ def _meaning(listing: Listing, robot: Robot) -> list[Said]:
         form = "straight" if move.straight else "joint"
         settings = [("move", form), ("speed", move.speed.text), ("corner", move.corner.text)]
         settings.append(("tool", move.tool))
-        said.append(Said(str(one.line), one.meaning, target, tuple(settings)))
+        said.append(Line(str(one.line), one.meaning, target, tuple(settings)))
     return said
 
 

@@ -93,7 +93,7 @@ class Corner:
         """How far in [m] from the written position the robot may leave its move, 0 for a stop."""
         return 0.0 if self.exact_stop else self.reach
 
-    def told(self, zone: float) -> str:
+    def in_words(self, zone: float) -> str:
         """Return the corner and what is taken for its zone in [m], for people."""
         if np.isinf(zone):
             return f"{self.text} (zone not known, half of each move taken)"

@@ -93,16 +93,17 @@ def common_shift(
     if found.findings or missing_points(points, found.timed.motion):
         return None
     message = (
-        f"{_told(-shift.p_contact0)}: where the program would have it, all {len(points)} cutter "
-        f"points are ground within {1e3 * rule.max_contact_error:g} mm of the contact model"
+        f"{_in_words(-shift.p_contact0)}: where the program would have it, all "
+        f"{len(points)} cutter points are ground within {1e3 * rule.max_contact_error:g} mm of "
+        "the contact model"
     )
     hidden = [f"{'xyz'[k]}" for k in range(3) if np.linalg.norm(shift.observed[:, k]) < 0.5]
     message += f"; along {' and '.join(hidden)} no contact shows it" if hidden else ""
     return Finding(Level.ERROR, "contact", "wheel", message)
 
 
-def _told(shift: Array) -> str:
-    """Say where the wheel is instead of where it was planned; z points from the part into it."""
+def _in_words(shift: Array) -> str:
+    """Return where the wheel is instead of where it was planned; z points from the part into it."""
     x, y, z = np.round(1e3 * shift, 2) + 0.0  # no -0.00
     length = 1e3 * np.linalg.norm(shift)
     where = "nearer than planned" if z < 0.0 else "farther away than planned"

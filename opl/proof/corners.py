@@ -104,7 +104,7 @@ def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playb
                 Level.ERROR,
                 "corner",
                 f"{_place(motion, corner)} ({playback.moves[corner.k].place})",
-                f"{playback.moves[corner.k].corner.told(zones[corner.k])} {fault}",
+                f"{playback.moves[corner.k].corner.in_words(zones[corner.k])} {fault}",
             )
             for corner, fault in faults
         ),
@@ -144,7 +144,7 @@ def contact_errors(
 def _errors(job: Job, points: CutterPoints, motion: Motion, corners: list[Rounding]) -> Array:
     """Do `contact_errors` for one corner or more."""
     wheel = job.cell.wheel
-    place = np.stack([corner.places(_lead_pace(job, points, corner)) for corner in corners])
+    place = np.stack([corner.places(_points_per_lead(job, points, corner)) for corner in corners])
     known = np.isfinite(place)
     q = np.stack([corner.configurations() for corner in corners])[known]
     Ts_contact0_workpiece = (
@@ -165,9 +165,9 @@ def _errors(job: Job, points: CutterPoints, motion: Motion, corners: list[Roundi
         here = (T_contact_contact0 @ Ts)[:, 0, 3]
         nudged = np.where(at + _NUDGE <= last, _NUDGE, -_NUDGE)
         there = T_contact_contact0 @ Ts_contact0_workpiece @ points.frames_at(at + nudged)
-        pace = (there[:, 0, 3] - here) / nudged
-        on_edge = (np.abs(t) > wheel.flat_end) & (pace != 0.0)
-        step = np.where(on_edge, -here / np.where(pace == 0.0, 1.0, pace), 0.0)
+        slope = (there[:, 0, 3] - here) / nudged
+        on_edge = (np.abs(t) > wheel.flat_end) & (slope != 0.0)
+        step = np.where(on_edge, -here / np.where(slope == 0.0, 1.0, slope), 0.0)
         at = np.clip(at + np.clip(step, -1.0, 1.0), first, last)
     Ts = Ts_contact0_workpiece @ points.frames_at(at)
     Ts_contact0_contact = wheel.T_contact0_contact(contact_positions(wheel, Ts))
@@ -179,7 +179,7 @@ def _errors(job: Job, points: CutterPoints, motion: Motion, corners: list[Roundi
     return np.asarray(np.maximum.accumulate(error, axis=1))
 
 
-def _lead_pace(job: Job, points: CutterPoints, corner: Rounding) -> float:
+def _points_per_lead(job: Job, points: CutterPoints, corner: Rounding) -> float:
     """Return how many cutter points a lead next to the end of a pass passes in all of its move.
 
     The part is only moved on a lead, so every point of it moves as the flange does.

@@ -109,20 +109,20 @@ class Rounding:
         left, begun = self._shares()
         return np.asarray(self.before.q_at(left) + self.after.q_at(begun) - self.before.q[0])
 
-    def places(self, lead_pace: float) -> Array:
+    def places(self, points_per_lead: float) -> Array:
         """Return the fractional cutter points there, NaN off the pass, shape (DEPTHS, ACROSS).
 
-        A lead goes on along the pass, by `lead_pace` cutter points in all of its move.
+        A lead goes on along the pass, by `points_per_lead` cutter points in all of its move.
         """
         left, begun = self._shares()
         here = self.before.place[0]
         if all(self.grinds):
             return np.asarray(self.before.place_at(left) + self.after.place_at(begun) - here)
         if self.grinds[1]:
-            place = self.after.place_at(begun) - left * lead_pace
+            place = self.after.place_at(begun) - left * points_per_lead
             return np.where(place >= here, place, np.nan)
         if self.grinds[0]:
-            place = self.before.place_at(left) + begun * lead_pace
+            place = self.before.place_at(left) + begun * points_per_lead
             return np.where(place <= here, place, np.nan)
         return np.full(left.shape, np.nan)
 

@@ -46,10 +46,10 @@ class TooWide:
                 before, here, after = positions[k - 1 : k + 2].tolist()
                 yield before, here, after
 
-    def _wide(self, motion: Motion, asked: NDArray[np.bool_]) -> Iterator[int]:
-        """Yield the numbers of the positions that the zone is too wide for, of those asked for."""
+    def _wide(self, motion: Motion, chosen: NDArray[np.bool_]) -> Iterator[int]:
+        """Yield the numbers of the positions that the zone is too wide for, of those chosen."""
         job = self._job
-        zones = np.where(asked, self._zone, 0.0)
+        zones = np.where(chosen, self._zone, 0.0)
         corners = list(roundings(motion, zones, tool_points_of(job)))
         if not corners:
             return

@@ -110,11 +110,11 @@ def bullets(lines: Iterable[str], marks: Sequence[str | None] = ()) -> str:
     return f"<ul>\n{items}\n</ul>{_cut_on_paper(items.count('<li>'))}"
 
 
-def marked(said: object, mark: str | None) -> str:
+def marked(content: object, mark: str | None) -> str:
     """Return text, as a button if it leads to a place in the viewer."""
     if mark is None:
-        return text(said)
-    return f'<button type="button" data-mark="{text(mark)}">{text(said)}</button>'
+        return text(content)
+    return f'<button type="button" data-mark="{text(mark)}">{text(content)}</button>'
 
 
 def table(

@@ -79,7 +79,7 @@ def hover() -> str:
 def choice(name: str, label: str, options: dict[str, str]) -> str:
     """Return a choice of one of some options, hidden where there is nothing to choose."""
     inside = "".join(
-        f'<option value="{key}">{text(said)}</option>' for key, said in options.items()
+        f'<option value="{key}">{text(title)}</option>' for key, title in options.items()
     )
     hidden = " hidden" if len(options) < 2 else ""
     return f'<label{hidden}>{label} <select id="{name}">{inside}</select></label>'

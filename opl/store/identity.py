@@ -32,15 +32,15 @@ def made_with() -> Mapping[str, str]:
     }
 
 
-def job_id(inputs: Mapping[str, str | None], asked: Mapping[str, Any]) -> str:
+def job_id(inputs: Mapping[str, str | None], request: Mapping[str, Any]) -> str:
     """Return the id of a job: a digest of everything that its outcome depends on.
 
     Args:
         inputs: Digests of its files by name, None for a file that is not there.
-        asked: What is to be done with them, in plain values.
+        request: What is to be done with them, in plain values.
     """
     date = os.environ.get("SOURCE_DATE_EPOCH")  # without it a program is dated when it is made
-    whole = [dict(inputs), dict(asked), dict(made_with()), date]
+    whole = [dict(inputs), dict(request), dict(made_with()), date]
     return hashlib.sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()[:32]
 
 

@@ -250,12 +250,12 @@ def _is_final(state: State, outcome: str | None) -> bool:
 
 def _stored(row: tuple[Any, ...]) -> StoredJob:
     id_, target, name, task, state, stage, fraction, cancelling, attempts, outcome, *times = row
-    asked = json.loads(task)
+    fields = json.loads(task)
     return StoredJob(
         id_,
         target,
         name,
-        Task(**{**asked, "programs": tuple(asked["programs"])}),
+        Task(**{**fields, "programs": tuple(fields["programs"])}),
         State(state),
         stage,
         fraction,

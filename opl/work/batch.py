@@ -73,18 +73,18 @@ def run_batch(
         InputError: If the store cannot be used.
     """
     batch = _Batch(out, settings)
-    asked = ask(jobs, out, batch.digests)
+    request = ask(jobs, out, batch.digests)
     rows: dict[str, BatchRow] = {}
     tell = done or (lambda _: None)
-    for one in asked.order:
+    for one in request.order:
         if isinstance(one, BatchRow):
             tell(one)
-        elif not settings.force and (known := batch.known(asked.jobs[one])) is not None:
+        elif not settings.force and (known := batch.known(request.jobs[one])) is not None:
             rows[one] = known
             tell(known)
-    for row in batch.run({id_: one for id_, one in asked.jobs.items() if id_ not in rows}, tell):
+    for row in batch.run({id_: one for id_, one in request.jobs.items() if id_ not in rows}, tell):
         rows[row[0]] = row[1]
-    return [one if isinstance(one, BatchRow) else rows[one] for one in asked.order]
+    return [one if isinstance(one, BatchRow) else rows[one] for one in request.order]
 
 
 def write_batch_page(rows: Sequence[BatchRow], out: Path) -> None:
@@ -122,7 +122,7 @@ class _Batch:
         if not jobs:
             return []
         left = dict(jobs)  # by the id that each has now
-        asked = {id_: id_ for id_ in jobs}
+        request = {id_: id_ for id_ in jobs}
         for one in jobs.values():
             self._submit(one, again=self._settings.force or self._is_done(one))
         ended: queue.Queue[str] = queue.Queue()
@@ -158,11 +158,11 @@ class _Batch:
                         continue
                     del left[id_]
                     if (newer := self._newer(wanted)) is not None:
-                        left[newer.id], asked[newer.id] = newer, asked[id_]
+                        left[newer.id], request[newer.id] = newer, request[id_]
                         self._submit(newer)
                         continue
                     row = self._row(wanted, job)
-                    rows.append((asked[id_], row))
+                    rows.append((request[id_], row))
                     tell(row)
         finally:
             crew.end()

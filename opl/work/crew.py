@@ -14,7 +14,7 @@ from opl.store.values import Outcome, State, StoredJob, Task
 from opl.work.worker import BUG, Beat, WorkerDied
 
 IDLE = 0.5  # [s] between two looks for work, unless somebody says that there is some
-SAID = 0.4  # [s] between two words about progress
+SELDOM = 0.4  # [s] between two words about progress
 
 
 class Doer(Protocol):
@@ -107,14 +107,14 @@ class Crew:
 
     def _do(self, doer: Doer, job: StoredJob) -> None:
         tell("begun", job=job.id, name=job.name, kind=job.task.kind, attempt=job.attempts)
-        said = ("", 0.0)
+        last = ("", 0.0)
 
         def beat(stage: str, fraction: float) -> bool:
-            nonlocal said
+            nonlocal last
             now = time.monotonic()
-            if stage == said[0] and now - said[1] < SAID:
+            if stage == last[0] and now - last[1] < SELDOM:
                 return True
-            said = stage, now
+            last = stage, now
             return self._store.renew(job.id, stage, fraction)
 
         try:

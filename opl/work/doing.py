@@ -74,14 +74,14 @@ def do(task: Task, tell: Tell) -> Outcome | None:
     """Do a task; return what became of it, None if it was cancelled."""
     last = 0.0
 
-    def told(stage: Stage, fraction: float) -> None:
+    def report(stage: Stage, fraction: float) -> None:
         nonlocal last
         if fraction in (0.0, 1.0) or time.monotonic() - last > SELDOM:
             last = time.monotonic()
             if not tell(stage.value, fraction):
                 watch.cancel()
 
-    watch = Watch(told)
+    watch = Watch(report)
     try:
         with confine_to(Path.cwd() if task.confined else None):
             return _KINDS[task.kind](task, watch)

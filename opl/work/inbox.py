@@ -45,8 +45,8 @@ def watch_inbox(
             paths = find_jobs([inbox])
         except InputError:  # it is empty, or was removed and may come back
             paths = []
-        asked = ask(paths, outbox, digests)
-        now = {one if isinstance(one, str) else f"{one.job} {one.message}" for one in asked.order}
+        request = ask(paths, outbox, digests)
+        now = {one if isinstance(one, str) else f"{one.job} {one.message}" for one in request.order}
         if now and now == seen and now != ran:
             rows = run_batch(
                 paths, outbox, settings, lambda row: None if row.unchanged else done(row)

@@ -40,13 +40,13 @@ class JobStanding:
 def batch_standing(jobs: Sequence[Path], out: Path) -> list[JobStanding]:
     """Return how each job stands; changes nothing."""
     store = Store(out / STORE) if (out / STORE).is_file() else None
-    asked = ask(jobs, out, Digests())
+    request = ask(jobs, out, Digests())
     found = []
-    for one in asked.order:
+    for one in request.order:
         if isinstance(one, BatchRow):
             found.append(JobStanding(one.job, "", one.status, None, ""))
             continue
-        wanted = asked.jobs[one]
+        wanted = request.jobs[one]
         job = None if store is None else store.of_target(wanted.target)
         status = None if job is None or job.outcome is None else job.outcome.status
         if job is None:

@@ -53,7 +53,7 @@ class Wanted:
 
 
 @dataclass
-class Asked:
+class Request:
     """The jobs of a batch: those that can be begun, and those that are refused before.
 
     Attributes:
@@ -77,22 +77,22 @@ def wanted_jobs(path: Path, out: Path, digests: Digests) -> list[Wanted]:
         InputError: If the file cannot be read, or its sweep makes no sense.
     """
     content = documents.content_of(path)
-    said = content if isinstance(content, Mapping) else {}
+    values = content if isinstance(content, Mapping) else {}
     found = []
     files = {name: digests.of(one) for name, one in files_of_job(path, content).items()}
-    for changes in variants(str(path), said) or [{}]:
-        name = changes.get(keys.NAME, said.get(keys.NAME, ""))
+    for changes in variants(str(path), values) or [{}]:
+        name = changes.get(keys.NAME, values.get(keys.NAME, ""))
         name = name if isinstance(name, str) else ""
         named = dict(files)
         task = Task("run", str(path), str(out), changes=changes)
-        asked = {"batch": [name or str(path), changes]}
-        found.append(Wanted(path, name, changes, task, job_id(named, asked)))
+        kind = {"batch": [name or str(path), changes]}
+        found.append(Wanted(path, name, changes, task, job_id(named, kind)))
     return found
 
 
-def ask(paths: Iterable[Path], out: Path, digests: Digests) -> Asked:
+def ask(paths: Iterable[Path], out: Path, digests: Digests) -> Request:
     """Return the jobs of a batch; jobs of one name are refused, each would overwrite the other."""
-    asked = Asked()
+    request = Request()
     all_: list[Wanted | BatchRow] = []
     for path in paths:
         try:
@@ -107,13 +107,13 @@ def ask(paths: Iterable[Path], out: Path, digests: Digests) -> Asked:
         if isinstance(one, Wanted) and len(by_name.get(one.name, ())) > 1:
             message = f"must be another for each job, {one.name} is also that of "
             message += _others(by_name[one.name], one.path)
-            asked.order.append(refused(one.path, InputError(f"{one.path}: {keys.NAME}", message)))
+            request.order.append(refused(one.path, InputError(f"{one.path}: {keys.NAME}", message)))
         elif isinstance(one, Wanted):
-            asked.order.append(one.id)
-            asked.jobs[one.id] = one
+            request.order.append(one.id)
+            request.jobs[one.id] = one
         else:
-            asked.order.append(one)
-    return asked
+            request.order.append(one)
+    return request
 
 
 def _others(sharers: Sequence[Path], path: Path) -> str:

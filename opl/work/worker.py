@@ -186,13 +186,13 @@ def work(pipe: Connection, parent: int) -> None:
         if task is None:  # the task that was cancelled had ended before
             continue
         os.chdir(home / task.home)
-        found = doing.do(task, lambda stage, fraction: _told(pipe, stage, fraction))
+        found = doing.do(task, lambda stage, fraction: _goes_on(pipe, stage, fraction))
         os.chdir(home)
         pipe.send(found)
         doing.tidy_up()
 
 
-def _told(pipe: Connection, stage: str, fraction: float) -> bool:
+def _goes_on(pipe: Connection, stage: str, fraction: float) -> bool:
     """Pass on how far a task is; return whether to go on."""
     pipe.send((stage, fraction))
     if pipe.poll():

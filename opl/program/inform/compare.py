@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from opl.cell.robot import Robot
-from opl.program.changes import Coordinate, Said, changed_lines
+from opl.program.changes import Coordinate, Line, changed_lines
 from opl.program.events import same_number
 from opl.program.inform.job import ROBOT_KINDS, InformJob, Instruction, Position, read_label
 from opl.program.listing import pose_coordinates
@@ -23,15 +23,15 @@ def differences_in_meaning(first: InformJob, second: InformJob, robot: Robot) ->
     return changed_lines(list(_meaning(first, robot)), list(_meaning(second, robot)))
 
 
-def _meaning(job: InformJob, robot: Robot) -> Iterator[Said]:
+def _meaning(job: InformJob, robot: Robot) -> Iterator[Line]:
     """Give everything that decides what the robot does, in order."""
-    yield Said("", f"job {job.name}")
+    yield Line("", f"job {job.name}")
     for header in job.headers:
         key = header.key.lstrip("/")
         if key.startswith(("GROUP", "ATTR")) or header.key in ("////FRAME", "///FRAME"):
-            yield Said(str(header.line), f"{key} {header.value}")
+            yield Line(str(header.line), f"{key} {header.value}")
     for alias in job.aliases:
-        yield Said("", f"alias {alias}")
+        yield Line("", f"alias {alias}")
     positions = {(p.kind, p.number): p for p in job.positions}
     for step in job.instructions:
         if step.word and step.word != "'" and not step.disabled:
@@ -41,15 +41,15 @@ def _meaning(job: InformJob, robot: Robot) -> Iterator[Said]:
             name = f"{position.kind}{position.number:03d}"
             settings = (("position", name), *_frame(position))
             text = f"{name} = {_exact(position)}"
-            yield Said(str(position.line), text, _target(position, robot, ""), settings)
+            yield Line(str(position.line), text, _target(position, robot, ""), settings)
 
 
 def _instruction(
     step: Instruction, positions: dict[tuple[str, int], Position], robot: Robot
-) -> Said:
+) -> Line:
     text = _text(step, positions)
     if not step.moves:
-        return Said(str(step.line), text)
+        return Line(str(step.line), text)
     target: list[Coordinate] = []
     settings: list[tuple[str, str]] = []
     for number, move in enumerate((step, *step.coupled)):
@@ -60,7 +60,7 @@ def _instruction(
             if label in positions:
                 target += _target(positions[label], robot, plus)
                 settings += [(plus + name, value) for name, value in _frame(positions[label])]
-    return Said(str(step.line), text, tuple(target), tuple(settings))
+    return Line(str(step.line), text, tuple(target), tuple(settings))
 
 
 def _text(step: Instruction, positions: dict[tuple[str, int], Position]) -> str:

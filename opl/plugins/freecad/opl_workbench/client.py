@@ -160,8 +160,8 @@ class Client:
 
     def jobs(self, state: str | None = None, most: int = 100) -> list[RemoteJob]:
         """Return the newest jobs, of one state or of all, without their figures."""
-        asked = {"most": str(most), **({} if state is None else {"state": state})}
-        found = json.loads(self._ask("GET", f"/v1/jobs?{urllib.parse.urlencode(asked)}"))
+        chosen = {"most": str(most), **({} if state is None else {"state": state})}
+        found = json.loads(self._ask("GET", f"/v1/jobs?{urllib.parse.urlencode(chosen)}"))
         return [_job(one) for one in found["jobs"]]
 
     def counts(self) -> dict[str, int]:
@@ -228,7 +228,7 @@ class Client:
 
     @contextmanager
     def _answer(self, request: urllib.request.Request, wait: float) -> Iterator[Any]:
-        """Yield an answer to be read; what breaks off meanwhile is told as a `ServiceError`."""
+        """Yield an answer to be read; what breaks off meanwhile becomes a `ServiceError`."""
         try:
             with urllib.request.urlopen(request, timeout=wait) as answer:
                 yield answer
@@ -246,8 +246,8 @@ def _refusal(error: urllib.error.HTTPError) -> ServiceError:
     except (OSError, http.client.HTTPException):  # it does not wait until all has been sent
         return ServiceError(error.code, "", str(error.reason))
     try:
-        told = json.loads(content)
-        return ServiceError(error.code, str(told["where"]), str(told["message"]))
+        answer = json.loads(content)
+        return ServiceError(error.code, str(answer["where"]), str(answer["message"]))
     except (ValueError, KeyError, TypeError):
         return ServiceError(error.code, "", content.decode("utf-8", "replace")[:200])
 
