@@ -16,7 +16,7 @@ from opl.planning.problem import GrindingProblem, wheel_distances
 from opl.planning.rows import Row
 from opl.search.box import JointBox
 from opl.search.in_box import missing as missing_of
-from opl.search.in_box import missing_chords, sampled
+from opl.search.in_box import missing_chords, nearest_points, sampled
 
 FINE = 33  # contact positions of a place at which a box is held against it
 ROW_SAMPLES = 8  # between two cutter points at one contact position
@@ -124,9 +124,24 @@ class ColumnSampler:
         t = np.clip(np.concatenate([t[:, :1] - BORDER, t, t[:, -1:] + BORDER], axis=1), -last, last)
         columns = self.at(places, there, placements, t)
         if self.collisions:
-            free = columns.free
-            free[free] = ~problem.scene.collision.collides(columns.q[free])
+            self._leave_out_collisions(columns, box)
         return columns
+
+    def _leave_out_collisions(self, columns: Columns, box: JointBox) -> None:
+        """Leave postures that collide out of columns, until those nearest to a box are free."""
+        free, asked = columns.free, np.zeros_like(columns.free)
+        every = np.arange(len(free))
+        while True:
+            _, row = nearest_points(columns.q, free, box)
+            near = np.zeros_like(free)
+            met = row >= 0.0
+            for end in (np.floor(row), np.ceil(row)):
+                near[every[met], end[met].astype(int)] = True
+            near &= ~asked
+            if not near.any():
+                return
+            asked |= near
+            free[near] = ~self._problem.scene.collision.collides(columns.q[near])
 
     def at(
         self, places: Array, there: CutterPoints, placements: Sequence[Placement], t: Array

@@ -25,7 +25,6 @@ from opl.geometry.toolpath import CutterPoints
 from opl.planning.cut_cells import cells_of, cut_finer
 from opl.planning.enclosed import ROUND_OFF, EnclosedCells, enclosing
 from opl.planning.images import Images
-from opl.planning.obstructed import Obstructions
 from opl.search.walls import Image, Line, Piece, Sweep, Wall
 
 MOST_CUTS = 3  # of such cells, each finer than the one before
@@ -56,7 +55,6 @@ class ColumnWalls:
         self._points = points
         self.images = images
         self.made = 0.0  # walls made so far; one cell cut finer is part of one
-        self.obstructions: Obstructions | None = None  # left out once they are known to matter
 
     def walls(self, places: Sequence[float]) -> list[Wall]:
         """Return the walls at fractional cutter points."""
@@ -177,8 +175,7 @@ class ColumnWalls:
             allowed |= (moved.low + up <= robot.upper).all(axis=1)
         for low, high in _runs(allowed):
             if allowed[low]:
-                part = piece.part(low, high)
-                yield from self.obstructions.clear(part) if self.obstructions else [part]
+                yield piece.part(low, high)
 
     def _cells(
         self, Ts_workpiece_cutter: Array, grids: list[Array], cuts: list[np.ndarray]

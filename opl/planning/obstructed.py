@@ -30,38 +30,51 @@ class Obstructions:
         self._levers = collision.levers()
         self._scenes = [collision.less(moved) for moved in MOVED]
         self._flips = images.flips
+        self._known: dict[int, tuple[Piece, dict[tuple[float, float], list[bool]]]] = {}
 
-    def clear(self, piece: Piece) -> list[Piece]:
-        """Return what is left of a piece."""
+    def clear(self, piece: Piece, first: int, end: int) -> list[Piece] | None:
+        """Return what is left of the cells from ``first`` to before ``end``, None if all is."""
         pads = np.maximum(piece.pad_high, -piece.pad_low)
         step = np.diff(piece.corners, axis=0)
+        # by the piece itself: while it is kept here, no other one has its place in memory
+        _, known = self._known.setdefault(id(piece), (piece, {}))
 
         def surely(_: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
-            cell = ((low + high) / 2.0).astype(int)
-            away = ((low + high) / 2.0 - cell)[:, None]
-            q = piece.corners[cell] + step[cell] * away
-            turned = np.abs(step[cell]) * (high - low)[:, None] / 2.0 + pads[cell]
-            return self._collide(q, turned @ self._levers)
+            asked = list(zip(low.tolist(), high.tolist(), strict=True))
+            new = np.array([k for k, cell in enumerate(asked) if cell not in known], dtype=int)
+            if len(new):
+                middle = (low + high)[new] / 2.0
+                cell = middle.astype(int)
+                q = piece.corners[cell] + step[cell] * (middle - cell)[:, None]
+                turned = np.abs(step[cell]) * (high - low)[new, None] / 2.0 + pads[cell]
+                hit, near = self._collide(q, turned @ self._levers)
+                for k, *found in zip(new.tolist(), hit.tolist(), near.tolist(), strict=True):
+                    known[asked[k]] = found
+            both = np.array([known[cell] for cell in asked], dtype=bool)
+            return both[:, 0], both[:, 1]
 
-        n = len(pads)
-        first = np.arange(n, dtype=float)
-        _, low, high, cuts = halved(np.zeros(n, dtype=int), first, first + 1.0, surely, MOST_WITHIN)
-        if not cuts.any():
-            return [piece]
+        # the cells beside tell where collisions begin
+        cells = np.arange(max(first - 1, 0), min(end + 1, len(pads)), dtype=float)
+        run = np.zeros(len(cells), dtype=int)
+        _, low, high, hit = halved(run, cells, cells + 1.0, surely, MOST_WITHIN)
+        own = (low >= first) & (high <= end)
+        low, high, hit = low[own], high[own], hit[own]
+        if not hit.any():
+            return None
         cell = ((low + high) / 2.0).astype(int)
         ends = np.append(low, high[-1])
-        places = np.arange(n + 1)
+        places = np.arange(len(pads) + 1)
         corners = np.stack([np.interp(ends, places, joint) for joint in piece.corners.T], axis=1)
         at = np.interp(ends, places, piece.at)
         finer = Piece(
             piece.family, piece.line, at, corners, piece.pad_low[cell], piece.pad_high[cell]
         )
-        breaks = np.flatnonzero(np.diff(cuts)) + 1
+        breaks = np.flatnonzero(np.diff(hit)) + 1
         starts = [0, *breaks.tolist()]
         return [
             finer.part(start, end)
-            for start, end in zip(starts, [*starts[1:], len(cuts)], strict=True)
-            if not cuts[start]
+            for start, end in zip(starts, [*starts[1:], len(hit)], strict=True)
+            if not hit[start]
         ]
 
     def _collide(self, q: Array, moved: Array) -> tuple[np.ndarray, np.ndarray]:

@@ -26,6 +26,7 @@ from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulges, Row
 from opl.planning.work import Work
 from opl.search.box import JointBox
+from opl.search.cells import Clear
 from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
 
@@ -85,13 +86,13 @@ class OptimalSearch:
         self._walls = ColumnWalls(problem.cell, part, points, images)
         self._families = Families(images, problem.field.q, problem.cuts, points.pass_index)
         self._sampler = ColumnSampler(problem, seams)
-        self._tracks = BoxTracks(
-            problem, self._sampler, settings.costs, settings.max_contact_change, most
-        )
+        costs, most_change = settings.costs, settings.max_contact_change
+        self._tracks = BoxTracks(problem, self._sampler, costs, most_change, most)
         self.plan = fallback
         self._largest = largest
         self._proven = self._least_hope = 0.0
         self._given_up = 0
+        self._clear: Clear | None = None  # of collisions, once they are known to matter
         self._early = 0.0  # work on early motions
         self.proof = BoxProof(images.of, self._walls.finer, largest, PROOF_SHARE * settings.widen)
         self._places: set[float] = set()
@@ -116,7 +117,7 @@ class OptimalSearch:
     @property
     def minds_collisions(self) -> bool:
         """Whether the proof rests on where the robot collides as well."""
-        return self._sampler.collisions
+        return self._clear is not None
 
     @property
     def open_because(self) -> str | None:
@@ -138,7 +139,8 @@ class OptimalSearch:
 
     def holders(self) -> tuple[Holder, ...]:
         """Return what holds the least box over the walls up."""
-        return holders(self.proof.walls, self._walls.images.of, self._walls.finer, self._value)
+        walls, images = self.proof.walls, self._walls.images.of
+        return holders(walls, images, self._walls.finer, self._value, self._clear)
 
     def step(self) -> None:
         """Work on one subproblem."""
@@ -165,8 +167,7 @@ class OptimalSearch:
             return
         looked_at = None
         if alike(placements):
-            looked_at = self._look(box, placements)
-            columns, _, inner = looked_at
+            columns, _, inner = looked_at = self._look(box, placements)
             self._hope(inner)
             allowed = MISSED * self._settings.widen * self.proof.threshold
             missed = missed or columns.missed(box, self._places, allowed)[:MOST_ADDED]
@@ -206,9 +207,8 @@ class OptimalSearch:
         if self._early < FIRST_WORK + EARLY_SHARE * before:
             columns, _, inner = self._look(larger, placements)
             if inner is not None:
-                self._keep(
-                    self._tracks.plan(columns, (), inner, self._room(inner), lambda _: False)
-                )
+                room = self._room(inner)
+                self._keep(self._tracks.plan(columns, (), inner, room, lambda _: False))
             self._early += self._work.done - before
 
     def _hope(self, box: JointBox | None) -> None:
@@ -219,10 +219,10 @@ class OptimalSearch:
 
     def _mind_collisions(self) -> None:
         """Leave out where the robot collides: it does wherever a motion might have been."""
-        scene = self._problem.scene
-        self._walls.obstructions = Obstructions(scene.collision, self._walls.images)
+        self._clear = Obstructions(self._problem.scene.collision, self._walls.images).clear
         self._sampler.collisions = True
         self._places.clear()
+        self.proof.put_back()  # before what is proven is noted
         self._begin_again(self._value, 0.0)
 
     def _hope_for_less(self) -> None:
@@ -234,9 +234,9 @@ class OptimalSearch:
         """Begin the proof again: boxes up to a larger size are of interest."""
         self._proven = self.lower_bound
         self._least_hope = least_hope
-        walls = self.proof.walls
+        made, walls = self._walls, self.proof.walls
         gap = PROOF_SHARE * self._settings.widen
-        self.proof = BoxProof(self._walls.images.of, self._walls.finer, threshold, gap)
+        self.proof = BoxProof(made.images.of, made.finer, threshold, gap, self._clear)
         self._work.begin_again(self.proof)
         for wall in walls:
             self.proof.add(wall)

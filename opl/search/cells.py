@@ -16,6 +16,8 @@ from opl.search.walls import Image, Piece, Wall
 COLUMNS = 26  # start 0:6, end 6:12, pad_low 12:18, pad_high 18:24, places 24 and 25
 WALL, KEY, SOURCE, FIRST, END = range(5)  # columns of a span
 Key = tuple[int, tuple[int, ...]]  # a family, and the key of its image
+# what is left of a run of cells of a piece without those that are forbidden; None if none is
+Clear = Callable[[Piece, int, int], Sequence[Piece] | None]
 
 
 class Cells:
@@ -48,6 +50,7 @@ class Cells:
         self._first: list[int] = []  # cell of each source, -1 for those not in the table yet
         self._of_wall: list[tuple[np.ndarray, Array, Array]] = []  # sources and boxes around them
         self._finer: dict[tuple[int, int], np.ndarray] = {}
+        self._clear: dict[int, np.ndarray] = {}  # which cells of a source are not forbidden
 
     @property
     def n_keys(self) -> int:
@@ -100,6 +103,27 @@ class Cells:
                 found.append(self._span(wall, len(self._sources) - 1))
             self._finer[at] = np.array(found, np.int64).reshape(-1, 5)
         return self._finer[at]
+
+    def cleared(self, spans: np.ndarray, clear: Clear) -> np.ndarray | None:
+        """Return spans without the cells that are forbidden, None if none of theirs is."""
+        found, forbidden = [], False
+        for span in spans.tolist():
+            wall, _, source, first, end = span
+            piece, image = self._sources[source]
+            looked_at = self._clear.setdefault(source, np.zeros(len(piece.pad_low), dtype=bool))
+            begin, stop = first - self._first[source], end - self._first[source]
+            left = None if looked_at[begin:stop].all() else clear(piece, begin, stop)
+            if left is None:
+                looked_at[begin:stop] = True
+                found.append(tuple(span))
+                continue
+            forbidden = True
+            for part in left:
+                self._new_source(part, image)
+                number = len(self._sources) - 1
+                self._clear[number] = np.ones(len(part.pad_low), dtype=bool)
+                found.append(self._span(wall, number))
+        return np.array(found, np.int64).reshape(-1, 5) if forbidden else None
 
     def _new_source(self, piece: Piece, image: int) -> None:
         self._sources.append((piece, image))

@@ -66,10 +66,15 @@ def missing_chords(q: Array, free: np.ndarray, box: JointBox) -> Array:
         free: Which may be used, shape (n, m).
         box: The box.
     """
+    return nearest_points(q, free, box)[0]
+
+
+def nearest_points(q: Array, free: np.ndarray, box: JointBox) -> tuple[Array, Array]:
+    """Return what `missing_chords` does, and the fractional row of the points, -1 for none."""
     missing, row = np.empty(len(q)), np.empty(len(q))
     by_joint = np.ascontiguousarray(np.moveaxis(q, 1, 2))
     outside(by_joint, np.ascontiguousarray(free), box.lower, box.upper, JUMP, missing, row)
-    return missing
+    return missing, row
 
 
 def nearest(q: Array, free: np.ndarray, box: JointBox) -> np.ndarray:

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.bounding import distance, tighten, trim
-from opl.search.cells import END, FIRST, WALL, Cells, Key
+from opl.search.cells import END, FIRST, WALL, Cells, Clear
 from opl.search.relaxation import least_box
+from opl.search.subproblems import Candidate, Relaxation, Subproblem
 from opl.search.walls import Image, Piece, Wall
 
 SETTLED = 0.1  # of the gap wanted: what the bend of the spans may lose where none is split further
@@ -30,64 +30,6 @@ FEWEST_UNSEEN = 8  # subproblems split before a box is shown that is not settled
 MOST_UNSEEN = 256  # that many where those shown before told nothing new
 
 
-@dataclass(frozen=True)
-class Relaxation:
-    """The least box over the convex hulls of the walls.
-
-    Attributes:
-        low: Lower faces of the box found, shape (6,).
-        high: Upper faces.
-        place: Where along each wall it meets the hull, shape (k,).
-        lost: How much more a wall would press had its cells no pads, in [rad], shape (k,).
-    """
-
-    low: Array
-    high: Array
-    place: Array
-    lost: Array
-
-
-@dataclass(order=True)
-class Subproblem:
-    """Boxes of which it is known through which spans they lead.
-
-    Attributes:
-        bound: None of them is smaller, in [rad].
-        number: To order those with equal bounds.
-        spans: The spans, sorted by their walls, columns as in `cells`, shape (n, 5).
-        n_walls: Of how many walls.
-        low: The lower faces are not above these, in [rad], shape (6,).
-        high: The upper faces are not below these.
-    """
-
-    bound: float
-    number: int
-    spans: np.ndarray = field(compare=False)
-    n_walls: int = field(compare=False)
-    low: Array = field(compare=False)
-    high: Array = field(compare=False)
-    found: Relaxation | None = field(default=None, compare=False)
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A box that holds a point of every wall, as far as the proof can tell.
-
-    Attributes:
-        bound: Of its subproblem in [rad].
-        low: Lower faces in [rad], shape (6,).
-        high: Upper faces.
-        settled: Whether nothing is gained by splitting its subproblem further.
-        keys: The families and images that each pass with walls has left, by pass.
-    """
-
-    bound: float
-    low: Array
-    high: Array
-    settled: bool
-    keys: dict[int, list[Key]]
-
-
 class BoxProof:
     """Branch and bound for the least box.
 
@@ -96,6 +38,8 @@ class BoxProof:
         cut: Cuts a cell of a wall into smaller ones.
         threshold: Boxes of this size or more in [rad] are of no interest.
         gap: Fraction by which the bound may stay below the threshold.
+        clear: Leaves out cells that are forbidden: asked only of what is left of a subproblem
+            when nothing is gained by splitting it further.
     """
 
     def __init__(
@@ -104,9 +48,11 @@ class BoxProof:
         cut: Callable[[Piece, int], Sequence[Piece]],
         threshold: float,
         gap: float,
+        clear: Clear | None = None,
     ) -> None:
         self._cells = Cells(images, cut)
         self._gap = gap
+        self._clear = clear
         self.threshold = threshold
         self.stuck = np.inf  # least bound of what could not be split
         self.subproblems = 0
@@ -162,6 +108,8 @@ class BoxProof:
         settled = self._branch is None
         if node.n_walls < len(self.walls):
             self.put_back() if settled else self.split()
+            return None
+        if settled and self._clear is not None and self._leave_out(self._clear):
             return None
         self._unseen += 1
         if not settled and self._unseen < self._show_after:
@@ -244,6 +192,16 @@ class BoxProof:
                 break
         node.spans, node.n_walls, node.low, node.high = spans, n_walls, low, high
         node.found = Relaxation(box[0], box[1], place, lost)
+        return True
+
+    def _leave_out(self, clear: Clear) -> bool:
+        """Leave forbidden cells out of the last subproblem; return whether there were any."""
+        node = self._kept
+        spans = self._cells.cleared(node.spans, clear)
+        if spans is None:
+            return False
+        if len(np.unique(spans[:, WALL])) == node.n_walls:
+            self._push(node.bound, spans, node.n_walls, node.low, node.high)
         return True
 
     def _few_cells(self, spans: np.ndarray) -> np.ndarray:

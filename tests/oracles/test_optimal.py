@@ -213,7 +213,7 @@ def test_what_is_left_out_of_a_wall_collides_all_over():
         t = np.linspace(piece.at[0], piece.at[-1], 400)
         q = inverse_kinematics(cell.robot.arm, cell.Ts_base_flange(t, T_workpiece_cutter))
         inside = np.zeros(len(t), dtype=bool)
-        for left in obstructions.clear(piece):
+        for left in obstructions.clear(piece, 0, len(piece.pad_low)) or [piece]:
             inside |= (t >= left.at[0]) & (t <= left.at[-1])
         for branch in (piece.family, piece.family + 4):
             left_out.append(q[~inside, branch])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from opl.planning.holders import holders
+from opl.search.least_box import BoxProof
 from opl.search.walls import Image, Line, Piece, Wall
 
 SAME = (Image(np.ones(6), np.zeros(6), (0,)),)
@@ -47,3 +48,32 @@ def test_without_a_holder_the_others_still_need_their_own_box():
     assert joints[1.0] == (1,)
     assert set(joints[2.0]) == {0, 1}
     assert all(one.bound_without <= value for one in found)
+
+
+def test_what_is_forbidden_is_left_out_of_the_least_box_and_asked_for_where_it_matters():
+    corners = np.outer(np.linspace(0.0, 1.0, 11), np.eye(6)[0])
+    nothing = np.zeros((10, 6))
+    ramp = Piece(0, Line(np.eye(4)), np.linspace(0.0, 1.0, 11), corners, nothing, nothing)
+    asked = []
+
+    def without_the_lowest(piece, first, end):
+        asked.append((first, end))
+        allowed = [
+            cell
+            for cell in range(first, end)
+            if piece.corners[cell, 0] > 0.25 or len(piece.pad_low) == 1
+        ]
+        if len(allowed) == end - first:
+            return None
+        return [piece.part(allowed[0], end)] if allowed else []
+
+    proof = BoxProof(lambda _: SAME, lambda *_: (), 0.5, 1e-3, without_the_lowest)
+    proof.add(point_wall(0, np.zeros(6)))
+    proof.add(Wall(0, 1.0, (ramp,)))
+    candidate = None
+    while candidate is None or not candidate.settled:
+        if candidate is not None:
+            proof.split()
+        candidate = proof.take_next()
+    assert candidate.bound == pytest.approx(0.3, abs=2e-3)
+    assert (0, 10) not in asked

@@ -1,0 +1,68 @@
+"""Subproblems of the search for the least box, and what is found of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from opl.geometry.frames import Array
+from opl.search.cells import Key
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """The least box over the convex hulls of the walls.
+
+    Attributes:
+        low: Lower faces of the box found, shape (6,).
+        high: Upper faces.
+        place: Where along each wall it meets the hull, shape (k,).
+        lost: How much more a wall would press had its cells no pads, in [rad], shape (k,).
+    """
+
+    low: Array
+    high: Array
+    place: Array
+    lost: Array
+
+
+@dataclass(order=True)
+class Subproblem:
+    """Boxes of which it is known through which spans they lead.
+
+    Attributes:
+        bound: None of them is smaller, in [rad].
+        number: To order those with equal bounds.
+        spans: The spans, sorted by their walls, columns as in `cells`, shape (n, 5).
+        n_walls: Of how many walls.
+        low: The lower faces are not above these, in [rad], shape (6,).
+        high: The upper faces are not below these.
+    """
+
+    bound: float
+    number: int
+    spans: np.ndarray = field(compare=False)
+    n_walls: int = field(compare=False)
+    low: Array = field(compare=False)
+    high: Array = field(compare=False)
+    found: Relaxation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A box that holds a point of every wall, as far as the proof can tell.
+
+    Attributes:
+        bound: Of its subproblem in [rad].
+        low: Lower faces in [rad], shape (6,).
+        high: Upper faces.
+        settled: Whether nothing is gained by splitting its subproblem further.
+        keys: The families and images that each pass with walls has left, by pass.
+    """
+
+    bound: float
+    low: Array
+    high: Array
+    settled: bool
+    keys: dict[int, list[Key]]
