@@ -33,6 +33,9 @@ MOST_ROUNDS = 4  # of asking the joints again after moves were slowed for their 
 # Changes of speed from one move to the next, as `_suddenness` has them, that the corners of a time
 # law leave as well: its own are up to 1.3 of what a joint can, because they take more than a move.
 SUDDEN = 1.4
+# Configurations nearer to each other than this in every joint [rad] are one: a micrometre at the
+# end of the arm, a tenth of an encoder pulse.
+SAME_CONFIGURATION = 1e-6
 SHORTEST_FREE = 0.05  # [s] of a free move: a shorter one is over before a robot is at its speed
 
 
@@ -94,7 +97,9 @@ def time_motion(
     moved = np.linalg.norm(np.diff(p_flange, axis=0, prepend=p_flange[:1]), axis=1)
     distance = np.where(grinding, surface_distance, moved)
     counts = np.where(grinding, counted(surface_distance, least, process.feed), 1.0)
-    wanted = np.maximum(fastest / process.air_speed, np.where(motion.free, SHORTEST_FREE, 0.0))
+    # a move to where it begins is none, and not written
+    moves_freely = motion.free & (turned.max(axis=1) > SAME_CONFIGURATION)
+    wanted = np.maximum(fastest / process.air_speed, np.where(moves_freely, SHORTEST_FREE, 0.0))
     wanted[grinding] = least[grinding]
 
     duration = np.maximum(wanted, fastest)

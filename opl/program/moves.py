@@ -19,15 +19,13 @@ from numpy.typing import NDArray
 from opl.errors import UnsafeError
 from opl.geometry.frames import Array
 from opl.motion.motion import Motion, MoveKind, Phase, TimedMotion, VerifiedMotion
+from opl.motion.timing import SAME_CONFIGURATION
 from opl.program.actions import NO_ACTIONS, Action, Actions
 from opl.program.stops import actions_at, stops_at
 
 # Speed of the move to the first configuration. Nothing is known of where the robot starts from, so
 # that move is proven by nobody but the person who watches it.
 START_SPEED = 0.05
-# Configurations nearer to each other than this in every joint [rad] are one: a micrometre at the
-# end of the arm, a tenth of an encoder pulse.
-SAME_CONFIGURATION = 1e-6
 # What a move may need above a joint's top speed before it is refused: the last digit of a speed.
 OVERSPEED = 1e-4
 

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from opl.findings import Finding, Level
 from opl.job.load import Job
 from opl.motion.motion import Motion
+from opl.motion.timing import SAME_CONFIGURATION
 from opl.program.events import Event, meanings
-from opl.program.moves import SAME_CONFIGURATION, START_SPEED, Move, Program
+from opl.program.moves import START_SPEED, Move, Program
 from opl.program.played import Playback, Reading
 from opl.program.posts import find_post
 from opl.program.stops import actions_at

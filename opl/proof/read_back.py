@@ -21,8 +21,9 @@ from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion, VerifiedMotion
+from opl.motion.timing import SAME_CONFIGURATION
 from opl.planning.positions import PositionRule
-from opl.program.moves import SAME_CONFIGURATION, Program
+from opl.program.moves import Program
 from opl.program.played import Playback
 from opl.program.posts import find_post
 from opl.proof.corners import CornerProof, corner_proof, tool_points_of

@@ -17,8 +17,7 @@ import numpy as np
 
 from opl.findings import Finding, Level
 from opl.motion.motion import Motion, MoveKind, Phase, TimedMotion
-from opl.motion.timing import Timing
-from opl.program.moves import SAME_CONFIGURATION
+from opl.motion.timing import SAME_CONFIGURATION, Timing
 from opl.program.played import Playback, ReadMove, SpeedUnit
 from opl.program.posts import PASS_TIME_TOLERANCE
 from opl.program.speeds import MOST_CORRECTION

@@ -11,8 +11,8 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion, TimedMotion
-from opl.motion.timing import time_motion
-from opl.program.moves import SAME_CONFIGURATION, Purpose
+from opl.motion.timing import SAME_CONFIGURATION, time_motion
+from opl.program.moves import Purpose
 from opl.program.played import Playback
 from opl.program.posts import Reader
 from opl.program.settings import PositionForm

@@ -202,24 +202,30 @@ class _Labels:
         for index in np.unique(pass_index):
             on_pass = np.flatnonzero(pass_index == index)
             begin, end = on_pass[0], on_pass[-1]
-            before = self._lead(configuration[begin], point[begin], t[begin], -1)
-            for k in before[:-1]:  # the move to the farthest of them is free
+            before, met = self._lead(configuration[begin], point[begin], t[begin], -1)
+            # the move to the farthest of them is free, unless it is one of the way back as well
+            for k in before if met else before[:-1]:
                 self._mark(k, MoveKind.APPROACH, index, np.nan, np.nan)
             firsts.append(min(before, default=int(configuration[begin])))
-            after = self._lead(configuration[end], point[end], t[end], 1)
+            after, _ = self._lead(configuration[end], point[end], t[end], 1)
             for k in after:
                 self._mark(k, MoveKind.RETRACT, index, np.nan, np.nan)
             lasts.append(max(after, default=int(configuration[end])))
         return firsts, lasts
 
-    def _lead(self, k: int, point: int, t: float, side: int) -> list[int]:
-        """Return the configurations off the wheel along the lead next to k, nearest first."""
+    def _lead(self, k: int, point: int, t: float, side: int) -> tuple[list[int], bool]:
+        """Return the configurations off the wheel along the lead next to k, nearest first.
+
+        And whether it goes on to the end of the retract before it: a part that turns back on its
+        row comes the way it left, with no free move in between.
+        """
         T_workpiece_cutter = self._segments.points.Ts_workpiece_cutter[point]
         T_contact_contact0 = inverse(self._segments.wheel.T_contact0_contact(t))
         direction = self._segments.points.direction_at(point)
-        farthest, found = 0.0, []
+        farthest = 0.0
+        found: list[int] = []
         j = int(k) + side
-        while 0 <= j < len(self._kind) and self._kind[j] is MoveKind.HOME:
+        while 0 <= j < len(self._kind) and self._kind[j] in (MoveKind.HOME, MoveKind.RETRACT):
             if not self._given[j]:
                 j += side
                 continue
@@ -231,10 +237,12 @@ class _Labels:
                 break
             if along > self._rule.approach_length + self._rule.approach_run + FARTHER:
                 break
+            if self._kind[j] is MoveKind.RETRACT:
+                return found, along > farthest + AT_POINT
             farthest = along
             found.append(j)
             j += side
-        return found
+        return found, False
 
     def _along_lead(self, p_contact: Array, side: int, direction: float) -> tuple[float, float]:
         """Return how far along approach or retract a point is and how far beside it, in [m].

@@ -491,3 +491,14 @@ def test_times_are_asked_for_by_the_places_that_are_recognised_in_the_file():
     # what the digits of the speeds leave
     np.testing.assert_allclose(asked.duration, times.duration, rtol=1e-3, atol=1e-4)
     assert [str(kind) for kind in asked.motion.kind] == [str(kind) for kind in times.motion.kind]
+
+
+@pytest.mark.parametrize("controller", ["DX200", "RAPID"])
+def test_a_part_that_turns_back_on_its_row_comes_the_way_it_left(tmp_path, controller):
+    changes = {**SHORT, "passes.order": "both", "program.controller": controller}
+    job = write_job(tmp_path, changes, quick=False)
+    run = opl("run", job, "--out", tmp_path / "out")
+    assert run.status == 0, run.err
+    program = next(path for path in (tmp_path / "out").iterdir() if path.suffix in (".JBI", ".mod"))
+    verified = opl("verify", job, program)
+    assert verified.status == 0, verified.err

@@ -11,6 +11,7 @@ from opl.cell.robot import Robot
 from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.frames import Array
+from opl.motion.timing import SAME_CONFIGURATION
 from opl.program.controller import ControllerProfile
 from opl.program.events import Event
 from opl.program.inform.heads import head_findings
@@ -18,7 +19,7 @@ from opl.program.inform.job import InformJob
 from opl.program.inform.sequence import Doing, Visit, first_job, visits
 from opl.program.inform.times import job_configurations, written_speed
 from opl.program.inform.words import STOP_LEVEL, radius_tag
-from opl.program.moves import SAME_CONFIGURATION, START_SPEED
+from opl.program.moves import START_SPEED
 from opl.program.played import (
     Corner,
     Corners,
