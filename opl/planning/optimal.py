@@ -124,7 +124,7 @@ class OptimalSearch:
         """Why the bound is further off than wanted, None if it is not."""
         if self.lower_bound >= self._value * (1.0 - self._settings.widen):
             return None
-        if self._given_up >= MOST_GIVEN_UP:
+        if self.work_share < 1.0:
             return "no motion was found nearer to the bound"
         return "the work allowed for the proof was done before it was complete"
 
