@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import faulthandler
 import os
 import signal
@@ -30,7 +31,8 @@ def stopped_at_once() -> Iterator[None]:
 
     Nothing is raised: an exception would have to make its way through libraries of C++, which do
     not know it, and through imports, which swallow some. What a delivery has half done the next
-    run puts in order, as after a crash.
+    run puts in order, as after a crash. A process whose command has ended goes on to its end: what
+    it did is whole, and so is its exit status.
     """
 
     def stop(number: int, frame: FrameType | None) -> NoReturn:
@@ -39,8 +41,19 @@ def stopped_at_once() -> Iterator[None]:
         os.write(2, f"{restored}error: stopped\n".encode())
         os._exit(STATUS)
 
-    with _handled_by(stop):
-        yield
+    try:
+        with _handled_by(stop):
+            yield
+    finally:
+        # the first to be called at the end: Python takes a while to leave
+        atexit.unregister(_ignored)
+        atexit.register(_ignored)
+
+
+def _ignored() -> None:
+    """Let no signal stop a process that leaves."""
+    for one in _SIGNALS:
+        signal.signal(one, signal.SIG_IGN)
 
 
 @contextmanager
