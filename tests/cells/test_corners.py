@@ -96,11 +96,15 @@ def off_by_hand(corner, left, begun):
     T = inverse(wheel.T_base_contact0) @ forward_kinematics(job.cell.robot, q)
     pass_places = points.pass_index == points.pass_index[int(corner.before.place[0])]
     first, last = np.flatnonzero(pass_places)[[0, -1]]
-    near = np.clip(place + np.linspace(-0.7, 0.7, 701), first, last)
-    Ts = T @ job.cell.T_flange_workpiece @ points.frames_at(near)
-    t = contact_positions(wheel, Ts)
-    seen = (inverse(wheel.T_contact0_contact(t)) @ Ts)[:, :3, 3]
-    at = int(np.abs(seen[:, 0]).argmin()) if abs(t[350]) > wheel.flat_end else 350
+    rolls, reach = False, 0.7
+    for _ in range(2):  # the second time a hundred times closer together
+        near = np.clip(place + np.linspace(-reach, reach, 701), first, last)
+        Ts = T @ job.cell.T_flange_workpiece @ points.frames_at(near)
+        t = contact_positions(wheel, Ts)
+        seen = (inverse(wheel.T_contact0_contact(t)) @ Ts)[:, :3, 3]
+        rolls |= abs(t[350]) > wheel.flat_end
+        at = int(np.abs(seen[:, 0]).argmin()) if rolls else 350
+        place, reach = near[at], reach / 100.0
     return max(abs(seen[at, 2]), abs(float(wheel.signed_distance(Ts[at, :3, 3]))))
 
 
