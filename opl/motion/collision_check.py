@@ -74,12 +74,12 @@ class MoveCheck:
         self._looked_at = cell, scene, part
         self._known: dict[bytes, CollidingMove | None] = {}
 
-    def colliding(self, motion: Motion, asked: NDArray[np.bool_] | None = None) -> Faults:
-        """Return which moves of a motion collide, of those asked for, once each, in order.
+    def colliding(self, motion: Motion, chosen: NDArray[np.bool_] | None = None) -> Faults:
+        """Return which moves of a motion collide, of those chosen, once each, in order.
 
-        `asked` are flags of the moves by the configurations that they end at, shape (n,).
+        `chosen` are flags of the moves by the configurations that they end at, shape (n,).
         """
-        moves = range(len(motion)) if asked is None else np.flatnonzero(asked).tolist()
+        moves = range(len(motion)) if chosen is None else np.flatnonzero(chosen).tolist()
         free = motion.free
         keys = {
             move: motion.q[max(move - 2, 0) : move + 1].tobytes()
@@ -101,20 +101,20 @@ def colliding_moves(
     scene: CollisionScene,
     part: PartTree,
     motion: Motion,
-    asked: NDArray[np.bool_] | None = None,
+    chosen: NDArray[np.bool_] | None = None,
 ) -> Faults:
     """Return every move of a motion that collides, once each, in order.
 
     The part may sink into the belt by its largest penetration while it is on the wheel, on
     approaches and on retracts; on free moves it keeps its clearance from the wheel. Only moves that
-    are asked for are looked at, flags by the configurations that they end at, shape (n,).
+    are chosen are looked at, flags by the configurations that they end at, shape (n,).
     """
-    if asked is None:
-        asked = np.ones(len(motion), dtype=bool)
-    sunk, sunk_at_end = _at_wheel(cell, part, motion, asked)
+    if chosen is None:
+        chosen = np.ones(len(motion), dtype=bool)
+    sunk, sunk_at_end = _at_wheel(cell, part, motion, chosen)
     q, move = densify(motion.q, RESOLUTION)
     # a move that is refused for the wheel need not be checked further
-    unrefused = (asked & ~sunk)[move]
+    unrefused = (chosen & ~sunk)[move]
     hits = np.zeros(len(q), dtype=bool)
     hits[unrefused] = scene.collides(q[unrefused])
     faults = []
@@ -130,7 +130,7 @@ def colliding_moves(
 
 
 def _at_wheel(
-    cell: WorkCell, part: PartTree, motion: Motion, asked: NDArray[np.bool_]
+    cell: WorkCell, part: PartTree, motion: Motion, chosen: NDArray[np.bool_]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return which moves bring the part too near to the wheel, and which of them end there.
 
@@ -157,17 +157,17 @@ def _at_wheel(
     needed = np.where(motion.free, cell.part_from_wheel, -cell.planned_penetration)[move]
     half = np.concatenate([[0.0], moved / counts / 2.0])[move]
     # a move begins where the one before it ends
-    looked_at = asked[move]
+    looked_at = chosen[move]
     looked_at[:-1] |= looked_at[1:]
     found = np.full(len(q), np.inf)
     found[looked_at] = distance(q[looked_at], (needed + half)[looked_at])
     sunk = np.zeros(len(motion), dtype=bool)
     sunk[move[found < needed]] = True
-    sunk &= asked
+    sunk &= chosen
     at_end = (found < needed)[np.concatenate([[0], np.cumsum(counts)])]
     near = found < needed + half
     near[1:] |= near[:-1]
-    unsure = np.flatnonzero(near & (half > 0.0) & (asked & ~sunk)[move])
+    unsure = np.flatnonzero(near & (half > 0.0) & (chosen & ~sunk)[move])
     between = np.arange(1, FINER)[:, None] / FINER
     finer = (q[unsure - 1, None] + between * (q[unsure] - q[unsure - 1])[:, None]).reshape(-1, 6)
     at = np.repeat(unsure, FINER - 1)
