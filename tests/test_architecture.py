@@ -67,6 +67,7 @@ HOMES = {
         "cell/separating",
         "search",
         "motion/fewest",
+        "motion/long_runs",
         "motion/corner_error",
         "motion/line_error",
     },
