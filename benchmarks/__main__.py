@@ -24,6 +24,7 @@ from benchmarks.results import write_results
 SIZES = (100, 300, 1000, 3000, 10_000)
 POSITIONS = (35, 140, 560)
 V_STEP, V_POINTS = 4.0, 300  # of the V job: longest step in [mm], cutter points
+EQUAL_FIELD = (1000, 140)  # cutter points and contact positions for opl and Descartes
 BARS = {"opl --help": 0.3, "opl show": 0.5, "V, 300 points x 140": 3.0}
 SIZE_BARS = {1000: 8.0, 10_000: 75.0}
 
@@ -35,6 +36,12 @@ def main() -> None:
     parser.add_argument("--sizes", type=int, nargs="*", default=SIZES)
     parser.add_argument("--positions", type=int, nargs="*", default=POSITIONS)
     parser.add_argument("--most-seconds", type=float, default=600.0, help="of a whole run")
+    parser.add_argument(
+        "--descartes",
+        type=Path,
+        metavar="PYTHON",
+        help="of a virtual environment with tesseract-robotics-nanobind (0.35.0.3 was used)",
+    )
     parser.add_argument("--out", type=Path, default=Path(__file__).parent)
     asked = parser.parse_args()
     rows: list[Row] = []
@@ -56,11 +63,20 @@ def main() -> None:
                 sizes[n_points], profiles[name] = row.ours, profile
                 _tell(row)
     # not before: a process begins with the memory of the one that starts it
-    from benchmarks.stages import stage_rows
+    from benchmarks.stages import equal_field, stage_rows
 
     for row in stage_rows(asked.runs):
         rows.append(row)
         _tell(row)
+    if asked.descartes is not None:
+        from benchmarks.descartes import descartes_row
+
+        with tempfile.TemporaryDirectory() as folder:
+            field = equal_field(*EQUAL_FIELD)
+            beside = descartes_row(field, asked.descartes, Path(folder), asked.most_seconds)
+        if beside is not None:
+            rows.append(beside)
+            _tell(beside)
     slower = write_results(asked.out, rows, profiles, sizes)
     print("\n".join(slower) or "nothing became slower")
 

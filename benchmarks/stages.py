@@ -22,6 +22,7 @@ from opl.planning.scene import planning_scene
 from opl.planning.survey import widest_branch
 from opl.verification.replay import replay
 
+V_ROW = 234.0  # [mm] of one row, about
 SAMPLE = 2000  # of what is held against a reference that takes one thing at a time
 
 
@@ -51,6 +52,15 @@ def stage_rows(runs: int) -> Iterator[Row]:
             lambda: replay(job.cell, points, motion, job.search.max_contact_error), min(runs, 3)
         )
         yield Row(f"verification in PyBullet, V {len(points)} points", SECOND, spent)
+
+
+def equal_field(n_points: int, n_positions: int) -> GrindingProblem:
+    """Return the problem of one row of the V with so many cutter points and contact positions."""
+    job = v_job(passes={"rows": 1, "max_step_mm": V_ROW / n_points})
+    points = opl.cut_surface(job).points
+    positions = job.cell.wheel.positions(n_positions)
+    scene = planning_scene(job.cell)
+    return build_problem(scene, points, positions, job.search.interpolation, job.process)
 
 
 def v_job(**changes: dict[str, Any]) -> Job:
