@@ -1,9 +1,10 @@
 """Runs random jobs that nobody tuned anything to. By hand: python -m benchmarks.strangers --seed 7.
 
 Each job is drawn, written as files into a folder of its own, and run as `opl run` does up to its
-path, or to its program with --whole, in a process that is ended when it takes too long. A job that
-is refused before its search, or has no path, counts with its cause and is drawn again, until as
-many as asked for were searched. The same seed draws the same jobs.
+path, or to its program with --whole, in a process that is ended when it takes too long; as many
+side by side as --workers says. A job that is refused before its search, or has no path, counts with
+its cause and is drawn again, until as many as asked for were searched. The same seed draws the same
+jobs, which --cases picks from: `--cases 3.0 17.2`. With --write the table goes into STRANGERS.md.
 """
 
 from __future__ import annotations
@@ -11,79 +12,30 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
-import os
-import platform
 import shutil
-import subprocess
 import time
-from collections import Counter, defaultdict
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from importlib.metadata import version
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from multiprocessing.connection import Connection
 from pathlib import Path
+from queue import SimpleQueue
+from threading import Lock
 from typing import Any
 
 import opl
 from benchmarks.stranger_jobs import Stranger, draw_job
+from benchmarks.stranger_table import HEAD, SEARCHED, Outcome, page, row
 from opl.cell.wheel_distance import use_threads
 from opl.run.preparing import prepare
 from opl.run.searches import search_path
 
-CLOSED = 0.002  # gap that counts as closed
 LONGEST = 120.0  # [s] that a job may take as a whole
 MOST_DRAWS = 12  # of one job until one can be searched
-LIBRARIES = ("numpy", "scipy", "numba", "pin", "pybullet")
+TABLE = Path(__file__).with_name("STRANGERS.md")
 Facts = dict[str, Any]  # fields of an outcome
-SEARCHED = ("ok", "unsafe", "timed out", "error")  # what counts; the others are drawn again
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a job.
-
-    Attributes:
-        index: Which job.
-        attempt: Which draw of it.
-        status: ``ok``, ``unsafe``, ``no_path``, ``bad input``, ``not reached``, ``timed out`` or
-            ``error``.
-        family: Of its part.
-        robot: Its arm.
-        axle: How the axle of its wheel lies.
-        points: Number of cutter points, 0 if they are not known.
-        passes: Number of passes.
-        sum_rad: Joint range sum found in [rad]; None if there is none.
-        bound_rad: Its lower bound in [rad].
-        search_s: Processor time of search and clearance in [s].
-        total_s: Wall-clock time from the job file on in [s].
-        cause: Why there is no program, or no gap.
-    """
-
-    index: int
-    attempt: int
-    status: str
-    family: str
-    robot: str
-    axle: str
-    points: int = 0
-    passes: int = 0
-    sum_rad: float | None = None
-    bound_rad: float | None = None
-    search_s: float = 0.0
-    total_s: float = 0.0
-    cause: str = ""
-
-    @property
-    def gap(self) -> float | None:
-        """Fraction by which the sum may exceed the least there is; None if nothing is proven."""
-        if self.sum_rad is None or self.bound_rad is None:
-            return None
-        return 1.0 - self.bound_rad / self.sum_rad
-
-    @property
-    def closed(self) -> bool:
-        """Whether the gap is as small as it should be."""
-        return self.gap is not None and self.gap <= CLOSED
+Draw = tuple[int, int]  # which job, and which draw of it
 
 
 class Processor:
@@ -112,9 +64,11 @@ def _path(job: opl.Job, watch: opl.Watch) -> Facts:
         with watch.stage(opl.Stage.SEARCH):
             plan = search_path(job.search, prepared.problem).plan
     except opl.NoPathError as error:
-        return {**facts, "status": "no_path", "cause": str(error)}
+        shut = error.message.startswith("no path:") or error.message.startswith("no path beyond")
+        status = "no_path" if shut else "not found"
+        return {**facts, "status": status, "cause": str(error)}
     facts.update(sum_rad=plan.path.joint_range_sum, bound_rad=plan.lower_bound)
-    return {**facts, "status": "ok"}
+    return {**facts, "status": "ok", "cause": plan.open_because or ""}
 
 
 def _program(job: opl.Job, out: Path, watch: opl.Watch) -> Facts:
@@ -191,20 +145,31 @@ class Worker:
 
 
 def run_strangers(
-    seed: int, indices: range, folder: Path, whole: bool, done: Callable[[Outcome], None]
-) -> list[Outcome]:
-    """Draw jobs and run them; return what became of every draw.
+    seed: int,
+    draws: Sequence[Sequence[Draw]],
+    folder: Path,
+    workers: int,
+    whole: bool,
+    done: Callable[[Outcome], None],
+) -> None:
+    """Draw jobs and run them side by side.
 
     Args:
         seed: Of all jobs.
-        indices: Which jobs.
+        draws: Of each job the draws of it, run until one can be searched.
         folder: Each draw gets a folder in here.
+        workers: How many are run at once.
         whole: Whether jobs are run to their end, not only to their path.
-        done: Called with each draw as it ends.
+        done: Called with each draw as it ends, never twice at once.
     """
-    outcomes, worker = [], Worker(whole)
-    for index in indices:
-        for attempt in range(MOST_DRAWS):
+    idle: SimpleQueue[Worker] = SimpleQueue()
+    for _ in range(workers):
+        idle.put(Worker(whole))
+    lock = Lock()
+
+    def run(job: Sequence[Draw]) -> None:
+        worker = idle.get()
+        for index, attempt in job:
             own = folder / f"{seed}_{index}_{attempt}"
             shutil.rmtree(own, ignore_errors=True)
             own.mkdir(parents=True)
@@ -212,12 +177,16 @@ def run_strangers(
             outcome = _outcome(index, attempt, drawn, worker)
             if drawn is None:
                 own.rmdir()
-            outcomes.append(outcome)
-            done(outcome)
+            with lock:
+                done(outcome)
             if outcome.status in SEARCHED:
                 break
-    worker.close()
-    return outcomes
+        idle.put(worker)
+
+    with ThreadPoolExecutor(workers) as threads:
+        list(threads.map(run, draws))
+    for _ in range(workers):
+        idle.get().close()
 
 
 def _outcome(index: int, attempt: int, drawn: Stranger | None, worker: Worker) -> Outcome:
@@ -227,76 +196,17 @@ def _outcome(index: int, attempt: int, drawn: Stranger | None, worker: Worker) -
     return Outcome(index, attempt, family=drawn.family, robot=drawn.robot, axle=drawn.axle, **facts)
 
 
-def row(outcome: Outcome) -> str:
-    """Return a line of the table."""
-    gap = "-" if outcome.gap is None else f"{100.0 * outcome.gap:.3f} %"
-    found = "-" if outcome.sum_rad is None else f"{outcome.sum_rad:.4f}"
-    cause = outcome.cause.split("\n")[0].replace("|", "/")[:160]
-    cells = (
-        f"{outcome.index}.{outcome.attempt}",
-        outcome.family,
-        outcome.robot,
-        outcome.axle,
-        f"{outcome.points} in {outcome.passes}",
-        outcome.status,
-        "yes" if outcome.closed else "no",
-        gap,
-        found,
-        f"{outcome.search_s:.1f}",
-        f"{outcome.total_s:.1f}",
-        cause,
-    )
-    return "| " + " | ".join(cells) + " |"
-
-
-HEAD = (
-    "| job | part | arm | axle | points, passes | status | closed | gap | sum, rad | search, s "
-    "| total, s | cause |\n|" + "---|" * 12
-)
-
-
-def page(seed: int, outcomes: list[Outcome]) -> str:
-    """Return the results as a page of Markdown."""
-    searched = [one for one in outcomes if one.status in SEARCHED]
-    closed = [one for one in searched if one.closed]
-    quick = [one for one in closed if one.search_s <= 10.0]
-    unproven = [one for one in searched if one.gap is None]
-    again = Counter(one.status for one in outcomes if one.status not in SEARCHED)
-    slowest = max((one.search_s for one in searched), default=0.0)
-    revision = subprocess.run(
-        ["git", "describe", "--always", "--dirty"],
-        capture_output=True, text=True, cwd=Path(__file__).parent, check=False,
-    ).stdout.strip()  # fmt: skip
-    versions = ", ".join(f"{name} {version(name)}" for name in LIBRARIES)
-    drawn_again = ", ".join(f"{count} {status}" for status, count in sorted(again.items()))
-    return "\n".join(
-        [
-            f"# Strangers, seed {seed}",
-            "",
-            f"{len(searched)} random jobs searched: {len(closed)} with a gap of at most "
-            f"{100.0 * CLOSED:g} %, {len(quick)} of them within 10 s of processor; "
-            f"{len(unproven)} without a bound; slowest {slowest:.1f} s. "
-            f"Drawn again: {drawn_again or 'none'}.",
-            "",
-            f"opl {opl.__version__} at {revision}, Python {platform.python_version()}, {versions}; "
-            f"{os.cpu_count()} processors. Search: processor time of search and clearance; total: "
-            "wall clock from the job file on.",
-            "",
-            HEAD,
-            *map(row, outcomes),
-            "",
-        ]
-    )
-
-
 def main() -> None:
     """Run the jobs, print the table line by line, and write it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--first", type=int, default=0, help="index of the first job")
+    parser.add_argument("--cases", nargs="+", help="draws to be run alone, such as 3.0")
+    parser.add_argument("--workers", type=int, default=1, help="jobs run at once")
     parser.add_argument("--folder", type=Path, default=Path("strangers"), help="of the jobs")
     parser.add_argument("--whole", action="store_true", help="replay, program and files as well")
+    parser.add_argument("--write", action="store_true", help=f"the table into {TABLE.name}")
     arguments = parser.parse_args()
     folder, seed = arguments.folder, arguments.seed
     folder.mkdir(parents=True, exist_ok=True)
@@ -309,13 +219,18 @@ def main() -> None:
 
     print(HEAD)
     indices = range(arguments.first, arguments.first + arguments.count)
-    run_strangers(seed, indices, folder, arguments.whole, done)
+    draws: list[list[Draw]] = [[(k, attempt) for attempt in range(MOST_DRAWS)] for k in indices]
+    if arguments.cases:
+        pairs = [case.split(".") for case in arguments.cases]
+        draws = [[(int(index), int(attempt))] for index, attempt in pairs]
+    run_strangers(seed, draws, folder, arguments.workers, arguments.whole, done)
     # what earlier runs of the same seed found counts too, the last of each draw
     lines = log.read_text(encoding="utf-8").splitlines()
     known = {(one.index, one.attempt): one for one in (Outcome(**json.loads(x)) for x in lines)}
     text = page(seed, [known[key] for key in sorted(known)])
-    (folder / f"{seed}.md").write_text(text, encoding="utf-8")
-    print(text.split("\n")[2])
+    for path in [folder / f"{seed}.md", *([TABLE] if arguments.write else [])]:
+        path.write_text(text, encoding="utf-8")
+    print(text.split("\n")[4])
 
 
 if __name__ == "__main__":

@@ -1,0 +1,134 @@
+"""Random jobs that were run, as a table."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import opl
+
+CLOSED = 0.002  # gap that counts as closed
+QUICK = 10.0  # [s] of processor that a search should take at the most
+LIBRARIES = ("numpy", "scipy", "numba", "pin", "pybullet")
+# what counts; the others are drawn again
+SEARCHED = ("ok", "unsafe", "not found", "timed out", "error")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job.
+
+    Attributes:
+        index: Which job.
+        attempt: Which draw of it.
+        status: ``ok``, ``unsafe``, ``no_path`` (every way is shut), ``not found`` (none within the
+            work allowed), ``bad input``, ``not reached``, ``timed out`` or ``error``.
+        family: Of its part.
+        robot: Its arm.
+        axle: How the axle of its wheel lies.
+        points: Number of cutter points, 0 if they are not known.
+        passes: Number of passes.
+        sum_rad: Joint range sum found in [rad]; None if there is none.
+        bound_rad: Its lower bound in [rad].
+        search_s: Processor time of search and clearance in [s].
+        total_s: Wall-clock time from the job file on in [s].
+        cause: Why there is no path or program, or why the gap is not closed.
+    """
+
+    index: int
+    attempt: int
+    status: str
+    family: str
+    robot: str
+    axle: str
+    points: int = 0
+    passes: int = 0
+    sum_rad: float | None = None
+    bound_rad: float | None = None
+    search_s: float = 0.0
+    total_s: float = 0.0
+    cause: str = ""
+
+    @property
+    def gap(self) -> float | None:
+        """Fraction by which the sum may exceed the least there is; None if nothing is proven."""
+        if self.sum_rad is None or self.bound_rad is None:
+            return None
+        return 1.0 - self.bound_rad / self.sum_rad
+
+    @property
+    def closed(self) -> bool:
+        """Whether the gap is as small as it should be."""
+        return self.gap is not None and self.gap <= CLOSED
+
+
+def row(outcome: Outcome) -> str:
+    """Return a line of the table."""
+    gap = "-" if outcome.gap is None else f"{100.0 * outcome.gap:.3f} %"
+    found = "-" if outcome.sum_rad is None else f"{outcome.sum_rad:.4f}"
+    cause = outcome.cause.split("\n")[0].replace("|", "/")[:160]
+    cells = (
+        f"{outcome.index}.{outcome.attempt}",
+        outcome.family,
+        outcome.robot,
+        outcome.axle,
+        f"{outcome.points} in {outcome.passes}",
+        outcome.status,
+        "yes" if outcome.closed else "no",
+        gap,
+        found,
+        f"{outcome.search_s:.1f}",
+        f"{outcome.total_s:.1f}",
+        cause,
+    )
+    return "| " + " | ".join(cells) + " |"
+
+
+HEAD = (
+    "| job | part | arm | axle | points, passes | status | closed | gap | sum, rad | search, s "
+    "| total, s | cause |\n|" + "---|" * 12
+)
+
+
+def page(seed: int, outcomes: Sequence[Outcome]) -> str:
+    """Return the results of a seed as a page of Markdown."""
+    searched = [one for one in outcomes if one.status in SEARCHED]
+    closed = [one for one in searched if one.closed]
+    quick = [one for one in closed if one.search_s <= QUICK]
+    unproven = [one for one in searched if one.gap is None]
+    again = Counter(one.status for one in outcomes if one.status not in SEARCHED)
+    slowest = max((one.search_s for one in outcomes), default=0.0)
+    revision = subprocess.run(
+        ["git", "describe", "--always", "--dirty"],
+        capture_output=True, text=True, cwd=Path(__file__).parent, check=False,
+    ).stdout.strip()  # fmt: skip
+    versions = ", ".join(f"{name} {version(name)}" for name in LIBRARIES)
+    drawn_again = ", ".join(f"{count} {status}" for status, count in sorted(again.items()))
+    return "\n".join(
+        [
+            f"# Strangers, seed {seed}",
+            "",
+            "Random jobs that nothing was tuned to, written by "
+            f"`python -m benchmarks.strangers --seed {seed}`. Each line is a draw, which the seed "
+            "and its numbers draw again.",
+            "",
+            f"{len(searched)} jobs searched: {len(closed)} with a gap of at most "
+            f"{100.0 * CLOSED:g} %, {len(quick)} of them within {QUICK:g} s of processor; "
+            f"{len(unproven)} without a bound; slowest {slowest:.1f} s of all drawn. "
+            f"Drawn again: {drawn_again or 'none'}.",
+            "",
+            f"opl {opl.__version__} at {revision}, Python {platform.python_version()}, {versions}; "
+            f"{os.cpu_count()} processors. Search: processor time of search and clearance; total: "
+            "wall clock from the job file on.",
+            "",
+            HEAD,
+            *map(row, outcomes),
+            "",
+        ]
+    )
