@@ -14,11 +14,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.robot import collision_shapes, forward_kinematics
+from opl.cell.robot import collision_shapes
 from opl.cell.separation import Bodies, Separation
 from opl.cell.workcell import PART, SECOND_OPINION, SECOND_OPINION_OF_A_LINK, WHEEL, WorkCell
-from opl.geometry.frames import Array, inverse, transform
-from opl.geometry.mesh import TriangleMesh, winding_number
+from opl.geometry.frames import Array, transform
+from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Body, Box, Cylinder
 
 BodyPair = tuple[str, str]
@@ -48,6 +48,12 @@ class CollisionScene:
         self._pairs: list[BodyPair] = []
         self._needed = np.array(self._choose_pairs(cell))
         self._bodies = Bodies.of(self._model, self._geometry)
+        meshes = [
+            isinstance(body.geometry, coal.BVHModelBase) for body in self._geometry.geometryObjects
+        ]
+        self._has_mesh = [
+            meshes[pair.first] or meshes[pair.second] for pair in self._geometry.collisionPairs
+        ]
         self._margins = self._needed
         self._asked = [0]  # of all scenes made of this one
         self._prepare(self._margins, range(0))
@@ -99,25 +105,6 @@ class CollisionScene:
         scene._prepare(self._margins + reserve, both_move)
         return scene
 
-    def less(self, amount: float) -> CollisionScene:
-        """Return the scene with less clearance [m]; below none, bodies must sink into each other.
-
-        That is not looked for where one of them is a mesh.
-        """
-        scene = copy(self)
-        margins = self._margins - amount
-        bodies = self._geometry.geometryObjects
-        meshes = [isinstance(body.geometry, coal.BVHModelBase) for body in bodies]
-        unchecked = [
-            index
-            for index, pair in enumerate(self._geometry.collisionPairs)
-            if margins[index] < 0.0 and (meshes[pair.first] or meshes[pair.second])
-        ]
-        scene._prepare(
-            np.where(np.isin(np.arange(len(margins)), unchecked), 0.0, margins), unchecked
-        )
-        return scene
-
     def levers(self) -> Array:
         """Return how far from each joint's axis anything it moves can ever be, in [m], shape (6,).
 
@@ -156,6 +143,38 @@ class CollisionScene:
             for k in np.flatnonzero(near.any(axis=1)) if near.any() else ():
                 found[first + k] = any(True for _ in self._hits(block[k], near[k]))
         return found
+
+    def collides_throughout(self, q: Array, turned: Array) -> np.ndarray:
+        """Return which configurations collide, and still do however little further they turn.
+
+        Two bodies do not come apart by more than the joints between them turn times their levers.
+        Those that would have to sink into each other for it to be sure are left out where one of
+        them is a mesh: that is not looked for.
+
+        Args:
+            q: In [rad], shape (n, 6).
+            turned: How far each joint may turn from there in [rad], shape (n, 6).
+        """
+        self._asked[0] += len(q)
+        near = self._separation.near(q, self._enough)
+        apart = turned @ self._separation.levers.T
+        hits = [self._stay(*of_one) for of_one in zip(q, near, apart, strict=True)]
+        return np.array(hits, dtype=bool)
+
+    def _stay(self, q: Array, near: np.ndarray, apart: Array) -> bool:
+        """Return whether one of the pairs marked collides even with so much less clearance."""
+        self.place(q)
+        for index in np.flatnonzero(near).tolist():
+            request = self._geometry_data.collisionRequests[index]
+            margin = request.security_margin
+            if margin < apart[index] and self._has_mesh[index]:
+                continue
+            request.security_margin = margin - float(apart[index])
+            hit = pin.computeCollision(self._geometry, self._geometry_data, index)
+            request.security_margin = margin
+            if hit:
+                return True
+        return False
 
     def colliding_pairs(self, q: Array) -> list[BodyPair]:
         """Return the names of every pair in collision at one configuration, shape (6,)."""
@@ -260,25 +279,6 @@ def _begin_anew(data: pin.GeometryData) -> None:
         warnings.simplefilter("ignore", DeprecationWarning)
         for request in (*data.collisionRequests, *data.distanceRequests):
             request.enable_cached_gjk_guess = False
-
-
-def enclosing_bodies(cell: WorkCell, q: Array) -> list[BodyPair]:
-    """Return flange or part with each obstacle they are inside of, at ``q``, shape (6,).
-
-    Collisions with a mesh are collisions with its triangles: whoever is wholly inside touches none
-    of them. A motion that starts outside of a mesh and never meets its surface stays outside, so it
-    is enough to look at one configuration.
-    """
-    T_base_flange = forward_kinematics(cell.robot, q)
-    p_base_part = transform(T_base_flange @ cell.T_flange_workpiece, cell.part.vertices[0])
-    points = {"flange": T_base_flange[:3, 3], PART: p_base_part}
-    return [
-        (name, body.name)
-        for body in cell.obstacles
-        if isinstance(body.shape, TriangleMesh) and body.shape.is_closed
-        for name, p_base in points.items()
-        if abs(winding_number(body.shape, transform(inverse(body.T_parent_body), p_base))) > 0.5
-    ]
 
 
 def _solid(body: Body) -> coal.CollisionGeometry:

@@ -84,6 +84,11 @@ class Separation:
         # the one that is moved by fewer joints first
         order = bodies.joint[pairs].argsort(axis=1, kind="stable")
         self._pairs = np.ascontiguousarray(np.take_along_axis(pairs, order, axis=1))
+        first, second = self._pairs.T
+        number = np.arange(len(bodies.axes))
+        between = (number >= bodies.joint[first, None]) & (number < bodies.joint[second, None])
+        # by how much a pair can come apart while a joint turns by 1 rad, in [m], shape (p, j)
+        self.levers = np.where(between, bodies.levers[second], 0.0)
         self._last = np.zeros(len(bodies.axes))
         self._best = np.zeros(len(pairs), dtype=np.int64)  # direction of each pair
         self.apart = np.full(len(pairs), -np.inf)  # at the last configuration, at the least, in [m]

@@ -1,7 +1,7 @@
 """Where along a wall the robot surely collides, whatever the posture within the pads of a cell.
 
-A cell counts as forbidden only if at its middle bodies are nearer than allowed by more than any
-point of them can move within the cell.
+A cell counts as forbidden only if at its middle bodies are nearer than allowed by more than they
+can come apart within the cell.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from opl.planning.cut_cells import halved
 from opl.planning.images import Images
 from opl.search.walls import Piece
 
-MOVED = np.array([0.0, 0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064])  # [m] within a cell
 MOST_WITHIN = 2  # halvings of a cell all in collision, but not deep enough to be sure
 
 
@@ -27,8 +26,7 @@ class Obstructions:
     """
 
     def __init__(self, collision: CollisionScene, images: Images) -> None:
-        self._levers = collision.levers()
-        self._scenes = [collision.less(moved) for moved in MOVED]
+        self._collision = collision
         self._flips = images.flips
         self._known: dict[int, tuple[Piece, dict[tuple[float, float], list[bool]]]] = {}
 
@@ -47,7 +45,7 @@ class Obstructions:
                 cell = middle.astype(int)
                 q = piece.corners[cell] + step[cell] * (middle - cell)[:, None]
                 turned = np.abs(step[cell]) * (high - low)[new, None] / 2.0 + pads[cell]
-                hit, near = self._collide(q, turned @ self._levers)
+                hit, near = self._collide(q, turned)
                 for k, *found in zip(new.tolist(), hit.tolist(), near.tolist(), strict=True):
                     known[asked[k]] = found
             both = np.array([known[cell] for cell in asked], dtype=bool)
@@ -77,22 +75,19 @@ class Obstructions:
             if not hit[start]
         ]
 
-    def _collide(self, q: Array, moved: Array) -> tuple[np.ndarray, np.ndarray]:
-        """Return where postures collide however they move, and where they do as they are.
+    def _collide(self, q: Array, turned: Array) -> tuple[np.ndarray, np.ndarray]:
+        """Return where postures collide however they turn, and where they do as they are.
 
         Args:
             q: In [rad], shape (n, 6).
-            moved: How far any point can move in [m], shape (n,).
+            turned: How far each joint can turn from there in [rad], shape (n, 6).
         """
         surely, near = np.ones(len(q), dtype=bool), np.ones(len(q), dtype=bool)
-        less = np.searchsorted(MOVED, moved)
         for sign, shift in self._flips:
             flipped = q * sign + shift
             now = np.flatnonzero(near)
-            near[now] = self._scenes[0].collides(flipped[now])
+            near[now] = self._collision.collides(flipped[now])
             surely &= near
-            for level, scene in enumerate(self._scenes):
-                now = np.flatnonzero(surely & (less == level))
-                surely[now] = scene.collides(flipped[now])
-            surely[less == len(MOVED)] = False
-        return surely, near & (moved < MOVED[-1] * len(MOVED))
+            now = np.flatnonzero(surely)
+            surely[now] = self._collision.collides_throughout(flipped[now], turned[now])
+        return surely, near

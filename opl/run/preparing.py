@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from opl.cell.collision import enclosing_bodies
+from opl.cell.enclosing import enclosing_bodies
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import PART, SECOND_OPINION_OF_A_LINK, WHEEL
