@@ -36,6 +36,7 @@ class PartTree:
         first: Index of each sphere's first triangle, shape (c,).
         end: Index after each sphere's last triangle, shape (c,).
         child: Index of each sphere's first child, the second follows it; 0 for a leaf, shape (c,).
+        looks: How many spheres and triangles were looked at so far, shape (1,).
     """
 
     triangles: Array
@@ -43,6 +44,7 @@ class PartTree:
     first: np.ndarray
     end: np.ndarray
     child: np.ndarray
+    looks: np.ndarray
 
 
 def part_tree(mesh: TriangleMesh) -> PartTree:
@@ -73,6 +75,7 @@ def part_tree(mesh: TriangleMesh) -> PartTree:
         np.ascontiguousarray(firsts),
         np.ascontiguousarray(ends),
         np.array(child, dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
     )
 
 
@@ -96,11 +99,12 @@ def signed_wheel_distance(
     shape = Ts_contact0_workpiece.shape[:-2]
     needs = np.array(np.broadcast_to(needed, shape), dtype=float).reshape(-1)
     flat = np.ascontiguousarray(Ts_contact0_workpiece.reshape(-1, 4, 4))
-    distances = np.empty(len(flat))
+    distances, looks = np.empty(len(flat)), np.empty(len(flat), dtype=np.int64)
     # to call threads costs as much as dozens of poses, and many times that on a busy machine
     kernel = _few_distances if len(flat) <= FEW else _distances
     tree = part.triangles, part.spheres, part.first, part.child
-    kernel(flat, *tree, wheel.width / 2.0, wheel.radius, needs, distances)
+    kernel(flat, *tree, wheel.width / 2.0, wheel.radius, needs, distances, looks)
+    part.looks[0] += looks.sum()
     return distances.reshape(shape)
 
 
@@ -121,25 +125,26 @@ def _sphere_bound(T, spheres, index, half_width, radius):  # type: ignore[no-unt
 
 
 @njit(
-    "float64(float64[:,::1],float64[:,:,::1],float64[:,::1],int64[::1],int64[::1],float64,float64,"
-    "float64)",
+    "Tuple((float64,int64))(float64[:,::1],float64[:,:,::1],float64[:,::1],int64[::1],int64[::1],"
+    "float64,float64,float64)",
     cache=True,
 )
 def _part_distance(  # type: ignore[no-untyped-def]
     T, triangles, spheres, first, child, half_width, radius, needed
 ):
-    """Distance of the part in one pose; see `signed_wheel_distance`."""
+    """Distance of the part in one pose, and how many looks that took."""
     room = np.empty((DEEPEST + 1, 9))
     waiting = np.empty(64, dtype=np.int64)  # deeper than any halving of an array can go
     bounds = np.empty(64)
     waiting[0] = 0
     bounds[0] = -np.inf
     n_waiting = 1
-    best = np.inf
+    best, looks = np.inf, 0
     while n_waiting > 0:
         n_waiting -= 1
         if bounds[n_waiting] >= min(best - TOLERANCE, needed):
             continue
+        looks += 1
         node = waiting[n_waiting]
         if child[node] == 0:
             best = nearest_on_triangle(
@@ -156,30 +161,30 @@ def _part_distance(  # type: ignore[no-untyped-def]
         waiting[n_waiting], bounds[n_waiting] = other, high
         waiting[n_waiting + 1], bounds[n_waiting + 1] = one, low
         n_waiting += 2
-    return best
+    return best, looks
 
 
 _POSES = (
     "void(float64[:,:,::1],float64[:,:,::1],float64[:,::1],int64[::1],int64[::1],"
-    "float64,float64,float64[::1],float64[::1])"
+    "float64,float64,float64[::1],float64[::1],int64[::1])"
 )
 
 
 @njit(_POSES, cache=True, parallel=True)
 def _distances(  # type: ignore[no-untyped-def]
-    poses, triangles, spheres, first, child, half_width, radius, needs, distances
+    poses, triangles, spheres, first, child, half_width, radius, needs, distances, looks
 ):
     for k in prange(len(poses)):
-        distances[k] = _part_distance(
+        distances[k], looks[k] = _part_distance(
             poses[k], triangles, spheres, first, child, half_width, radius, needs[k]
         )
 
 
 @njit(_POSES, cache=True)
 def _few_distances(  # type: ignore[no-untyped-def]
-    poses, triangles, spheres, first, child, half_width, radius, needs, distances
+    poses, triangles, spheres, first, child, half_width, radius, needs, distances, looks
 ):
     for k in range(len(poses)):
-        distances[k] = _part_distance(
+        distances[k], looks[k] = _part_distance(
             poses[k], triangles, spheres, first, child, half_width, radius, needs[k]
         )

@@ -21,7 +21,6 @@ from opl.search.in_box import missing_chords, nearest_points, sampled
 FINE = 33  # contact positions of a place at which a box is held against it
 ROW_SAMPLES = 8  # between two cutter points at one contact position
 POSTURES_OF_WORK = 400  # that cost a unit of work
-DISTANCES_OF_WORK = 50  # to the wheel that cost one
 BORDER = 1e-2  # belt units to look beyond what lies in the box
 HALVINGS = 10  # between a posture that is free and one that is not: where the free ones end
 
@@ -239,7 +238,6 @@ class ColumnSampler:
         for column in (np.floor(places).astype(int), np.ceil(places).astype(int)):
             near += cuts[column[:, None], after - 1].astype(int) + cuts[column[:, None], after]
         unsure = (near > 0) & (near < 4)
-        self.work += np.count_nonzero(unsure) / DISTANCES_OF_WORK
         distance = wheel_distances(self._problem.scene, Ts_workpiece_cutter, t, unsure)
         found = distance < -self._problem.cell.planned_penetration
         return np.asarray(np.where(unsure, found, near == 4))

@@ -33,11 +33,15 @@ def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
     return first_free(problem, matrices, _tracks(problem, matrices, start))
 
 
-def try_recursive(problem: GrindingProblem, start: Start, most_checks: int) -> SearchOutcome:
-    """Return what the recursive search finds within a number of checked motions."""
+def try_recursive(
+    problem: GrindingProblem, start: Start, most_checks: int | None, most_work: float = np.inf
+) -> SearchOutcome:
+    """Return what the recursive search finds within a number of checked motions, and work."""
     matrices = open_matrices(problem)
     tracks = _tracks(problem, matrices, start)
-    return propose_and_check(problem, matrices, tracks, most_checks=most_checks)
+    return propose_and_check(
+        problem, matrices, tracks, most_checks=most_checks, most_work=most_work
+    )
 
 
 def _tracks(problem: GrindingProblem, matrices: list[OpenMatrix], start: Start) -> Iterator[Track]:

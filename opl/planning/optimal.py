@@ -7,8 +7,8 @@ smoothest motion is sought, until nothing can be smaller than the best by more t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -96,7 +96,7 @@ class OptimalSearch:
         self._early = 0.0  # work on early motions
         self.proof = BoxProof(images.of, self._walls.finer, largest, PROOF_SHARE * settings.widen)
         self._places: set[float] = set()
-        self._work = Work(problem.scene.collision, self._walls, self._families, self._tracks)
+        self._work = Work(problem.scene, self._walls, self._families, self._tracks)
         self._work.begin_again(self.proof)
         self._crossings = Crossings(self._sampler, points)
         self._hope(self._families.smallest_grown())
@@ -208,7 +208,7 @@ class OptimalSearch:
             columns, _, inner = self._look(larger, placements)
             if inner is not None:
                 room = self._room(inner)
-                self._keep(self._tracks.plan(columns, (), inner, room, lambda _: False))
+                self.keep(self._tracks.plan(columns, (), inner, room, lambda _: False))
             self._early += self._work.done - before
 
     def _hope(self, box: JointBox | None) -> None:
@@ -260,41 +260,14 @@ class OptimalSearch:
                 self.proof.add(wall)
             return learnt
 
-        self._keep(self._tracks.plan(columns, rows, box, room, learn))
+        self.keep(self._tracks.plan(columns, rows, box, room, learn))
         return learnt
 
     def _room(self, box: JointBox) -> float:
         return ROOM_SHARE * self._settings.widen * box.size
 
-    def _keep(self, found: Plan | None) -> None:
+    def keep(self, found: Plan | None) -> None:
         """Keep a motion that is better than the best."""
         if found is not None and found.path.joint_range_sum < self._value:
             self.plan = found
             self.proof.threshold = min(self.proof.threshold, self._value)
-
-
-def plan_optimal(
-    problem: GrindingProblem,
-    settings: OptimalSettings,
-    fallback: Plan | None,
-    report: Callable[[float], None] = lambda _: None,
-) -> Plan | None:
-    """Find the collision-free motion with the least joint range sum, the smoothest of these.
-
-    Args:
-        problem: What is to be planned.
-        settings: What is wanted.
-        fallback: A motion that is known, if one is: joints and contact should travel no further.
-        report: Given how much of the work allowed is done, after every step; may raise.
-
-    Returns:
-        The plan with its lower bound; None only if no motion was known and none was found.
-    """
-    search = OptimalSearch(problem, settings, fallback)
-    while not search.finished:
-        search.step()
-        report(min(search.work_share, 1.0))
-    if search.plan is None:
-        return None
-    bound, why, held = search.lower_bound, search.open_because, search.holders()
-    return replace(search.plan, lower_bound=bound, open_because=why, holders=held)

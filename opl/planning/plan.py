@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import numpy as np
+
 from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
 from opl.planning.blocking import block
@@ -18,6 +20,8 @@ from opl.planning.open_matrix import OpenMatrix, Track
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import no_path
 from opl.planning.track_check import Collides, Free, check_track
+
+WORK_OF_A_CHECK = 0.4  # units, for each of the places of a motion, beside what the scene is asked
 
 
 @dataclass(frozen=True)
@@ -78,14 +82,20 @@ class Found:
 
 @dataclass(frozen=True)
 class Exhausted:
-    """No proposal is left, and none was free; so many motions were checked."""
+    """No proposal is left, and none was free; so many motions were checked.
+
+    Attributes:
+        checks: How many.
+        matrices: What is blocked, and why.
+    """
 
     checks: int
+    matrices: list[OpenMatrix]
 
 
 @dataclass(frozen=True)
 class OutOfBudget:
-    """A search ended before it came to an end: as many motions as allowed were checked."""
+    """A search ended before it came to an end: as much was done as is allowed."""
 
     checks: int
 
@@ -99,6 +109,7 @@ def propose_and_check(
     proposals: Iterable[Track],
     checks: int = 0,
     most_checks: int | None = None,
+    most_work: float = np.inf,
 ) -> SearchOutcome:
     """Check proposed tracks in turn until the motion of one is free; block what is not.
 
@@ -108,7 +119,10 @@ def propose_and_check(
         proposals: Tracks, best first.
         checks: How many motions were checked before.
         most_checks: How many to check at the most, those before included; None for no limit.
+        most_work: In units, after which no other is checked.
     """
+    first, begun = checks, problem.scene.work
+    of_a_check = WORK_OF_A_CHECK * len(problem.points)
     collided: dict[tuple[int, bytes], Collides] = {}
     for track in proposals:
         matrix = matrices[track.matrix]
@@ -124,9 +138,10 @@ def propose_and_check(
         block(problem, matrix, track.rows, found)
         if isinstance(found, Collides):
             collided[same] = found
-        if checks == most_checks:
+        done = problem.scene.work - begun + (checks - first) * of_a_check
+        if checks == most_checks or done >= most_work:
             return OutOfBudget(checks)
-    return Exhausted(checks)
+    return Exhausted(checks, matrices)
 
 
 def first_free(

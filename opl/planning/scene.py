@@ -11,6 +11,10 @@ from opl.cell.workcell import WorkCell
 from opl.motion.collision_check import MoveCheck
 from opl.motion.free_move_search import FreeMoveSearch
 
+# what makes a unit of work, which is counted so that it is the same on any machine
+QUERIES = 50  # configurations asked about for collisions
+LOOKS = 20_000  # at spheres and triangles of the part, for its distance to the wheel
+
 
 @dataclass(frozen=True)
 class PlanningScene:
@@ -25,6 +29,11 @@ class PlanningScene:
     cell: WorkCell
     collision: CollisionScene
     part: PartTree
+
+    @property
+    def work(self) -> float:
+        """What was asked so far, in units of work: about a millisecond each."""
+        return self.collision.queries / QUERIES + float(self.part.looks[0]) / LOOKS
 
     @cached_property
     def free_moves(self) -> FreeMoveSearch:

@@ -18,8 +18,9 @@ import numpy as np
 from opl.motion.figures import figures_of_path
 from opl.planning.costs import CostWeights, ObjectiveWeights, track_cost
 from opl.planning.least_cost import least_cost
+from opl.planning.least_range import plan_optimal
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
-from opl.planning.optimal import OptimalSettings, plan_optimal
+from opl.planning.optimal import OptimalSettings
 from opl.planning.plan import Found, ObjectiveValue, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem
 from opl.planning.symmetry import twins

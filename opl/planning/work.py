@@ -5,18 +5,17 @@ A unit is what takes about a millisecond.
 
 from __future__ import annotations
 
-from opl.cell.collision import CollisionScene
 from opl.planning.box_track import BoxTracks
 from opl.planning.columns import ColumnWalls
 from opl.planning.families import Families
+from opl.planning.plan import WORK_OF_A_CHECK
+from opl.planning.scene import QUERIES, PlanningScene
 from opl.search.least_box import BoxProof
 
 # what makes a unit, or how many units one makes
-QUERIES = 50  # configurations asked about for collisions
 NUMBERS = 1e6  # worked on in linear programs
 SUBPROBLEMS = 4
 WORK_OF_A_WALL = 50.0
-WORK_OF_A_CHECK = 1.0  # for each of the places of a motion
 
 
 def work_of_proof(proof: BoxProof) -> float:
@@ -28,7 +27,7 @@ class Work:
     """What was done, from when this was made.
 
     Args:
-        collision: The scene.
+        scene: Asked about collisions and distances.
         walls: Made so far.
         families: Held against boxes.
         tracks: Sampled and checked.
@@ -38,9 +37,9 @@ class Work:
     """
 
     def __init__(
-        self, collision: CollisionScene, walls: ColumnWalls, families: Families, tracks: BoxTracks
+        self, scene: PlanningScene, walls: ColumnWalls, families: Families, tracks: BoxTracks
     ) -> None:
-        self._collision, self._walls = collision, walls
+        self._scene, self._walls = scene, walls
         self._families, self._tracks = families, tracks
         self._before = -self._counted()
         self.proof: BoxProof | None = None
@@ -57,7 +56,7 @@ class Work:
         self.proof = proof
 
     def _counted(self) -> float:
-        asked = (self._collision.queries + self._tracks.queries) / QUERIES
+        asked = self._scene.work + self._tracks.queries / QUERIES
         made = self._walls.made * WORK_OF_A_WALL
         checked = self._tracks.places_checked * WORK_OF_A_CHECK
         return asked + made + checked + self._families.work + self._tracks.sampler.work

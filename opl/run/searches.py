@@ -14,18 +14,19 @@ from opl.planning.cheapest import plan_cheapest
 from opl.planning.costs import ObjectiveWeights
 from opl.planning.equals import quickest_of_equals
 from opl.planning.least_cost import least_cost
+from opl.planning.least_range import plan_optimal
 from opl.planning.multi_start import Start, plan_recursive, try_recursive
-from opl.planning.optimal import plan_optimal
-from opl.planning.plan import Found, ObjectiveValue, OutOfBudget, Plan, SearchOutcome
+from opl.planning.plan import Exhausted, Found, ObjectiveValue, OutOfBudget, Plan
 from opl.planning.problem import GrindingProblem
+from opl.planning.reasons import no_path
 from opl.planning.weighted import plan_weighted
-from opl.planning.work import WORK_OF_A_CHECK
 from opl.run.values import Prepared
 
 # of motions from the paper's start node, which are searched for comparison only
 MOST_CHECKS = 20
-MOST_LATER_CHECKS = 200  # where the proof found no motion either; more if it left work over
-MOST_FIRST_CHECKS = 40  # of motions of the recursive search, before the proof begins without it
+# of motions of the recursive search, before the proof begins without it, and units of work on them
+MOST_FIRST_CHECKS = 40
+MOST_FIRST_WORK = 3000.0
 
 
 @dataclass(frozen=True)
@@ -59,36 +60,41 @@ def search_path(
     Raises:
         NoPathError: If there is none.
     """
-    first: SearchOutcome | None = None
     if search.method is Method.OPTIMAL and search.objective is Objective.RANGE:
-        first = try_recursive(problem, search.start, MOST_FIRST_CHECKS)
-        if isinstance(first, OutOfBudget):
-            # what it proposes collides again and again: the proof knows better where not to look
-            done = 0.0
-
-            def note(share: float) -> None:
-                nonlocal done
-                done = share
-                report(share)
-
-            best = plan_optimal(problem, search.optimal, None, note)
-            if best is not None:
-                return FoundPaths(_finished(search, problem, best, nameable), best)
-            # a proof can end early: no track leads through the least boxes, a longer one may
-            left = search.optimal.max_subproblems * (1.0 - done)
-            most = int(left / (WORK_OF_A_CHECK * len(problem.points)))
-            first = try_recursive(problem, search.start, max(most, MOST_LATER_CHECKS))
-            if isinstance(first, OutOfBudget):
-                raise NoPathError(
-                    f"no path found: the {first.checks} best motions of the recursive search are "
-                    "not free, and the proof found none that is in the work allowed; more work, or "
-                    "more room around the robot, may help"
-                )
-    recursive = first.plan if isinstance(first, Found) else plan_recursive(problem, search.start)
-    plan = recursive
-    if search.method is Method.OPTIMAL:
-        plan = _search_best(search, problem, recursive, report)
+        plan, recursive = _search_range(search, problem, report)
+    else:
+        plan = recursive = plan_recursive(problem, search.start)
+        if search.method is Method.OPTIMAL:
+            plan = _search_best(search, problem, recursive, report)
     return FoundPaths(_finished(search, problem, plan, nameable), recursive)
+
+
+def _search_range(
+    search: Search, problem: GrindingProblem, report: Callable[[float], None]
+) -> tuple[Plan, Plan]:
+    """Return the plan of least joint range sum, and the recursive one where that was needed."""
+    last = try_recursive(problem, search.start, MOST_FIRST_CHECKS, MOST_FIRST_WORK)
+    known = last.plan if isinstance(last, Found) else None
+    if isinstance(last, Exhausted):
+        raise no_path(problem, last.matrices)
+
+    def otherwise(work: float) -> Plan | None:
+        nonlocal last
+        last = try_recursive(problem, search.start, None, work)
+        return last.plan if isinstance(last, Found) else None
+
+    # where all that is proposed collides, the proof knows better where not to look
+    best = plan_optimal(problem, search.optimal, known, report, otherwise)
+    if best is not None:
+        return best, last.plan if isinstance(last, Found) else best
+    if isinstance(last, Exhausted):
+        raise no_path(problem, last.matrices)
+    assert isinstance(last, OutOfBudget), "what was found is a plan"
+    raise NoPathError(
+        f"no path found: the {last.checks} best motions of the recursive search are not free, and "
+        "the proof found none that is in the work allowed; more work, or more room around the "
+        "robot, may help"
+    )
 
 
 def _finished(
@@ -107,8 +113,6 @@ def _search_best(
 ) -> Plan:
     settings = search.optimal
     change = settings.max_contact_change
-    if search.objective is Objective.RANGE:
-        return plan_optimal(problem, settings, recursive, report) or recursive
     if search.objective is Objective.WEIGHTED:
         weights = search.objective_weights
         return plan_weighted(problem, weights, settings, recursive, report)

@@ -1,0 +1,50 @@
+"""The motion of least joint range sum: the proof run to its end, or to the end of its work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from opl.planning.optimal import OptimalSearch, OptimalSettings
+from opl.planning.plan import Plan
+from opl.planning.problem import GrindingProblem
+
+OTHERWISE_SHARE = 0.3  # of the work: a motion sought in another way, where the proof found none
+
+
+def plan_optimal(
+    problem: GrindingProblem,
+    settings: OptimalSettings,
+    fallback: Plan | None,
+    report: Callable[[float], None] = lambda _: None,
+    otherwise: Callable[[float], Plan | None] | None = None,
+) -> Plan | None:
+    """Find the collision-free motion with the least joint range sum, the smoothest of these.
+
+    Args:
+        problem: What is to be planned.
+        settings: What is wanted.
+        fallback: A motion that is known, if one is: joints and contact should travel no further.
+        report: Given how much of the work allowed is done, after every step; may raise.
+        otherwise: Looks for a motion in another way, where the proof finds none, given how many
+            units of work are left for that.
+
+    Returns:
+        The plan with its lower bound; None only if no motion was known and none was found.
+    """
+    search = OptimalSearch(problem, settings, fallback)
+    share = 1.0 if otherwise is None else 1.0 - OTHERWISE_SHARE
+
+    def go_on(share: float) -> None:
+        while not search.finished and (search.plan is not None or search.work_share < share):
+            search.step()
+            report(min(search.work_share, 1.0))
+
+    go_on(share)
+    if search.plan is None and otherwise is not None:
+        search.keep(otherwise(OTHERWISE_SHARE * settings.max_subproblems))
+        go_on(1.0)
+    if search.plan is None:
+        return None
+    bound, why, held = search.lower_bound, search.open_because, search.holders()
+    return replace(search.plan, lower_bound=bound, open_because=why, holders=held)
