@@ -39,7 +39,7 @@ def stage_rows(runs: int) -> Iterator[Row]:
     yield from _kinematics(job, runs)
     problem = built(points)
     yield from _collisions(problem, runs)
-    layer = timed(lambda: wheel_distances(scene, points.Ts_workpiece_cutter, positions), runs)
+    layer = timed(lambda: wheel_distances(scene, points, positions), runs)
     n_nodes = problem.cuts.size
     yield Row(f"distance of part and wheel, {n_nodes} nodes", SECOND, layer)
     small = built(opl.cut_surface(v_job(passes={"rows": 1})).points)
@@ -100,7 +100,7 @@ def _collisions(problem: GrindingProblem, runs: int) -> Iterator[Row]:
     points, positions = problem.points, problem.field.contact_positions
 
     def whole_map() -> None:
-        wheel_distances(problem.scene, points.Ts_workpiece_cutter, positions)
+        wheel_distances(problem.scene, points, positions)
         scene.collides(nodes)
 
     bar = 0.35

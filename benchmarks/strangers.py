@@ -42,7 +42,7 @@ class Processor:
     """Processor time of the stages of a run."""
 
     def __init__(self) -> None:
-        self.seconds: dict[str, float] = defaultdict(float)
+        self._seconds: dict[str, float] = defaultdict(float)
         self._start: dict[str, float] = {}
 
     def __call__(self, stage: opl.Stage, fraction: float) -> None:
@@ -51,7 +51,13 @@ class Processor:
         if fraction == 0.0:
             self._start[stage.value] = now
         elif fraction == 1.0:
-            self.seconds[stage.value] += now - self._start[stage.value]
+            self._seconds[stage.value] += now - self._start.pop(stage.value)
+
+    def of(self, stage: str) -> float:
+        """Return that of a stage in [s], until now if it was broken off."""
+        begun = self._start.get(stage)
+        so_far = 0.0 if begun is None else time.process_time() - begun
+        return self._seconds[stage] + so_far
 
 
 def _path(job: opl.Job, watch: opl.Watch) -> Facts:
@@ -101,7 +107,7 @@ def _serve(pipe: Connection, whole: bool) -> None:
             facts = {"status": "bad input", "cause": str(error)}
         except Exception as error:  # what breaks here is a case, not the end of the benchmark
             facts = {"status": "error", "cause": f"{type(error).__name__}: {error}"}
-        facts["search_s"] = processor.seconds["search"] + processor.seconds["clearance"]
+        facts["search_s"] = processor.of("search") + processor.of("clearance")
         pipe.send(facts)
 
 

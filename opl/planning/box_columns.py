@@ -22,7 +22,6 @@ FINE = 33  # contact positions of a place at which a box is held against it
 ROW_SAMPLES = 8  # between two cutter points at one contact position
 POSTURES_OF_WORK = 400  # that cost a unit of work
 BORDER = 1e-2  # belt units to look beyond what lies in the box
-HALVINGS = 10  # between a posture that is free and one that is not: where the free ones end
 
 
 @dataclass(frozen=True)
@@ -117,7 +116,7 @@ class ColumnSampler:
         after = np.ceil(places).astype(int)
         # between cutter points near enough to see where the box may be met
         coarse = field[before] + (places - before)[:, None, None] * (field[after] - field[before])
-        free = ~self._cuts(places, there.Ts_workpiece_cutter, grid) & ~np.isnan(coarse[..., 0])
+        free = ~self._cuts(places, there, grid) & ~np.isnan(coarse[..., 0])
         t, _ = sampled(grid, coarse, free, box, FINE, whole=True)
         # where the part begins to cut is known to a hair only
         last = problem.cell.wheel.last_position
@@ -125,7 +124,6 @@ class ColumnSampler:
         columns = self.at(places, there, placements, t)
         if self.collisions:
             self._leave_out_collisions(columns, box)
-        self._move_to_borders(columns, box)
         return columns
 
     def _leave_out_collisions(self, columns: Columns, box: JointBox) -> None:
@@ -144,58 +142,16 @@ class ColumnSampler:
             asked |= near
             free[near] = ~self._problem.scene.collision.collides(columns.q[near])
 
-    def _move_to_borders(self, columns: Columns, box: JointBox) -> None:
-        """Move what is not free, beside the posture nearest to a box, to where the free ones end.
-
-        Samples alone let a box seem to miss a column that it meets between two of them.
-        """
-        points, t = columns.points, columns.t
-        missing, row = nearest_points(columns.q, columns.free, box)
-        at_sample = np.flatnonzero((missing > GROWN) & np.isfinite(missing) & (row % 1.0 == 0.0))
-        for step in (-1, 1):
-            here = row[at_sample].astype(int)
-            beside = np.clip(here + step, 0, t.shape[1] - 1)
-            shut = ~columns.free[at_sample, beside]
-            own, here, beside = at_sample[shut], here[shut], beside[shut]
-            if not len(own):
-                continue
-            places, inner, outer = columns.places[own], t[own, here], t[own, beside]
-            Ts, pass_index = points.Ts_workpiece_cutter[own], points.pass_index[own]
-            q = columns.q[own, here]
-            for _ in range(HALVINGS):
-                middle = (inner + outer) / 2.0
-                at = self._postures(places, Ts, pass_index, columns.placements, middle[:, None])
-                found, free = at[0][:, 0], at[1][:, 0]
-                if self.collisions:
-                    free[free] = ~self._problem.scene.collision.collides(found[free])
-                inner, outer = np.where(free, middle, inner), np.where(free, outer, middle)
-                q = np.where(free[:, None], found, q)
-            moved = inner != t[own, here]
-            own, beside = own[moved], beside[moved]
-            t[own, beside], columns.q[own, beside] = inner[moved], q[moved]
-            columns.free[own, beside] = True
-
     def at(
         self, places: Array, there: CutterPoints, placements: Sequence[Placement], t: Array
     ) -> Columns:
         """Return the postures of places at contact positions, shape (n, m)."""
-        Ts, pass_index = there.Ts_workpiece_cutter, there.pass_index
-        q, free = self._postures(places, Ts, pass_index, placements, t)
-        return Columns(places, there, tuple(placements), t, q, free)
-
-    def _postures(
-        self,
-        places: Array,
-        Ts_workpiece_cutter: Array,
-        pass_index: np.ndarray,
-        placements: Sequence[Placement],
-        t: Array,
-    ) -> tuple[Array, np.ndarray]:
-        """Return placed postures, shape (n, m, 6), and which may be used, shape (n, m)."""
+        problem = self._problem
         self.work += t.size / POSTURES_OF_WORK
-        q = inverse_solutions(self._problem.cell, Ts_workpiece_cutter[:, None], t)
-        q = self._placed(pass_index, q, placements)
-        return q, ~np.isnan(q[..., 0]) & ~self._cuts(places, Ts_workpiece_cutter, t)
+        q = inverse_solutions(problem.cell, there.Ts_workpiece_cutter[:, None], t)
+        q = self._placed(there.pass_index, q, placements)
+        free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
+        return Columns(places, there, tuple(placements), t, q, free)
 
     def row(
         self, first: float, last: float, t: float, must: bool, columns: Columns, box: JointBox
@@ -226,7 +182,7 @@ class ColumnSampler:
             for row, q in zip(rows, np.split(placed, np.cumsum(counts)[:-1]), strict=True)
         ]
 
-    def _cuts(self, places: Array, Ts_workpiece_cutter: Array, t: Array) -> np.ndarray:
+    def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m).
 
         Where all nodes of the field around a place and contact position agree, so does what lies
@@ -238,7 +194,7 @@ class ColumnSampler:
         for column in (np.floor(places).astype(int), np.ceil(places).astype(int)):
             near += cuts[column[:, None], after - 1].astype(int) + cuts[column[:, None], after]
         unsure = (near > 0) & (near < 4)
-        distance = wheel_distances(self._problem.scene, Ts_workpiece_cutter, t, unsure)
+        distance = wheel_distances(self._problem.scene, there, t, unsure)
         found = distance < -self._problem.cell.planned_penetration
         return np.asarray(np.where(unsure, found, near == 4))
 

@@ -86,13 +86,13 @@ def build_problem(
     with clock("nodes"):
         field = build_nodes(scene.cell, points, contact_positions)
     with clock("clearance"):
-        layer = wheel_distances(scene, points.Ts_workpiece_cutter, contact_positions)
+        layer = wheel_distances(scene, points, contact_positions)
     return GrindingProblem(scene, points, field, layer, interpolation, process)
 
 
 def wheel_distances(
     scene: PlanningScene,
-    Ts_workpiece_cutter: Array,
+    points: CutterPoints,
     contact_positions: Array,
     at: np.ndarray | None = None,
 ) -> Array:
@@ -105,13 +105,13 @@ def wheel_distances(
     """
     cell = scene.cell
     if at is None:
-        at = np.ones((len(Ts_workpiece_cutter), contact_positions.shape[-1]), dtype=bool)
+        at = np.ones((len(points), contact_positions.shape[-1]), dtype=bool)
     columns, _ = np.nonzero(at)
     Ts_contact0_contact = cell.wheel.T_contact0_contact(
         np.broadcast_to(contact_positions, at.shape)[at]
     )
     # cutter and contact coincide, whatever robot brings the part there
-    Ts_contact0_workpiece = Ts_contact0_contact @ inverse(Ts_workpiece_cutter)[columns]
+    Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[columns]
     layer = np.full(at.shape, -np.inf)
     allowed = -cell.planned_penetration
     layer[at] = signed_wheel_distance(scene.part, cell.wheel, Ts_contact0_workpiece, allowed)

@@ -217,3 +217,18 @@ def test_margins_are_distances_not_box_overlaps():
         ready = replace(cell, obstacles=(body,))
         found = unordered(CollisionScene(ready).colliding_pairs(np.zeros(6)))
         assert (("part", "post") in found) == hit
+
+
+def test_what_collides_throughout_collides_wherever_the_joints_turn():
+    cell = v_job().cell
+    scene = CollisionScene(cell.widened(0.03))
+    q = configurations_of_interest(cell, n=600, seed=4)
+    random = np.random.default_rng(4)
+    turned = random.uniform(0.0, 0.03, q.shape) * random.integers(0, 2, q.shape)
+    sure = scene.collides_throughout(q, turned)
+    assert sure.any() and (scene.collides(q) & ~sure).any()
+    # to every corner of what the joints may turn, where bodies come apart farthest
+    for _ in range(40):
+        there = q[sure] + turned[sure] * random.choice([-1.0, 1.0], turned[sure].shape)
+        assert scene.collides(there).all()
+    np.testing.assert_array_equal(scene.collides_throughout(q, np.zeros_like(q)), scene.collides(q))

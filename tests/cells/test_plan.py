@@ -198,11 +198,10 @@ def test_a_search_ends_with_a_plan_or_without_proposals_or_with_its_budget_spent
 
 def test_a_search_that_finds_nothing_in_its_work_says_so_and_ends(monkeypatch):
     monkeypatch.setattr(searches, "MOST_FIRST_CHECKS", 1)
-    monkeypatch.setattr(searches, "MOST_LATER_CHECKS", 2)
     job = small_job()
     optimal = replace(job.search.optimal, max_subproblems=1)
     shut = with_scene(one_row_problem(), collision=Ghosts(np.zeros(6), radius=100.0))
-    with pytest.raises(NoPathError, match="the 2 best motions of the recursive search are not"):
+    with pytest.raises(NoPathError, match="the 1 best motions of the recursive search are not"):
         searches.search_path(replace(job.search, optimal=optimal), shut)
 
 
@@ -214,8 +213,12 @@ def test_what_a_proof_that_ends_early_leaves_over_goes_to_the_recursive_search(m
     wanted = plan_recursive(haunted)
     assert wanted.checks > 1
     monkeypatch.setattr(searches, "MOST_FIRST_CHECKS", 1)
-    monkeypatch.setattr(searches, "MOST_LATER_CHECKS", 1)
-    monkeypatch.setattr(searches, "plan_optimal", lambda *arguments: None)  # gave up at once
+
+    def gives_up_at_once(problem, settings, known, report, otherwise):
+        assert known is None
+        return otherwise(1e6)
+
+    monkeypatch.setattr(searches, "plan_optimal", gives_up_at_once)
     found = searches.search_path(small_job().search, haunted)
     np.testing.assert_array_equal(found.recursive.path.q, wanted.path.q)
 

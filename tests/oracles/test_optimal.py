@@ -200,6 +200,20 @@ def test_without_a_motion_that_is_known_the_proof_finds_one():
     assert plan.lower_bound <= optimal(one_row).path.joint_range_sum
 
 
+def test_a_motion_that_the_proof_does_not_find_keeps_its_bound():
+    asked = []
+
+    def otherwise(work):
+        asked.append(work)
+        return recursive(one_row)
+
+    plan = plan_optimal(one_row(), replace(SETTINGS, max_subproblems=10), None, otherwise=otherwise)
+    assert asked == pytest.approx([3.0])
+    assert plan.path is recursive(one_row).path
+    assert 0.0 <= plan.lower_bound <= optimal(one_row).path.joint_range_sum
+    assert plan.open_because is not None
+
+
 def test_what_is_left_out_of_a_wall_collides_all_over():
     problem = one_row()
     cell = problem.cell
