@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+import opl  # noqa: F401  before numpy, which it lets round alike on every processor
+
 GOLDEN = Path(__file__).parent / "golden"
 
 # the workers of a run share the cores; settled before numba is loaded

@@ -18,7 +18,7 @@ PACKAGE = Path(opl.__file__).parent
 # Lowest first. A module may import from floors below its own, and from its own room. Rooms on one
 # floor do not know each other. A room is a folder, or a module that lies in the package itself.
 FLOORS = [
-    {"errors", "findings", "version"},
+    {"errors", "findings", "processor", "version"},
     {"files", "client", "plugins"},
     {"geometry", "store"},
     {"cell", "search"},
@@ -67,6 +67,7 @@ HOMES = {
         "cell/separating",
         "search",
         "motion/fewest",
+        "motion/long_runs",
         "motion/corner_error",
         "motion/line_error",
     },

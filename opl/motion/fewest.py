@@ -60,14 +60,36 @@ def fewest(
     Returns:
         Indices in the run; None if no chain keeps the rule.
     """
+    return chain_of(screws, run, rule, blocked, np.arange(len(run.q)))
+
+
+def chain_of(
+    screws: Screws,
+    run: Run,
+    rule: ChainRule,
+    blocked: frozenset[tuple[int, ...]],
+    kept: NDArray[np.intp],
+) -> NDArray[np.intp] | None:
+    """Return the fewest of some configurations, as `fewest` does.
+
+    Lines are looked at where they pass those; ``kept`` are their indices in the run, in order, the
+    first and the last among them.
+    """
+    of_kept = {int(row): place for place, row in enumerate(kept)}
+    known = [
+        tuple(of_kept[row] for row in one)
+        for one in sorted(blocked)
+        if all(row in of_kept for row in one)
+    ]
     lines, corners = (
-        np.array(sorted(one for one in blocked if len(one) == n), dtype=np.int64).reshape(-1, n)
+        np.array([one for one in known if len(one) == n], dtype=np.int64).reshape(-1, n)
         for n in (2, 3)
     )
     arm = screws.axes, screws.T_base_flange
     limits = rule.shortest, rule.ratio, rule.zone, rule.corner
-    chain = _chain(*arm, *run.arrays, *limits, lines, corners)  # type: ignore[call-arg]
-    return chain.astype(np.intp) if len(chain) else None
+    values = (value[kept] for value in run.arrays)
+    chain = _chain(*arm, *values, *limits, lines, corners, kept)  # type: ignore[call-arg]
+    return kept[chain] if len(chain) else None
 
 
 @njit(cache=True)
@@ -129,9 +151,12 @@ def _even(pace, i, j, k, ratio):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _chain(  # type: ignore[no-untyped-def]
     axes, T0, q, places, targets, freedom, room, allowed, pace, tool,
-    shortest, ratio, zone, most, barred, wide,
+    shortest, ratio, zone, most, barred, wide, at,
 ):  # fmt: skip
-    """Return the best chain; empty if there is none. A line is charged for with all before it."""
+    """Return the best chain; empty if there is none. A line is charged for with all before it.
+
+    ``at`` are the indices of the configurations in the run that they are of.
+    """
     starts, first, errors = _lines(
         axes, T0, q, places, targets, freedom, room, allowed, pace, barred
     )
@@ -149,7 +174,7 @@ def _chain(  # type: ignore[no-untyped-def]
                 corner = 0.0
                 if not _even(pace, starts[ahead], j, k, ratio):
                     continue
-                if zone > 0.0 and k > starts[ahead] + 2:
+                if zone > 0.0 and at[k] > at[starts[ahead]] + 2:
                     corner = rounded_off(
                         axes, T0, q, places, targets, freedom, tool, starts[ahead], j, k, zone
                     )

@@ -19,9 +19,10 @@ from opl.errors import UnsafeError
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import MM_PER_M, ContactWheel
-from opl.motion.fewest import ChainRule, fewest
+from opl.motion.fewest import ChainRule
 from opl.motion.gradual import PLANNED_RATIO
 from opl.motion.line_error import LEVER, ROLLS, SLIDES, Run, Screws, line_errors, screws_of
+from opl.motion.long_runs import fewest_of_long
 from opl.motion.motion import Motion
 from opl.motion.process_settings import ProcessSettings
 from opl.motion.timing import on_wheel, time_motion
@@ -104,7 +105,7 @@ def with_fewest_positions(
     while stale:
         for first in dict.fromkeys(stale):
             run, chain = runs[first], rule.chain
-            found = fewest(screws, run, chain, blocked.get(first, frozenset()))
+            found = fewest_of_long(screws, run, chain, blocked.get(first, frozenset()))
             if found is None:
                 index = motion.pass_index[first] + 1
                 raise UnsafeError(f"pass {index}: no positions keep the contact error")

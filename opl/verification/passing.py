@@ -22,6 +22,7 @@ from opl.verification.world import World
 STEP = 1e-3  # [m] that no corner of the part's box moves farther from one sample to the next
 TURN = np.deg2rad(0.5)  # that no joint turns farther
 APART = 0.01  # of a sample: what is nearer to its ends is taken for them
+AT_EDGE = 1.5  # belt units from where the flat ends: by as much t may change in a sample
 NEAR = 2.0  # times what is allowed: what a configuration that is put in is hoped to be off at most
 
 
@@ -141,18 +142,49 @@ def _passed(
     Ts = points.Ts_workpiece_cutter[np.concatenate(around)]
     start, end = Ts_contact0_workpiece[k] @ Ts, Ts_contact0_workpiece[k + 1] @ Ts
     t = contact_positions(wheel, (start + end) / 2.0)
+    share, good = _nearest(wheel, start, end, t, np.abs(t) > wheel.flat_end, allowed)
+    # beside the end of the flat it may slide at one end of the way and roll at the other
+    beside = np.flatnonzero((np.abs(np.abs(t) - wheel.flat_end) <= AT_EDGE) & ~good)
+    at_edge, slides = np.copysign(wheel.flat_end, t[beside]), np.abs(t[beside]) <= wheel.flat_end
+    share[beside], good[beside] = _nearest(
+        wheel, start[beside], end[beside], at_edge, slides, allowed
+    )
+    return np.asarray(at[k[good]] + share[good] * (at[k[good] + 1] - at[k[good]]))
+
+
+def _nearest(
+    wheel: ContactWheel,
+    start: Array,
+    end: Array,
+    t: Array,
+    rolls: NDArray[np.bool_],
+    allowed: float,
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return where on their way frames come nearest to the contact model.
+
+    Args:
+        wheel: The wheel.
+        start: Frames in contact frame 0, shape (n, 4, 4).
+        end: Where they come to.
+        t: Contact positions near by, shape (n,).
+        rolls: Whether the contact rolls about an edge there, else it slides, shape (n,).
+        allowed: Farthest in [m] that one may be from the contact model.
+
+    Returns:
+        Fractions of the way, not limited to it, and which of them are to be looked at: between the
+        ends, near to the model, and not within what is allowed at both ends; each of shape (n,).
+    """
     Ts_contact0_contact = wheel.T_contact0_contact(t)
-    free = np.where(np.abs(t) > wheel.flat_end, 4, 0)
     first, last = (_off(Ts_contact0_contact, one) for one in (start, end))
     for one in (first, last):
-        one[np.arange(len(k)), free] = 0.0
+        one[np.arange(len(t)), np.where(rolls, 4, 0)] = 0.0
     way = last - first
     length = np.square(way).sum(axis=1)
     share = -(first * way).sum(axis=1) / np.where(length > 0.0, length, 1.0)
     nearest = np.linalg.norm(first + share[:, None] * way, axis=1)
     kept = np.maximum(np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1)) <= allowed
     good = (share > APART) & (share < 1.0 - APART) & (nearest <= NEAR * allowed) & ~kept
-    return np.asarray(at[k[good]] + share[good] * (at[k[good] + 1] - at[k[good]]))
+    return share, good
 
 
 def _off(Ts_contact0_contact: Array, Ts_contact0_cutter: Array) -> Array:
