@@ -58,7 +58,7 @@ def _moved(problem: GrindingProblem, path: GrindingPath, nameable: Nameable) -> 
     for k in np.flatnonzero(~nameable(path.q, MARGIN)):
         places = t[k] + offsets
         frame = problem.points.frames_at(path.cutter_point[[k]])
-        found = inverse_solutions(cell, np.repeat(frame, len(places), axis=0), places)
+        found = inverse_solutions(cell, frame[:, None], places)[0]
         turned = nearest_turn(found[:, path.ik_branch], q[k])
         usable = (np.abs(places) <= last) & ~np.isnan(turned).any(axis=1)
         usable[usable] = cell.within_limits(turned[usable]) & nameable(turned[usable], MARGIN)

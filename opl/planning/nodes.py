@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from opl.cell.full_turns import full_turns
-from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.inverse_kinematics import N_IK_BRANCHES, inverse_kinematics
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
@@ -79,6 +79,7 @@ class NodeField:
 SEAM_GAP = np.deg2rad(45.0)
 # three turns each of two wrist axes
 MOST_SHEETS = 9
+AT_ONCE = 20_000  # nodes: what is worked on at a time stays small beside what is kept
 
 
 def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) -> NodeField:
@@ -91,30 +92,62 @@ def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) 
         if np.isnan(q[:, :, ik_branch, 0]).all():
             continue
         lifted, sheets, copies = _lift(q[:, :, ik_branch], robot.lower, robot.upper)
-        for sheet in sheets:
-            # (N, copies, M, 6)
-            turned = lifted[:, None] + sheet + copies[:, None]
-            within = cell.within_limits(turned)
-            copy, position_index = np.nonzero(within.any(axis=0))
-            if len(position_index):
-                q_sheet = np.ascontiguousarray(
-                    np.where(within[..., None], turned, np.nan)[:, copy, position_index]
-                )
-                t = np.broadcast_to(contact_positions[position_index], q_sheet.shape[:2])
-                matrices.append(NodeMatrix(ik_branch, q_sheet, t, position_index))
+        for turns in sheets[:, None] + copies:
+            nodes = _sheet(cell, lifted, turns, contact_positions, ik_branch)
+            if nodes is not None:
+                matrices.append(nodes)
     return NodeField(contact_positions, q, tuple(matrices))
+
+
+def _sheet(
+    cell: WorkCell, lifted: Array, turns: Array, contact_positions: Array, ik_branch: int
+) -> NodeMatrix | None:
+    """Return the nodes of one sheet, None if there are none within the limits.
+
+    Args:
+        cell: The cell.
+        lifted: Angles of the branch in [rad], shape (N, M, 6).
+        turns: Full turns of the copies of the nodes in [rad], shape (n_copies, 6).
+        contact_positions: Shape (M,).
+        ik_branch: The branch.
+    """
+    blocks = blocks_of(lifted.shape[0], lifted.shape[1] * len(turns))
+    within = np.concatenate(
+        [cell.within_limits(lifted[block, None] + turns[:, None]) for block in blocks]
+    )  # (N, copies, M)
+    copy, position_index = np.nonzero(within.any(axis=0))
+    if not len(position_index):
+        return None
+    # as the searches read them, who need no copy then
+    by_joint = np.empty((len(lifted), 6, len(position_index)))
+    for block in blocks:
+        q = lifted[block][:, position_index] + turns[copy]
+        q[~within[block][:, copy, position_index]] = np.nan
+        by_joint[block] = np.moveaxis(q, 1, 2)
+    t = np.broadcast_to(contact_positions[position_index], (len(lifted), len(position_index)))
+    return NodeMatrix(ik_branch, np.moveaxis(by_joint, 1, 2), t, position_index)
+
+
+def blocks_of(n_columns: int, n_rows: int) -> list[slice]:
+    """Return slices of columns with about as many nodes as are worked on at once."""
+    size = max(AT_ONCE // max(n_rows, 1), 1)
+    return [slice(first, first + size) for first in range(0, n_columns, size)]
 
 
 def inverse_solutions(
     cell: WorkCell, Ts_workpiece_cutter: Array, contact_positions: Array
 ) -> Array:
-    """Return every inverse solution in [rad], NaN where there is none, shape (..., 8, 6).
+    """Return every inverse solution in [rad], NaN where there is none, shape (N, M, 8, 6).
 
-    Cutter frames have shape (..., 4, 4), the contact position at which each is ground (...).
+    Cutter frames have shape (N, 1, 4, 4), the contact positions at which each is ground (M,) or
+    (N, M).
     """
-    return inverse_kinematics(
-        cell.robot.arm, cell.Ts_base_flange(contact_positions, Ts_workpiece_cutter)
-    )
+    t = np.asarray(contact_positions, dtype=float)
+    q = np.empty((len(Ts_workpiece_cutter), t.shape[-1], N_IK_BRANCHES, 6))
+    for block in blocks_of(*q.shape[:2]):
+        Ts = cell.Ts_base_flange(t if t.ndim == 1 else t[block], Ts_workpiece_cutter[block])
+        q[block] = inverse_kinematics(cell.robot.arm, Ts)
+    return q
 
 
 def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:

@@ -14,7 +14,7 @@ from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.process_settings import ProcessSettings
 from opl.planning.filling import Interpolation
-from opl.planning.nodes import NodeField, NodeMatrix, build_nodes
+from opl.planning.nodes import NodeField, NodeMatrix, blocks_of, build_nodes
 from opl.planning.scene import PlanningScene
 from opl.search.ladder import Ladder
 
@@ -106,13 +106,15 @@ def wheel_distances(
     cell = scene.cell
     if at is None:
         at = np.ones((len(points), contact_positions.shape[-1]), dtype=bool)
-    columns, _ = np.nonzero(at)
-    Ts_contact0_contact = cell.wheel.T_contact0_contact(
-        np.broadcast_to(contact_positions, at.shape)[at]
-    )
-    # cutter and contact coincide, whatever robot brings the part there
-    Ts_contact0_workpiece = Ts_contact0_contact @ inverse(points.Ts_workpiece_cutter)[columns]
     layer = np.full(at.shape, -np.inf)
-    allowed = -cell.planned_penetration
-    layer[at] = signed_wheel_distance(scene.part, cell.wheel, Ts_contact0_workpiece, allowed)
+    Ts_cutter_workpiece = inverse(points.Ts_workpiece_cutter)
+    t = np.broadcast_to(contact_positions, at.shape)
+    for block in blocks_of(*at.shape):
+        asked = at[block]
+        columns, _ = np.nonzero(asked)
+        # cutter and contact coincide, whatever robot brings the part there
+        Ts = cell.wheel.T_contact0_contact(t[block][asked]) @ Ts_cutter_workpiece[block][columns]
+        layer[block][asked] = signed_wheel_distance(
+            scene.part, cell.wheel, Ts, -cell.planned_penetration
+        )
     return layer

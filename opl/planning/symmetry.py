@@ -40,6 +40,15 @@ def twins(matrices: list[OpenMatrix], track: Track, robot: Robot) -> list[Track]
 
 def _followers(nodes: NodeMatrix, positions: np.ndarray) -> Iterator[np.ndarray]:
     """Yield the tracks of a matrix with given contact positions, one for each turn of the wrist."""
+    if len(np.unique(nodes.position_index)) == len(nodes.position_index):
+        # one row for each contact position
+        row_of = np.full(positions.max() + 1, -1)
+        known = nodes.position_index <= positions.max()
+        row_of[nodes.position_index[known]] = np.flatnonzero(known)
+        rows = row_of[positions]
+        if (rows >= 0).all() and nodes.exists[np.arange(len(rows)), rows].all():
+            yield rows
+        return
     for start in np.flatnonzero(nodes.position_index == positions[0]):
         rows = np.full(len(positions), start)
         for column in range(1, len(positions)):
