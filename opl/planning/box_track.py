@@ -147,6 +147,7 @@ class _Sampled:
             points=columns.points,
             field=NodeField(columns.t[0], problem.field.q[:0], tuple(self._images(q))),
             wheel_distance=np.zeros(columns.t.shape),
+            known_sides=problem.sides_at(columns.places, columns.t),
         )
         self.matrices = open_matrices(self.problem)
         self._swept = False

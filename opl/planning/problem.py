@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -31,6 +32,7 @@ class GrindingProblem:
             than the largest belt penetration allows, shape (N, M).
         interpolation: How the path between nodes is filled in.
         process: Speeds, approach and home.
+        known_sides: `sides`, where the distances do not tell.
     """
 
     scene: PlanningScene
@@ -39,11 +41,41 @@ class GrindingProblem:
     wheel_distance: Array
     interpolation: Interpolation
     process: ProcessSettings
+    known_sides: np.ndarray | None = None
 
     @property
     def cell(self) -> WorkCell:
         """The cell."""
         return self.scene.cell
+
+    @cached_property
+    def sides(self) -> np.ndarray | None:
+        """Between which shut contact positions nodes lie, as `Ladder.sides`, (N - 1, 2, M).
+
+        A motion does not pass a contact position at which the part cuts into the wheel at two
+        neighbouring cutter points on its way between the two. None where nothing is shut.
+        """
+        if self.known_sides is not None:
+            return self.known_sides
+        shut = self.cuts[:-1] & self.cuts[1:]
+        if not shut.any():
+            return None
+        below = np.cumsum(shut, axis=1, dtype=np.int16)
+        return np.stack([below, below], axis=1)
+
+    def sides_at(self, places: Array, t: Array) -> np.ndarray | None:
+        """Return `sides` of places at contact positions of their own, shape (n - 1, 2, m).
+
+        Args:
+            places: Fractional cutter points, shape (n,).
+            t: Contact positions, shape (n, m).
+        """
+        if self.sides is None:
+            return None
+        above = np.searchsorted(self.field.contact_positions, t)
+        below = np.pad(self.sides[places[:-1].astype(int), 0], ((0, 0), (1, 0)))
+        both = [np.take_along_axis(below, rows, axis=1) for rows in (above[:-1], above[1:])]
+        return np.stack(both, axis=1)
 
     @property
     def off_wheel(self) -> np.ndarray:
@@ -68,6 +100,7 @@ class GrindingProblem:
             self.off_wheel,
             self.interpolation.max_contact_step,
             self.interpolation.max_joint_step,
+            sides=None if self.sides is None else self.sides[:, :, nodes.position_index].copy(),
         )
 
 

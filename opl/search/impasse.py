@@ -42,11 +42,11 @@ def impasses(ladder: Ladder, blocked: np.ndarray) -> list[tuple[int, int]]:
 
 @njit(
     "boolean[:,::1](float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
-    "int64[::1],int64)",
+    "int16[:,:,::1],int64[::1],int64)",
     cache=True,
 )
 def _edges(  # type: ignore[no-untyped-def]
-    q, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, column
+    q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked, column
 ):
     """Return which rows of a column lead to which of the next, were they all free."""
     n_rows = q.shape[2]
@@ -54,6 +54,16 @@ def _edges(  # type: ignore[no-untyped-def]
     for here in range(n_rows):
         for row in range(n_rows):
             edges[here, row] = allowed(
-                q, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, column, here, row
+                q,
+                t,
+                off_wheel,
+                max_t_step,
+                max_t_change,
+                max_q_step,
+                sides,
+                blocked,
+                column,
+                here,
+                row,
             )
     return edges

@@ -27,6 +27,9 @@ class Ladder:
             (n_columns - 1,) or one for all; the paper sets none.
         max_joint_step: Largest change of a joint between adjacent nodes in [rad]; more is taken for
             a discontinuity.
+        sides: For each edge on which side of what is shut on the way its ends are, which an edge
+            does not change: that of the rows of its column, and of those of the next, of int16,
+            shape (n_columns - 1, 2, n_rows); None where nothing is shut.
     """
 
     q: Array
@@ -36,6 +39,7 @@ class Ladder:
     max_contact_step: float
     max_joint_step: float
     max_contact_change: Array | float = np.inf
+    sides: np.ndarray | None = None
 
     @cached_property
     def t_of_nodes(self) -> Array:
@@ -53,7 +57,7 @@ class Ladder:
         return np.ascontiguousarray(np.moveaxis(self.q, 1, 2))
 
     @property
-    def edge_rule(self) -> tuple[Array, np.ndarray, float, Array, float]:
+    def edge_rule(self) -> tuple[Array, np.ndarray, float, Array, float, np.ndarray]:
         """What makes an edge small enough, in the order in which the inner loops take it."""
         return (
             self.t_of_nodes,
@@ -61,7 +65,14 @@ class Ladder:
             self.max_contact_step,
             self.contact_changes,
             self.max_joint_step,
+            self._sides,
         )
+
+    @cached_property
+    def _sides(self) -> np.ndarray:
+        n_columns, n_rows = self.q.shape[:2]
+        nothing = np.zeros((n_columns - 1, 2, n_rows), dtype=np.int16)
+        return nothing if self.sides is None else self.sides
 
     def edge_key(self, column: int, row: int, next_row: int) -> int:
         """Return the number under which an edge is remembered as blocked."""
@@ -78,17 +89,20 @@ def middle_count(contact_step: float, max_contact_step: float) -> int:
 
 
 @njit(
-    "boolean(float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,int64,int64,int64)",
+    "boolean(float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
+    "int16[:,:,::1],int64,int64,int64)",
     cache=True,
 )
 def continuous(  # type: ignore[no-untyped-def]
-    q, t, off_wheel, max_t_step, max_t_change, max_q_step, column, here, row
+    q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, column, here, row
 ):
     """Return whether an edge to a row of the next column is small in t and in every joint."""
     if off_wheel[column]:
         return True
     t_step = abs(t[column + 1, row] - t[column, here])
     if t_step > max_t_change[column] + 1e-9:
+        return False
+    if sides[column, 0, here] != sides[column, 1, row]:
         return False
     largest = max_q_step * max(np.ceil(t_step / max_t_step - 1e-9), 1.0)
     for joint in range(q.shape[1]):
@@ -105,15 +119,15 @@ def contains(keys, key):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "boolean(float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,int64[::1],"
-    "int64,int64,int64)",
+    "boolean(float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
+    "int16[:,:,::1],int64[::1],int64,int64,int64)",
     cache=True,
 )
 def allowed(  # type: ignore[no-untyped-def]
-    q, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, column, here, row
+    q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked, column, here, row
 ):
     """Return whether an edge to a row of the next column is small enough and not blocked."""
     n_rows = q.shape[2]
     return continuous(
-        q, t, off_wheel, max_t_step, max_t_change, max_q_step, column, here, row
+        q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, column, here, row
     ) and not contains(blocked, (column * n_rows + here) * n_rows + row)

@@ -71,13 +71,13 @@ _COMPLETE, _FAILED, _GIVEN_UP = 1, 0, 2
 
 _FIELD = (
     "float64[:,:,::1],boolean[:,::1],float64[:,::1],boolean[::1],"
-    "float64,float64[::1],float64,int64[::1]"
+    "float64,float64[::1],float64,int16[:,:,::1],int64[::1]"
 )
 
 
 @njit(f"void({_FIELD},boolean[:,::1])", cache=True)
 def _add_dead_ends(  # type: ignore[no-untyped-def]
-    q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, dead
+    q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked, dead
 ):
     n_columns, _, n_rows = q.shape
     for column in range(n_columns - 2, -1, -1):
@@ -90,7 +90,7 @@ def _add_dead_ends(  # type: ignore[no-untyped-def]
                 if not free[column + 1, row] or dead[column + 1, row]:
                     continue
                 if not continuous(
-                    q, t, off_wheel, max_t_step, max_t_change, max_q_step, column, here, row
+                    q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, column, here, row
                 ):
                     continue
                 if not contains(blocked, (column * n_rows + here) * n_rows + row):
@@ -101,7 +101,19 @@ def _add_dead_ends(  # type: ignore[no-untyped-def]
 
 @njit(f"Tuple((int64,float64,int64))({_FIELD},boolean[:,::1],int64,float64,int64[::1])", cache=True)
 def _descend(  # type: ignore[no-untyped-def]
-    q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked, dead, start, bound, rows
+    q,
+    free,
+    t,
+    off_wheel,
+    max_t_step,
+    max_t_change,
+    max_q_step,
+    sides,
+    blocked,
+    dead,
+    start,
+    bound,
+    rows,
 ):
     n_columns, n_joints, n_rows = q.shape
     sums = np.empty(n_rows)
@@ -137,7 +149,7 @@ def _descend(  # type: ignore[no-untyped-def]
             if ranges == tried_sum[following] and row <= tried_row[following]:
                 continue
             if not continuous(
-                q, t, off_wheel, max_t_step, max_t_change, max_q_step, column, here, row
+                q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, column, here, row
             ):
                 continue
             best_sum = ranges

@@ -127,12 +127,12 @@ def smoothest_within(
 
 @njit(
     "float64(float64[:,:,::1],boolean[:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
-    "int64[::1],float64[::1],float64,float64,float64[::1],float64[::1],float64,float64[:,::1],"
+    "int16[:,:,::1],int64[::1],float64[::1],float64,float64,float64[::1],float64[::1],float64,float64[:,::1],"
     "int64[::1])",
     cache=True,
 )
 def _cheapest(  # type: ignore[no-untyped-def]
-    q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked,
+    q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked,
     joint_weights, contact_weight, time_weight, edge_seconds, max_speed, contact_speed, node_cost,
     rows,
 ):  # fmt: skip
@@ -182,7 +182,7 @@ def _cheapest(  # type: ignore[no-untyped-def]
             if cheapest < 0:
                 continue
             if allowed(
-                q, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked,
+                q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked,
                 column - 1, cheapest, row,
             ):  # fmt: skip
                 following[row] = least
@@ -190,7 +190,7 @@ def _cheapest(  # type: ignore[no-untyped-def]
             else:
                 for here in range(n_rows):
                     if price[here] < following[row] and allowed(
-                        q, t, off_wheel, max_t_step, max_t_change, max_q_step, blocked,
+                        q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked,
                         column - 1, here, row,
                     ):  # fmt: skip
                         following[row] = price[here]

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -14,7 +15,13 @@ from opl.motion.timing import Cause, time_motion
 from opl.motion.whole_motion import UnreachableApproachError, whole_motion
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.fixed_contact import keep_contact, runs_of
-from opl.planning.multi_start import Start, plan_recursive, try_recursive
+from opl.planning.multi_start import (
+    Start,
+    plan_recursive,
+    tracks_from_best_start,
+    try_recursive,
+)
+from opl.planning.open_matrix import open_matrices
 from opl.planning.plan import Exhausted, Found, OutOfBudget
 from opl.planning.reasons import explain, unreachable_points
 from opl.planning.survey import NodeState, survey_nodes
@@ -221,6 +228,28 @@ def test_what_a_proof_that_ends_early_leaves_over_goes_to_the_recursive_search(m
     monkeypatch.setattr(searches, "plan_optimal", gives_up_at_once)
     found = searches.search_path(small_job().search, haunted)
     np.testing.assert_array_equal(found.recursive.path.q, wanted.path.q)
+
+
+def test_no_track_passes_a_contact_position_that_is_shut_on_the_way():
+    problem = one_row_problem()
+    n, m = problem.wheel_distance.shape
+    layer = problem.wheel_distance.copy()
+    layer[:, m // 2] = -1.0
+    shut = replace(problem, wheel_distance=layer)
+    matrices = open_matrices(shut)
+    tracks = list(islice(tracks_from_best_start(matrices), 5))
+    assert tracks
+    for track in tracks:
+        above = matrices[track.matrix].nodes.position_index[track.rows] > m // 2
+        assert above.all() or not above.any()
+    # where it is shut at one of two cutter points only, it can be passed between them
+    every_other = np.where(np.arange(n)[:, None] % 2, problem.wheel_distance, layer)
+    assert replace(problem, wheel_distance=every_other).sides is None
+    grid = np.broadcast_to(problem.field.contact_positions, (n, m))
+    free = ~shut.cuts
+    sides = shut.sides_at(np.arange(float(n)), grid)
+    np.testing.assert_array_equal(sides[:, 0][free[:-1]], shut.sides[:, 0][free[:-1]])
+    np.testing.assert_array_equal(sides[:, 1][free[1:]], shut.sides[:, 1][free[1:]])
 
 
 def test_another_scene_finds_free_moves_of_its_own():
