@@ -3,9 +3,9 @@
     python -m tests.attacks.same_bytes SECONDS [JOB.yaml | arch]...
 
 Each job is run with two threads, with one, beside four busy loops, with another hash seed, as on a
-processor of another maker, and stopped for so many seconds in the middle of its run. Ends with status 1 if a byte of program,
-table, pictures, motion or result differs, the times of stages aside; ``arch`` is a part that does
-not come with opl.
+processor of another maker, and stopped for so many seconds in the middle of its run. Ends with
+status 1 if a byte of program, table, pictures, motion or result differs, the times of stages aside;
+``arch`` is a part that does not come with opl.
 """
 
 from __future__ import annotations
