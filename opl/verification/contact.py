@@ -8,7 +8,6 @@ an edge from how far its normal has turned.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,8 @@ from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import MM_PER_M, ContactWheel
 
 LEVER = 0.05  # [m] from the ground point; weighs angles against distances
+AT_ONCE = 1 << 16  # distances that are held in memory
+ROUND_OFF = 1e-9  # [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,17 +73,40 @@ def find_touches(
     `Ts_contact0_workpiece` has shape (n, 4, 4); a point may be up to `tolerance` in [m] off the
     contact model, with what it is turned counted along `LEVER`.
     """
-    Ts_workpiece_cutter = points.Ts_workpiece_cutter
-    found: list[tuple[NDArray[Any], ...]] = [(np.empty(0),) * 4]
-    for configuration, T_contact0_workpiece in enumerate(Ts_contact0_workpiece):
-        p_contact0 = transform(T_contact0_workpiece, Ts_workpiece_cutter[:, :3, 3])
-        near = np.flatnonzero(np.abs(wheel.signed_distance(p_contact0)) <= tolerance)
-        Ts_contact0_cutter = T_contact0_workpiece @ Ts_workpiece_cutter[near]
-        t = contact_positions(wheel, Ts_contact0_cutter)
-        distance, angle = misfit(wheel, Ts_contact0_cutter, t)
-        off = np.hypot(distance, LEVER * angle)
-        fits = off <= tolerance
-        point = near[fits]
-        found.append((np.full(len(point), configuration), point, t[fits], off[fits]))
-    columns = [np.concatenate(column) for column in zip(*found, strict=True)]
-    return Touches(columns[0].astype(np.intp), columns[1].astype(np.intp), *columns[2:])
+    configuration, point = near_wheel(wheel, points, Ts_contact0_workpiece, tolerance)
+    Ts_contact0_cutter = Ts_contact0_workpiece[configuration] @ points.Ts_workpiece_cutter[point]
+    t = contact_positions(wheel, Ts_contact0_cutter)
+    distance, angle = misfit(wheel, Ts_contact0_cutter, t)
+    off = np.hypot(distance, LEVER * angle)
+    fits = off <= tolerance
+    return Touches(configuration[fits], point[fits], t[fits], off[fits])
+
+
+def near_wheel(
+    wheel: ContactWheel, points: CutterPoints, Ts_contact0_workpiece: Array, within: float
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return which cutter points are near the surface of the wheel, and at which configurations.
+
+    Args:
+        wheel: The wheel.
+        points: The cutter points.
+        Ts_contact0_workpiece: Where the part is at each configuration, shape (n, 4, 4).
+        within: How near, in [m].
+
+    Returns:
+        Indices of configurations, ascending, and of points, ascending within each; shape (k,).
+    """
+    p_workpiece = points.Ts_workpiece_cutter[:, :3, 3]
+    at_once = max(1, AT_ONCE // max(1, len(p_workpiece)))
+    found = [(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp))]
+    for first in range(0, len(Ts_contact0_workpiece), at_once):
+        Ts = Ts_contact0_workpiece[first : first + at_once, :3]
+        # in whole matrices, for a first choice: how they round depends on the machine
+        p_contact0 = np.moveaxis(Ts[..., :3].swapaxes(0, 1) @ p_workpiece.T, 0, -1)
+        away = np.abs(wheel.signed_distance(p_contact0 + Ts[:, None, :, 3]))
+        configuration, point = np.nonzero(away <= within + ROUND_OFF)
+        found.append((configuration + first, point))
+    configuration, point = (np.concatenate(one) for one in zip(*found, strict=True))
+    p_contact0 = transform(Ts_contact0_workpiece[configuration], p_workpiece[point])
+    near = np.abs(wheel.signed_distance(p_contact0)) <= within
+    return configuration[near], point[near]

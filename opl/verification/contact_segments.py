@@ -12,6 +12,7 @@ another contact position. Which of them grinds it follows from the segments befo
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,6 +25,7 @@ from opl.verification.contact import LEVER, Touches, contact_positions, misfit
 
 TRIED = 48  # places tried first between two neighbouring cutter points
 ROUNDS = 4  # of refining, each to a quarter
+AT_ONCE = 1 << 18  # numbers that are held in memory
 # [m] that one belt unit away from an even change of t counts for, move by move: on a flat part of
 # the surface there is nothing else to choose places by
 UNEVEN = 1e-5
@@ -73,24 +75,45 @@ class ContactSegments:
     def between(self, before: int, after: int) -> ContactSegment:
         """Return the segment from one touch to another, by their indices."""
         if (before, after) not in self._found:
-            self._found[before, after] = self._between(before, after)
+            self._find([(before, after)])
         return self._found[before, after]
 
-    def _between(self, before: int, after: int) -> ContactSegment:
+    def _find(self, wanted: Iterable[tuple[int, int]]) -> None:
+        """Find segments from one touch to another, those of one size at once."""
+        configuration, point = self.touches.configuration, self.touches.point
+        sizes: dict[tuple[int, int], list[tuple[int, int]]] = {}
+        for before, after in wanted:
+            if (before, after) not in self._found:
+                count = max(int(configuration[after] - configuration[before]) - 1, 0)
+                span = int(point[after] - point[before])
+                sizes.setdefault((count, span), []).append((before, after))
+        for (count, span), pairs in sizes.items():
+            tried = span * TRIED + 1  # of which pairs are compared, and which are frames each
+            at_once = max(1, AT_ONCE // (tried * max(tried, 16 * count)))
+            for first in range(0, len(pairs), at_once):
+                self._place(pairs[first : first + at_once], count, span)
+
+    def _place(self, pairs: Sequence[tuple[int, int]], count: int, span: int) -> None:
+        """Place the configurations of segments that have as many of them and of points."""
         touches = self.touches
-        first, last = int(touches.configuration[before]), int(touches.configuration[after])
-        configurations = np.arange(first + 1, last)
-        if not len(configurations):
-            return ContactSegment(configurations, *np.empty((3, 0)))
-        found = place_between(
-            self.wheel,
-            self.points,
-            self.Ts_contact0_workpiece[configurations],
-            self.duration[first + 1 : last + 1],
-            (int(touches.point[before]), int(touches.point[after])),
-            (float(touches.contact_position[before]), float(touches.contact_position[after])),
-        )
-        return ContactSegment(configurations, *found)
+        before, after = np.array(pairs).T
+        first = touches.configuration[before]
+        configurations = first[:, None] + np.arange(1, count + 1)
+        moves = first[:, None] + np.arange(1, count + 2)
+        found = np.empty((3, len(pairs), count))
+        if count:
+            found = np.stack(
+                place_between(
+                    self.wheel,
+                    self.points,
+                    self.Ts_contact0_workpiece[configurations],
+                    self.duration[moves],
+                    (touches.point[before], span),
+                    (touches.contact_position[before], touches.contact_position[after]),
+                )
+            )
+        for k, pair in enumerate(pairs):
+            self._found[pair] = ContactSegment(configurations[k], *found[:, k])
 
     def settled(self, ground: NDArray[np.intp], allowed: float) -> NDArray[np.intp]:
         """Return chosen touches, other ones of the same cutter points where those fit better.
@@ -99,6 +122,8 @@ class ContactSegments:
         off the contact model.
         """
         chosen: NDArray[np.intp] = ground.copy()
+        goes_on = [m for m in range(1, len(chosen)) if self._goes_on(chosen, m)]
+        self._find((int(chosen[m - 1]), int(chosen[m])) for m in goes_on)
         for m in range(1, len(chosen)):
             if not self._goes_on(chosen, m) or self._farthest(chosen, m) <= allowed:
                 continue
@@ -138,59 +163,67 @@ def place_between(
     points: CutterPoints,
     Ts_contact0_workpiece: Array,
     duration: Array,
-    ends: tuple[int, int],
-    t_ends: tuple[float, float],
+    ends: tuple[NDArray[np.intp], int],
+    t_ends: tuple[Array, Array],
 ) -> tuple[Array, Array, Array]:
     """Place the configurations between two cutter points, none before the one ahead of it.
+
+    Of s segments at once that have n configurations each and lead equally many cutter points on.
 
     Args:
         wheel: The wheel.
         points: The cutter points.
-        Ts_contact0_workpiece: Where the part is at each configuration, shape (n, 4, 4).
-        duration: Times of the moves, the one onto the second cutter point as well, shape (n + 1,).
-        ends: The cutter points that are ground before and after.
-        t_ends: The contact positions there.
+        Ts_contact0_workpiece: Where the part is at each configuration, shape (s, n, 4, 4).
+        duration: Times of the moves, the one onto the second cutter point as well, (s, n + 1).
+        ends: The cutter points that are ground before, shape (s,), and how many points later the
+            one is that is ground after.
+        t_ends: The contact positions before and after, shape (s,) each.
 
     Returns:
         Fractional cutter point, contact position, and distance from the contact model in [m], with
-        what the part is turned counted along `LEVER`; each of shape (n,).
+        what the part is turned counted along `LEVER`; each of shape (s, n).
     """
-    n, span = len(Ts_contact0_workpiece), ends[1] - ends[0]
+    n = Ts_contact0_workpiece.shape[1]
+    start, span = ends[0][:, None, None], ends[1]
     time = np.maximum(duration, 1e-9)
-    even = np.diff(t_ends) * time / time.sum()  # change of t in each move
-    width = 1.0 / TRIED
-    tried = np.tile(ends[0] + np.arange(span * TRIED + 1) / TRIED, (n, 1))
+    even = (t_ends[1] - t_ends[0])[:, None] * time / time.sum(axis=1, keepdims=True)
+    width = 1.0 / TRIED  # of cutter points around a place that is tried anew
+    tried = np.tile(start + np.arange(span * TRIED + 1) / TRIED, (1, n, 1))
     for _ in range(1 + ROUNDS):
-        Ts = Ts_contact0_workpiece[:, None] @ points.frames_at(tried)
+        Ts = Ts_contact0_workpiece[:, :, None] @ points.frames_at(tried)
         t = contact_positions(wheel, Ts)
         distance, angle = misfit(wheel, Ts, t)
         apart = np.hypot(distance, LEVER * angle)
-        chosen = np.arange(n), _in_order(tried, apart, t, even, t_ends)
-        found = tried[chosen], t[chosen], apart[chosen]
-        tried = np.clip(found[0][:, None] + np.linspace(-width, width, 9), *ends)
+        chosen = _in_order(tried, apart, t, even, t_ends)[..., None]
+        place, t, apart = (np.take_along_axis(one, chosen, axis=2) for one in (tried, t, apart))
+        tried = np.clip(place + np.linspace(-width, width, 9), start, start + span)
         width /= 4.0
-    return found
+    return place[..., 0], t[..., 0], apart[..., 0]
 
 
 def _in_order(
-    tried: Array, apart: Array, t: Array, even: Array, t_ends: tuple[float, float]
+    tried: Array, apart: Array, t: Array, even: Array, t_ends: tuple[Array, Array]
 ) -> NDArray[np.intp]:
-    """Choose one place for each configuration so that none goes back, shape (n,).
+    """Choose one place for each configuration so that none goes back, shape (s, n).
 
     Dynamic programming over the configurations; the sum of the squares of all misfits is least.
-    Places, distances in [m] and contact positions have shape (n, k), even changes of t (n + 1,).
+    Places, distances in [m] and contact positions have shape (s, n, k), even changes of t, the
+    changes of all moves if they were as fast, shape (s, n + 1).
     """
-    n = len(tried)
+    n = tried.shape[1]
     came_from = np.zeros(tried.shape, dtype=np.intp)
-    cost = np.square(apart[0]) + np.square(UNEVEN * (t[0] - t_ends[0] - even[0]))
+    begun = t[:, 0] - t_ends[0][:, None] - even[:, :1]
+    cost = np.square(apart[:, 0]) + np.square(UNEVEN * begun)
     for k in range(1, n):
-        total = cost + np.square(UNEVEN * (t[k][:, None] - t[k - 1] - even[k]))
-        total[tried[k][:, None] < tried[k - 1]] = np.inf
-        came_from[k] = total.argmin(axis=1)
-        cost = np.take_along_axis(total, came_from[k][:, None], axis=1)[:, 0] + np.square(apart[k])
-    last = cost + np.square(UNEVEN * (t_ends[1] - t[-1] - even[-1]))
-    chosen = np.empty(n, dtype=np.intp)
-    chosen[-1] = last.argmin()
+        change = t[:, k, :, None] - t[:, k - 1, None]
+        total = cost[:, None] + np.square(UNEVEN * (change - even[:, k, None, None]))
+        total[tried[:, k, :, None] < tried[:, k - 1, None]] = np.inf
+        came_from[:, k] = total.argmin(axis=2)
+        least = np.take_along_axis(total, came_from[:, k, :, None], axis=2)[..., 0]
+        cost = least + np.square(apart[:, k])
+    last = cost + np.square(UNEVEN * (t_ends[1][:, None] - t[:, -1] - even[:, -1:]))
+    chosen = np.empty(tried.shape[:2], dtype=np.intp)
+    chosen[:, -1] = last.argmin(axis=1)
     for k in range(n - 1, 0, -1):
-        chosen[k - 1] = came_from[k][chosen[k]]
+        chosen[:, k - 1] = np.take_along_axis(came_from[:, k], chosen[:, k, None], axis=1)[:, 0]
     return chosen

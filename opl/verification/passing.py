@@ -16,7 +16,7 @@ from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import ContactWheel
-from opl.verification.contact import LEVER, contact_positions
+from opl.verification.contact import LEVER, contact_positions, near_wheel
 from opl.verification.world import World
 
 STEP = 1e-3  # [m] that no corner of the part's box moves farther from one sample to the next
@@ -98,8 +98,7 @@ def sample(
 
 
 def _places(world: World, wheel: ContactWheel, q: Array) -> Array:
-    Ts_base_workpiece = np.array([world.move_to(one) for one in q]).reshape(-1, 4, 4)
-    return np.linalg.solve(wheel.T_base_contact0, Ts_base_workpiece)
+    return np.asarray(np.linalg.solve(wheel.T_base_contact0, world.parts_at(q)))
 
 
 def _on_lines(q: Array, at: Array) -> Array:
@@ -132,14 +131,10 @@ def _passed(
 
     Not where one keeps to it from sample to sample: a flat part of a surface on the flat.
     """
-    p_workpiece = points.Ts_workpiece_cutter[:, :3, 3]
-    samples, around = [np.empty(0, dtype=np.intp)], [np.empty(0, dtype=np.intp)]
-    for number in np.flatnonzero(np.isin(np.ceil(at[1:]).astype(int) - 1, close)):
-        off = np.abs(wheel.signed_distance(transform(Ts_contact0_workpiece[number], p_workpiece)))
-        around.append(np.flatnonzero(off <= STEP + NEAR * allowed))
-        samples.append(np.full(len(around[-1]), number))
-    k = np.concatenate(samples)
-    Ts = points.Ts_workpiece_cutter[np.concatenate(around)]
+    passed = np.flatnonzero(np.isin(np.ceil(at[1:]).astype(int) - 1, close))
+    within = STEP + NEAR * allowed
+    number, point = near_wheel(wheel, points, Ts_contact0_workpiece[passed], within)
+    k, Ts = passed[number], points.Ts_workpiece_cutter[point]
     start, end = Ts_contact0_workpiece[k] @ Ts, Ts_contact0_workpiece[k + 1] @ Ts
     t = contact_positions(wheel, (start + end) / 2.0)
     share, good = _nearest(wheel, start, end, t, np.abs(t) > wheel.flat_end, allowed)

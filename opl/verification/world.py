@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opl.cell.workcell import PART, WorkCell
-from opl.geometry.frames import Array, pose, transform
+from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.rotations import quaternion
 from opl.geometry.shapes import Body, Box, Cylinder
@@ -79,8 +79,10 @@ class World:
         self._client = start()
         # the client looks names up each time
         self._closest_points = self._client.getClosestPoints
-        self._turn_joint = self._client.resetJointState
+        self._turn_joints = self._client.resetJointStatesMultiDof
         self._place = self._client.resetBasePositionAndOrientation
+        self._link_state = self._client.getLinkState
+        self._joined = self._client.multiplyTransforms
         # else a file is taken for an earlier one of its name
         self._client.setPhysicsEngineParameter(enableFileCaching=0)
         self._robot = self._client.loadURDF(
@@ -160,17 +162,24 @@ class World:
 
     def move_to(self, q: Array) -> Array:
         """Pose robot, part and fixture; return T_base_workpiece as PyBullet sees it, (4, 4)."""
-        client = self._client
-        for joint, value in zip(self._joints, q, strict=True):
-            self._turn_joint(self._robot, joint, value)
-        state = client.getLinkState(self._robot, self._flange, computeForwardKinematics=True)
-        placed = [client.multiplyTransforms(*state[4:6], *at_flange) for _, at_flange in self._held]
+        self._turn_joints(self._robot, self._joints, q[:, None].tolist())
+        state = self._link_state(self._robot, self._flange, computeForwardKinematics=True)
+        placed = [self._joined(*state[4:6], *at_flange) for _, at_flange in self._held]
         for (held, _), at in zip(self._held, placed, strict=True):
             self._place(held.body, *at)
-        position, quaternion = self._part_at = placed[0]
-        R = np.array(client.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
-        self._T_base_workpiece = pose(R, np.array(position))
+        self._part_at = placed[0]
+        self._T_base_workpiece = _as_pose(*self._part_at)
         return self._T_base_workpiece
+
+    def parts_at(self, q: Array) -> Array:
+        """Return T_base_workpiece as PyBullet sees it at configurations (n, 6), (n, 4, 4)."""
+        found = np.empty((len(q), 4, 4))
+        _, at_flange = self._held[0]
+        for k, joints in enumerate(q[..., None].tolist()):
+            self._turn_joints(self._robot, self._joints, joints)
+            state = self._link_state(self._robot, self._flange, computeForwardKinematics=True)
+            found[k] = _as_pose(*self._joined(*state[4:6], *at_flange))
+        return found
 
     def distance(self, first: Solid, second: Solid, within: float) -> float:
         """Return the distance in [m], negative in penetration, inf beyond ``within``."""
@@ -195,7 +204,7 @@ class World:
 
     def surrounding(self) -> list[str]:
         """Return the meshes around flange or part as posed: distances are those of surfaces."""
-        state = self._client.getLinkState(self._robot, self._flange, computeForwardKinematics=True)
+        state = self._link_state(self._robot, self._flange, computeForwardKinematics=True)
         points = [
             np.array(state[4]),
             transform(self._T_base_workpiece, self._cell.part.vertices[0]),
@@ -224,9 +233,7 @@ class World:
         farther body of the pair hangs on, and the body stretched out beyond it.
         """
         self.move_to(np.zeros(len(self._joints)))
-        origins = [
-            np.array(self._client.getLinkState(self._robot, joint)[4]) for joint in self._joints
-        ]
+        origins = [np.array(self._link_state(self._robot, joint)[4]) for joint in self._joints]
         lengths = np.linalg.norm(np.diff(origins, axis=0), axis=1)
         radii = {}
         for solid in (*self._links[1:], *(held for held, _ in self._held)):
@@ -280,3 +287,11 @@ class World:
 def _position_quaternion(T: Array) -> tuple[list[float], list[float]]:
     """Return a pose as Bullet takes it: position in [m], quaternion x y z w."""
     return T[:3, 3].tolist(), quaternion(T[:3, :3]).tolist()
+
+
+def _as_pose(position: Sequence[float], xyzw: Sequence[float]) -> Array:
+    """Return a pose as Bullet gives it, shape (4, 4)."""
+    T = np.eye(4)
+    T[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(xyzw), (3, 3))
+    T[:3, 3] = position
+    return T

@@ -14,7 +14,13 @@ from opl.job.load import load_job
 from opl.motion.motion import MoveKind
 from opl.run.surfacing import cut_surface
 from opl.verification.align import Course, align
-from opl.verification.contact import Touches, contact_positions, find_touches, misfit
+from opl.verification.contact import (
+    Touches,
+    contact_positions,
+    find_touches,
+    misfit,
+    near_wheel,
+)
 from opl.verification.contact_segments import ContactSegments, place_between
 from opl.verification.recognise import Rule, recognise
 from opl.verification.replay import replay
@@ -133,11 +139,20 @@ def parts_at(wheel, points, place, t):
     return wheel.T_contact0_contact(np.asarray(t)) @ inverse(points.frames_at(np.asarray(place)))
 
 
+def placed(wheel, points, Ts, duration, ends, t_ends):
+    """Return places, contact positions and distances of one segment."""
+    first, last = ends
+    t_before, t_after = np.array(t_ends)[:, None]
+    of_one = np.array([first]), last - first
+    found = place_between(wheel, points, Ts[None], duration[None], of_one, (t_before, t_after))
+    return tuple(one[0] for one in found)
+
+
 def test_a_place_between_two_cutter_points_is_found():
     problem = small_problem()
     wheel, points = problem.cell.wheel, problem.points
     Ts = parts_at(wheel, points, [20.3], [12.5])
-    found, position, apart = place_between(wheel, points, Ts, np.ones(2), (20, 21), (12.5, 12.5))
+    found, position, apart = placed(wheel, points, Ts, np.ones(2), (20, 21), (12.5, 12.5))
     assert found[0] == pytest.approx(20.3, abs=1e-3)
     assert position[0] == pytest.approx(12.5, abs=0.01)
     assert apart[0] < 1e-6
@@ -156,7 +171,7 @@ def test_a_pivot_through_the_hollow_is_followed(forwards):
     again = Ts[:, None] @ points.frames_at(place[:, None] + np.linspace(0.1, 0.3, 401))
     distance, _ = misfit(wheel, again, contact_positions(wheel, again))
     assert distance.min() < 1e-5
-    found, position, apart = place_between(
+    found, position, apart = placed(
         wheel, points, Ts, np.ones(9), (0, 1), (-15.6, -33.3) if forwards else (-33.3, -15.6)
     )
     np.testing.assert_allclose(found, place, atol=1e-3)
@@ -177,17 +192,45 @@ def test_whatever_goes_forward_over_the_wheel_is_explained(point, fractions, sta
     place = point + np.array(fractions)
     t = np.clip(start + np.cumsum(changes[:n]), -70.0, 70.0)
     Ts = parts_at(wheel, points, place, t)
-    found, _, apart = place_between(
-        wheel, points, Ts, np.ones(n + 1), (point, point + 1), (t[0], t[-1])
-    )
+    found, _, apart = placed(wheel, points, Ts, np.ones(n + 1), (point, point + 1), (t[0], t[-1]))
     assert (np.diff(found) >= 0.0).all()
     assert apart.max() < 1e-5
+
+
+def test_segments_at_once_are_placed_as_one_by_one():
+    wheel, points = hollow()
+    first = np.array([3, 11, 24])
+    place = first[:, None] + np.linspace(0.1, 0.8, 5)
+    t = np.array([[-40.0, -3.0, 28.0], [-38.0, 2.0, 31.0]])
+    Ts = parts_at(wheel, points, place, np.linspace(*t, 5, axis=1))
+    duration = np.linspace(0.5, 2.0, 18).reshape(3, 6)
+    at_once = place_between(wheel, points, Ts, duration, (first, 1), tuple(t))
+    for k, point in enumerate(first):
+        alone = placed(wheel, points, Ts[k], duration[k], (point, point + 1), t[:, k])
+        for one, other in zip(at_once, alone, strict=True):
+            np.testing.assert_array_equal(one[k], other)
+
+
+def test_points_near_the_wheel_are_those_found_one_by_one(monkeypatch):
+    wheel, points = hollow()
+    Ts = parts_at(wheel, points, np.linspace(1.0, 40.0, 60), np.linspace(-60.0, 60.0, 60))
+    monkeypatch.setattr("opl.verification.contact.AT_ONCE", 7 * len(points))
+    configuration, point = near_wheel(wheel, points, Ts, 1e-3)
+    p_workpiece = points.Ts_workpiece_cutter[:, :3, 3]
+    expected = [
+        (k, i)
+        for k, T in enumerate(Ts)
+        for i, p in enumerate(p_workpiece)
+        if abs(wheel.signed_distance(T[:3, :3] @ p + T[:3, 3])) <= 1e-3
+    ]
+    assert len(expected) > len(Ts)
+    assert list(zip(configuration.tolist(), point.tolist(), strict=True)) == expected
 
 
 def test_what_goes_back_is_not_explained():
     wheel, points = hollow()
     Ts = parts_at(wheel, points, [3.2, 3.6, 3.3, 3.8], np.full(4, 30.0))
-    found, _, apart = place_between(wheel, points, Ts, np.ones(5), (3, 4), (30.0, 30.0))
+    found, _, apart = placed(wheel, points, Ts, np.ones(5), (3, 4), (30.0, 30.0))
     assert (np.diff(found) >= 0.0).all()
     step = np.linalg.norm(np.diff(points.Ts_workpiece_cutter[3:5, :3, 3], axis=0))
     assert apart[1:3].sum() > 0.25 * step  # it went back by 0.3 of the step
