@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from opl.cell.collision import CollisionScene
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import PartTree, signed_wheel_distance
+from opl.cell.wheel_triangle import TOLERANCE
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
@@ -19,7 +20,8 @@ RESOLUTION = np.deg2rad(1.0)  # largest joint change between two configurations 
 # Where the part may touch the wheel it turns and slides by many times what it may sink in: no
 # corner of its box moves farther than this between two places that are looked at
 STEP = 1e-3  # [m]
-FINER = 16  # parts of a step, where the part could be too deep on the way
+FINER = 16  # parts of a step, where the part could be too deep on the way; a power of two
+LONGER = 1.02  # times the straight way from place to place: what the part goes, as it turns
 
 
 @dataclass(frozen=True)
@@ -134,8 +136,8 @@ def _at_wheel(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return which moves bring the part too near to the wheel, and which of them end there.
 
-    Where it may touch the wheel, a place between two that are looked at is nearer by half the way
-    between them at the most. Where that could matter, more are looked at.
+    Where it may touch the wheel, a place between two that are looked at is nearer than half of both
+    distances by half the way between them at the most. Where that could matter, the way is halved.
 
     Returns:
         Two flags for each move, by the configuration that it ends at, each of shape (n,).
@@ -155,21 +157,33 @@ def _at_wheel(
     counts = np.maximum(counts, 1).astype(int)
     q, move = _in_parts(motion.q, counts)
     needed = np.where(motion.free, cell.part_from_wheel, -cell.planned_penetration)[move]
-    half = np.concatenate([[0.0], moved / counts / 2.0])[move]
+    way = LONGER * np.concatenate([[0.0], moved / counts])[move]
     # a move begins where the one before it ends
     looked_at = chosen[move]
     looked_at[:-1] |= looked_at[1:]
+    kept = needed + way / 2.0 + TOLERANCE
     found = np.full(len(q), np.inf)
-    found[looked_at] = distance(q[looked_at], (needed + half)[looked_at])
+    found[looked_at] = distance(q[looked_at], kept[looked_at])
     sunk = np.zeros(len(motion), dtype=bool)
     sunk[move[found < needed]] = True
     sunk &= chosen
     at_end = (found < needed)[np.concatenate([[0], np.cumsum(counts)])]
-    near = found < needed + half
-    near[1:] |= near[:-1]
-    unsure = np.flatnonzero(near & (half > 0.0) & (chosen & ~sunk)[move])
-    between = np.arange(1, FINER)[:, None] / FINER
-    finer = (q[unsure - 1, None] + between * (q[unsure] - q[unsure - 1])[:, None]).reshape(-1, 6)
-    at = np.repeat(unsure, FINER - 1)
-    sunk[move[at[distance(finer, needed[at]) < needed[at]]]] = True
+    # what keeps its distance is not measured further
+    at_least = np.minimum(found, kept)
+    end = np.flatnonzero((way > 0.0) & (chosen & ~sunk)[move])
+    apart = np.full((len(end), FINER + 1), np.inf)
+    apart[:, 0], apart[:, -1] = at_least[end - 1], at_least[end]
+    step = FINER
+    while step > 1:
+        before = np.arange(0, FINER, step)
+        too_little = 2.0 * (needed[end] + TOLERANCE) + way[end] * step / FINER
+        one, k = np.nonzero(apart[:, before] + apart[:, before + step] < too_little[:, None])
+        at = end[one]
+        middle = before[k] + step // 2
+        between = q[at - 1] + (middle / FINER)[:, None] * (q[at] - q[at - 1])
+        enough = needed[at] + way[at] * step / FINER / 4.0 + TOLERANCE
+        there = distance(between, enough)
+        sunk[move[at[there < needed[at]]]] = True
+        apart[one, middle] = np.minimum(there, enough)
+        step //= 2
     return sunk, at_end
