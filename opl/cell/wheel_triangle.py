@@ -82,6 +82,14 @@ def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-de
     nz = edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0]
     for sign in (-1.0, 1.0):
         most = max(most, _out_along(corners, half_width, radius, sign * nx, sign * ny, sign * nz))
+    for k in range(3):
+        # away from the axle where an edge is nearest to it: mostly that is enough
+        ey, ez = edges[k, 1], edges[k, 2]
+        square = ey * ey + ez * ez
+        share = -(corners[k, 1] * ey + corners[k, 2] * ez) / square if square > 0.0 else 0.0
+        y, z = corners[k, 1] + share * ey, corners[k, 2] + share * ez
+        if 0.0 < share < 1.0:
+            most = max(most, _out_along(corners, half_width, radius, 0.0, y, z))
     across, tried = np.empty((2, 3)), np.empty(DIRECTIONS)
     turn = 2.0 * np.pi / DIRECTIONS
     for k in range(3):

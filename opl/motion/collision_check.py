@@ -21,6 +21,7 @@ RESOLUTION = np.deg2rad(1.0)  # largest joint change between two configurations 
 # corner of its box moves farther than this between two places that are looked at
 STEP = 1e-3  # [m]
 FINER = 16  # parts of a step, where the part could be too deep on the way; a power of two
+CERTAIN = 0.75  # of the allowed depth: that a place is no deeper than the rest is soon found out
 LONGER = 1.02  # times the straight way from place to place: what the part goes, as it turns
 
 
@@ -161,7 +162,8 @@ def _at_wheel(
     # a move begins where the one before it ends
     looked_at = chosen[move]
     looked_at[:-1] |= looked_at[1:]
-    kept = needed + way / 2.0 + TOLERANCE
+    most = CERTAIN * cell.planned_penetration
+    kept = needed + np.where(way > 0.0, np.minimum(way / 2.0 + TOLERANCE, most), 0.0)
     found = np.full(len(q), np.inf)
     found[looked_at] = distance(q[looked_at], kept[looked_at])
     sunk = np.zeros(len(motion), dtype=bool)
@@ -181,7 +183,7 @@ def _at_wheel(
         at = end[one]
         middle = before[k] + step // 2
         between = q[at - 1] + (middle / FINER)[:, None] * (q[at] - q[at - 1])
-        enough = needed[at] + way[at] * step / FINER / 4.0 + TOLERANCE
+        enough = needed[at] + np.minimum(way[at] * step / FINER / 4.0 + TOLERANCE, most)
         there = distance(between, enough)
         sunk[move[at[there < needed[at]]]] = True
         apart[one, middle] = np.minimum(there, enough)
