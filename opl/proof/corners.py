@@ -88,9 +88,10 @@ def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playb
                     f"{np.floor(100.0 * fits) / 100.0:g} mm would do",
                 )
             )
-    near = list(_too_near(job, corners))
-    faults += near[:MOST_NAMED]
-    faults += _too_deep(job, corners)
+    with World(job.cell) as world:
+        near = list(_too_near(world, corners))
+        faults += near[:MOST_NAMED]
+        faults += _too_deep(world, corners, job.cell.max_belt_penetration)
     most = int(worst.argmax()) if worst.max(initial=0.0) > 0.0 else None
     return CornerProof(
         len(corners),
@@ -207,43 +208,46 @@ def _with_bows(values: Array) -> Array:
     return np.asarray(np.abs(np.concatenate([values, vertex], axis=-1)))
 
 
-def _too_near(job: Job, corners: list[Rounding]) -> Iterator[tuple[Rounding, str]]:
+def _too_near(world: World, corners: list[Rounding]) -> Iterator[tuple[Rounding, str]]:
     """Yield corners that bring bodies too near to each other, and which."""
-    with World(job.cell) as world:
-        triangles = Triangles(world)
-        for corner in corners:
-            found = triangles.too_near(*corner.triangle(), corner.free)
-            if found is not None:
-                yield (
-                    corner,
-                    f"brings {found.names} to {1e3 * found.distance:.2f} mm, "
-                    f"{1e3 * found.needed:g} mm needed",
-                )
+    triangles = Triangles(world)
+    for corner in corners:
+        found = triangles.too_near(*corner.triangle(), corner.free)
+        if found is not None:
+            yield (
+                corner,
+                f"brings {found.names} to {1e3 * found.distance:.2f} mm, "
+                f"{1e3 * found.needed:g} mm needed",
+            )
 
 
-def _too_deep(job: Job, corners: list[Rounding]) -> Iterator[tuple[Rounding, str]]:
+def _too_deep(
+    world: World, corners: list[Rounding], allowed: float
+) -> Iterator[tuple[Rounding, str]]:
     """Yield the first corners that take the part too deep into the belt, and how deep."""
-    allowed, named = job.cell.max_belt_penetration, 0
-    with World(job.cell) as world:
-        for corner in corners:
-            deepest = _deepest(world, corner)
-            if deepest > allowed and named < MOST_NAMED:
-                named += 1
-                yield (
-                    corner,
-                    f"takes the part {1e3 * deepest:.3f} mm into the belt, "
-                    f"{1e3 * allowed:g} mm allowed",
-                )
+    named = 0
+    for corner in corners:
+        deepest = _deepest(world, corner, allowed)
+        if deepest > allowed and named < MOST_NAMED:
+            named += 1
+            yield (
+                corner,
+                f"takes the part {1e3 * deepest:.3f} mm into the belt, "
+                f"{1e3 * allowed:g} mm allowed",
+            )
 
 
-def _deepest(world: World, corner: Rounding) -> float:
-    """Return how deep the part is in the belt on some chords in [m], 0 where it must keep off."""
+def _deepest(world: World, corner: Rounding, allowed: float) -> float:
+    """Return how deep the part is in the belt on some chords in [m], if deeper than allowed.
+
+    Else some depth that is not; 0 where it must keep off.
+    """
     if corner.free:
         return 0.0
     gaps = []
     for q in looked_at(corner):
         world.move_to(q)
-        gaps.append(world.gap(0.0))
+        gaps.append(world.gap(-allowed))
     return max(0.0, -min(gaps))
 
 

@@ -16,8 +16,8 @@ from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import ContactWheel
+from opl.verification.arm import Arm
 from opl.verification.contact import LEVER, contact_positions, near_wheel
-from opl.verification.world import World
 
 STEP = 1e-3  # [m] that no corner of the part's box moves farther from one sample to the next
 TURN = np.deg2rad(0.5)  # that no joint turns farther
@@ -48,7 +48,7 @@ class Samples:
 
 
 def sample(
-    world: World,
+    arm: Arm,
     wheel: ContactWheel,
     points: CutterPoints,
     part_vertices: Array,
@@ -59,7 +59,7 @@ def sample(
     """Sample moves where they may grind.
 
     Args:
-        world: Knows where the part is.
+        arm: Knows where the part is.
         wheel: The wheel.
         points: The cutter points that may be ground.
         part_vertices: Of the held part in [m], shape (k, 3).
@@ -67,7 +67,7 @@ def sample(
         duration: Time of the move that ends at each configuration in [s], shape (n,).
         allowed: Farthest that a ground point may be from the contact model in [m].
     """
-    Ts = _places(world, wheel, q)
+    Ts = _places(arm, wheel, q)
     corners = box_corners(part_vertices)
     at_corners = transform(Ts[:, None], corners)
     moved = np.linalg.norm(np.diff(at_corners, axis=0), axis=-1).max(axis=1, initial=0.0)
@@ -80,9 +80,9 @@ def sample(
     move = np.repeat(np.arange(1, len(q)), counts.astype(int))
     step = np.arange(len(move)) - np.searchsorted(move, move) + 1
     at = np.concatenate([[0.0], move - 1 + step / counts[move - 1]])  # whole where given
-    at, Ts = _with(world, wheel, q, np.arange(len(q)).astype(float), Ts, at)
+    at, Ts = _with(arm, wheel, q, np.arange(len(q)).astype(float), Ts, at)
     put_in = _passed(wheel, points, Ts, at, np.flatnonzero(close), allowed)
-    at, Ts = _with(world, wheel, q, at, Ts, np.union1d(at, put_in))
+    at, Ts = _with(arm, wheel, q, at, Ts, np.union1d(at, put_in))
     source = np.ceil(at).astype(np.intp)
     share = np.diff(at, prepend=0.0)
     ends = np.concatenate([[False], close])
@@ -97,8 +97,8 @@ def sample(
     )
 
 
-def _places(world: World, wheel: ContactWheel, q: Array) -> Array:
-    return np.asarray(np.linalg.solve(wheel.T_base_contact0, world.parts_at(q)))
+def _places(arm: Arm, wheel: ContactWheel, q: Array) -> Array:
+    return np.asarray(np.linalg.solve(wheel.T_base_contact0, arm.parts_at(q)))
 
 
 def _on_lines(q: Array, at: Array) -> Array:
@@ -109,13 +109,13 @@ def _on_lines(q: Array, at: Array) -> Array:
 
 
 def _with(
-    world: World, wheel: ContactWheel, q: Array, known: Array, Ts: Array, at: Array
+    arm: Arm, wheel: ContactWheel, q: Array, known: Array, Ts: Array, at: Array
 ) -> tuple[Array, Array]:
     """Return fractional indices and where the part is there; for the known ones that is known."""
     found = np.empty((len(at), 4, 4))
     old = np.isin(at, known)
     found[old] = Ts[np.searchsorted(known, at[old])]
-    found[~old] = _places(world, wheel, _on_lines(q, at[~old]))
+    found[~old] = _places(arm, wheel, _on_lines(q, at[~old]))
     return at, found
 
 

@@ -62,32 +62,65 @@ class Patches:
 
     Attributes:
         triangles: Corners of those of each patch in [m], p arrays of shape (m, 3, 3).
-        middle: Middle of the box around each patch in [m], shape (p, 3).
+        axes: Along the edges of a box around each patch, thin where the patch is flat: unit
+            vectors as columns, shape (p, 3, 3).
+        middle: Middle of the box in [m], shape (p, 3).
         half: Half its edges in [m], shape (p, 3).
+        corners: Those of its triangles, each once, from the middle, p arrays of shape (c, 3).
     """
 
     triangles: tuple[Array, ...]
+    axes: Array
     middle: Array
     half: Array
+    corners: tuple[Array, ...]
 
     @classmethod
     def of(cls, triangles: Array) -> Patches:
         """Return the patches of triangles, shape (m, 3, 3)."""
         patches = tuple(_halved(triangles))
-        low = np.array([patch.min(axis=(0, 1)) for patch in patches])
-        high = np.array([patch.max(axis=(0, 1)) for patch in patches])
-        return cls(patches, (low + high) / 2.0, (high - low) / 2.0)
+        corners = [np.unique(patch.reshape(-1, 3), axis=0) for patch in patches]
+        spreads = [one - one.mean(axis=0) for one in corners]
+        _, axes = np.linalg.eigh([spread.T @ spread for spread in spreads])
+        along = [one @ its for one, its in zip(corners, axes, strict=True)]
+        low = np.array([one.min(axis=0) for one in along])
+        high = np.array([one.max(axis=0) for one in along])
+        middle = np.einsum("pik,pk->pi", axes, (low + high) / 2.0)
+        around = tuple(one - its for one, its in zip(corners, middle, strict=True))
+        return cls(patches, axes, middle, (high - low) / 2.0, around)
 
-    def least_distances(self, drum: Drum, T_base_workpiece: Array) -> Array:
-        """Return a lower bound of the distance of each patch from the wheel in [m], shape (p,).
-
-        The signed distance to a cylinder is convex: nothing of a patch is nearer than the plane
-        that touches it in the middle says. That bounds Bullet's penetration depth as well, the
-        shortest motion out of the wheel: one is along the normal of that plane.
-        """
+    def beside(self, drum: Drum, T_base_workpiece: Array) -> Beside:
+        """Return how near the patches can be to the wheel in a pose of the part, shape (4, 4)."""
         distance, outward = drum.distances(transform(T_base_workpiece, self.middle))
-        reach = (np.abs(outward @ T_base_workpiece[:3, :3]) * self.half).sum(axis=1)
-        return np.asarray(distance - reach)
+        return Beside(self, distance, outward @ T_base_workpiece[:3, :3])
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Lower bounds of the distance of patches from the wheel in [m].
+
+    The signed distance to a cylinder is convex: nothing of a patch is nearer than the plane that
+    touches it in the middle says. That bounds Bullet's penetration depth as well, the shortest
+    motion out of the wheel: one is along the normal of that plane.
+
+    Attributes:
+        patches: The patches.
+        distance: Of the middle of each in [m], shape (p,).
+        outward: In which direction it grows, in the workpiece frame, shape (p, 3).
+    """
+
+    patches: Patches
+    distance: Array
+    outward: Array
+
+    def of_boxes(self) -> Array:
+        """Return a bound of each patch by the box around it, shape (p,)."""
+        along = np.abs(np.einsum("pi,pik->pk", self.outward, self.patches.axes))
+        return np.asarray(self.distance - (along * self.patches.half).sum(axis=1))
+
+    def of_corners(self, k: int) -> float:
+        """Return a bound of one patch by its triangles, no less than that of its box."""
+        return float(self.distance[k] + (self.patches.corners[k] @ self.outward[k]).min())
 
 
 def _halved(triangles: Array) -> Iterator[Array]:

@@ -20,10 +20,10 @@ from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion, MoveKind, TimedMotion
 from opl.verification.align import Course, align
+from opl.verification.arm import Arm
 from opl.verification.contact import find_touches
 from opl.verification.contact_segments import ContactSegment, ContactSegments
 from opl.verification.passing import Samples, sample
-from opl.verification.world import World
 
 # [m] that a configuration which is written at a cutter point may be off the contact model there:
 # what the digits of a position leave. Of several that grind a point the nearest is taken by this
@@ -97,8 +97,8 @@ def recognise(
         rule: What a motion over the wheel has to keep.
     """
     allowed = rule.max_contact_error
-    with World(cell) as world:
-        samples = sample(world, cell.wheel, points, cell.part.vertices, q, duration, allowed)
+    with Arm(cell) as arm:
+        samples = sample(arm, cell.wheel, points, cell.part.vertices, q, duration, allowed)
     # of the configurations of a straight move only the last is written, and all lie near together
     Ts, near = samples.Ts_contact0_workpiece, samples.near
     touches = find_touches(cell.wheel, points, Ts[near], allowed)

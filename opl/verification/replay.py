@@ -221,7 +221,9 @@ class _Run:
         off_wheel = cell.pairs.required.get(frozenset((PART, WHEEL)), cell.required_clearance)
         needed = off_wheel if free else -cell.max_belt_penetration
         farthest = self._allowed_error + GAP_ACCURACY if grinding and not touching_down else np.inf
-        gap = self._world.gap(farthest if farthest < np.inf else max(needed, 0.0))
+        # where it may touch, what is not as deep as it ever was need not be known
+        counts = needed if free else max(needed, self.gap.amount)
+        gap = self._world.gap(farthest if farthest < np.inf else counts, counts)
         if not free:
             self.gap.note(gap, f"{PART} and {WHEEL}", move, self._q)
         if gap < needed:

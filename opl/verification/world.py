@@ -16,13 +16,12 @@ import numpy as np
 from opl.cell.workcell import PART, WorkCell
 from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import TriangleMesh
-from opl.geometry.rotations import quaternion
 from opl.geometry.shapes import Body, Box, Cylinder
-from opl.verification.engine import pybullet, start
+from opl.verification.arm import BASE_LINK, Arm, as_placed, as_pose
+from opl.verification.engine import pybullet
 from opl.verification.meshes import concave_shape, is_inside, triangle_body
 from opl.verification.patches import Drum, Patches
 
-BASE_LINK = -1  # Bullet's number of the link that does not move
 # Bullet rounds the edges of a link's boxes by about this much, so that they seem farther away than
 # they are; it is added to what is needed
 LINK_ROUNDING = 1e-3  # [m]
@@ -71,46 +70,22 @@ class SolidPair:
         return less <= joint < more
 
 
-class World:
+class World(Arm):
     """A physics server with the cell in it; use as a context manager."""
 
     def __init__(self, cell: WorkCell) -> None:
+        super().__init__(cell)
         self._cell = cell
-        self._client = start()
-        # the client looks names up each time
         self._closest_points = self._client.getClosestPoints
-        self._turn_joints = self._client.resetJointStatesMultiDof
         self._place = self._client.resetBasePositionAndOrientation
-        self._link_state = self._client.getLinkState
-        self._joined = self._client.multiplyTransforms
-        # else a file is taken for an earlier one of its name
-        self._client.setPhysicsEngineParameter(enableFileCaching=0)
-        self._robot = self._client.loadURDF(
-            str(cell.robot.urdf),
-            basePosition=[0.0, 0.0, -cell.robot.base_height],
-            useFixedBase=True,
-            # else Bullet inscribes prisms of 32 sides in cylinders
-            flags=pybullet.URDF_USE_IMPLICIT_CYLINDER,
-        )
-        self._joints: list[int] = []
         self._links = [Solid(self._link_name(BASE_LINK), self._robot, BASE_LINK)]
-        self._flange = BASE_LINK
-        for index in range(self._client.getNumJoints(self._robot)):
-            info = self._client.getJointInfo(self._robot, index)
-            if info[2] == pybullet.JOINT_REVOLUTE:
-                self._joints.append(index)
-                link = Solid(self._link_name(index), self._robot, index, len(self._joints))
-                self._links.append(link)
-            if info[12].decode() == "tool0":
-                self._flange = index
+        for count, index in enumerate(self._joints, start=1):
+            self._links.append(Solid(self._link_name(index), self._robot, index, count))
         # the part is the first of the held bodies
         part = self._add_mesh(cell.part.triangles.reshape(-1, 3))
-        held = [(part, cell.T_flange_workpiece)]
-        held += [(self._add(body), body.T_parent_body) for body in cell.fixture]
-        self._held = [
-            (replace(solid, moved_by=len(self._joints)), _position_quaternion(T))
-            for solid, T in held
-        ]
+        held = [(part, self._part_at_flange)]
+        held += [(self._add(body), as_placed(body.T_parent_body)) for body in cell.fixture]
+        self._held = [(replace(solid, moved_by=len(self._joints)), at) for solid, at in held]
         wheel = cell.wheel_body()
         self._wheel = self._add(wheel, wheel.T_parent_body)
         self._drum = Drum(wheel.T_parent_body, cell.wheel.radius, cell.wheel.width)
@@ -122,9 +97,6 @@ class World:
 
     def __enter__(self) -> World:
         return self
-
-    def __exit__(self, *_: object) -> None:
-        self._client.disconnect()
 
     def pairs(self) -> list[SolidPair]:
         """Return every pair that must stay apart; part and wheel may touch and are not in it."""
@@ -162,44 +134,38 @@ class World:
 
     def move_to(self, q: Array) -> Array:
         """Pose robot, part and fixture; return T_base_workpiece as PyBullet sees it, (4, 4)."""
-        self._turn_joints(self._robot, self._joints, q[:, None].tolist())
-        state = self._link_state(self._robot, self._flange, computeForwardKinematics=True)
-        placed = [self._joined(*state[4:6], *at_flange) for _, at_flange in self._held]
+        flange = self._turned(q)
+        placed = [self._joined(*flange, *at_flange) for _, at_flange in self._held]
         for (held, _), at in zip(self._held, placed, strict=True):
             self._place(held.body, *at)
         self._part_at = placed[0]
-        self._T_base_workpiece = _as_pose(*self._part_at)
+        self._T_base_workpiece = as_pose(*self._part_at)
         return self._T_base_workpiece
-
-    def parts_at(self, q: Array) -> Array:
-        """Return T_base_workpiece as PyBullet sees it at configurations (n, 6), (n, 4, 4)."""
-        found = np.empty((len(q), 4, 4))
-        _, at_flange = self._held[0]
-        for k, joints in enumerate(q[..., None].tolist()):
-            self._turn_joints(self._robot, self._joints, joints)
-            state = self._link_state(self._robot, self._flange, computeForwardKinematics=True)
-            found[k] = _as_pose(*self._joined(*state[4:6], *at_flange))
-        return found
 
     def distance(self, first: Solid, second: Solid, within: float) -> float:
         """Return the distance in [m], negative in penetration, inf beyond ``within``."""
         contacts = self._closest_points(first.body, second.body, within, first.link, second.link)
         return min((contact[8] for contact in contacts), default=np.inf)
 
-    def gap(self, within: float) -> float:
+    def gap(self, within: float, counts: float = np.inf) -> float:
         """Return the distance of the part from the wheel in [m], as `distance`.
 
         Measured patch by patch, the nearest bound first, and none that cannot be nearer than what
-        was measured.
+        was measured. Once the part is known to be within, only distances less than ``counts`` are
+        the smallest there is; others are those of some patch.
         """
-        bounds = self._patches.least_distances(self._drum, self._T_base_workpiece)
-        nearest = np.inf
+        beside = self._patches.beside(self._drum, self._T_base_workpiece)
+        bounds, nearest = beside.of_boxes(), np.inf
         for k in bounds.argsort():
-            if bounds[k] - 2.0 * MARGIN > min(nearest, within):
+            wanted = min(nearest, within if nearest > within else counts) + 2.0 * MARGIN
+            if bounds[k] > wanted:
                 break
+            if beside.of_corners(k) > wanted:
+                continue
             patch = self._shown[k]
             self._place(patch.body, *self._part_at)
-            nearest = min(nearest, self.distance(patch, self._wheel, min(nearest, within)))
+            ahead = min(nearest, max(within, 0.0))
+            nearest = min(nearest, self.distance(patch, self._wheel, ahead))
         return nearest
 
     def surrounding(self) -> list[str]:
@@ -271,7 +237,7 @@ class World:
         else:
             solid = self._as_solid(body.name, triangle_body(client, body.shape))
         if T_base_body is not None:
-            at = _position_quaternion(T_base_body)
+            at = as_placed(T_base_body)
             client.resetBasePositionAndOrientation(solid.body, *at)
         return solid
 
@@ -282,16 +248,3 @@ class World:
     def _as_solid(self, name: str, body: int) -> Solid:
         self._client.changeDynamics(body, BASE_LINK, collisionMargin=MARGIN)
         return Solid(name, body, BASE_LINK)
-
-
-def _position_quaternion(T: Array) -> tuple[list[float], list[float]]:
-    """Return a pose as Bullet takes it: position in [m], quaternion x y z w."""
-    return T[:3, 3].tolist(), quaternion(T[:3, :3]).tolist()
-
-
-def _as_pose(position: Sequence[float], xyzw: Sequence[float]) -> Array:
-    """Return a pose as Bullet gives it, shape (4, 4)."""
-    T = np.eye(4)
-    T[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(xyzw), (3, 3))
-    T[:3, 3] = position
-    return T
