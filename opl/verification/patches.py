@@ -89,6 +89,18 @@ class Patches:
         around = tuple(one - its for one, its in zip(corners, middle, strict=True))
         return cls(patches, axes, middle, (high - low) / 2.0, around)
 
+    def from_box(self, low: Array, high: Array, T_base_workpiece: Array) -> Array:
+        """Return lower bounds of the distance of patches from a box along the base frame, (p,).
+
+        In [m], 0 where they may touch it. The box is given by its lowest and highest coordinates,
+        shape (3,), the pose of the part has shape (4, 4).
+        """
+        middle = transform(T_base_workpiece, self.middle)
+        along = np.abs(T_base_workpiece[:3, :3] @ self.axes)
+        reach = np.einsum("pik,pk->pi", along, self.half)
+        between = np.maximum(np.maximum(low - middle, middle - high) - reach, 0.0)
+        return np.asarray(np.linalg.norm(between, axis=1))
+
     def beside(self, drum: Drum, T_base_workpiece: Array) -> Beside:
         """Return how near the patches can be to the wheel in a pose of the part, shape (4, 4)."""
         distance, outward = drum.distances(transform(T_base_workpiece, self.middle))

@@ -90,6 +90,8 @@ class World(Arm):
         self._wheel = self._add(wheel, wheel.T_parent_body)
         self._drum = Drum(wheel.T_parent_body, cell.wheel.radius, cell.wheel.width)
         self._obstacles = [self._add(body, body.T_parent_body) for body in cell.obstacles]
+        boxes = map(_box_around, cell.obstacles)
+        self._standing = dict(zip(self._obstacles, boxes, strict=True))
         # Bullet tests every triangle in the box around the wheel, nearly all of a fine mesh
         self._patches = Patches.of(cell.part.triangles)
         self._shown = [self._add_mesh(patch.reshape(-1, 3)) for patch in self._patches.triangles]
@@ -144,6 +146,23 @@ class World(Arm):
 
     def distance(self, first: Solid, second: Solid, within: float) -> float:
         """Return the distance in [m], negative in penetration, inf beyond ``within``."""
+        if first == self._held[0][0] and second in self._standing:
+            bounds = self._patches.from_box(*self._standing[second], self._T_base_workpiece)
+            nearest = np.inf
+            for k in bounds.argsort():
+                if bounds[k] > min(nearest, within) + 2.0 * MARGIN:
+                    break
+                nearest = min(nearest, self._from_patch(k, second, min(nearest, within)))
+            return nearest
+        return self._measured(first, second, within)
+
+    def _from_patch(self, k: int, other: Solid, within: float) -> float:
+        """Return the distance of a patch of the part from another solid, as `distance`."""
+        self._place(self._shown[k].body, *self._part_at)
+        return self._measured(self._shown[k], other, within)
+
+    def _measured(self, first: Solid, second: Solid, within: float) -> float:
+        """Return what Bullet says of two solids, as `distance`."""
         contacts = self._closest_points(first.body, second.body, within, first.link, second.link)
         return min((contact[8] for contact in contacts), default=np.inf)
 
@@ -162,10 +181,8 @@ class World(Arm):
                 break
             if beside.of_corners(k) > wanted:
                 continue
-            patch = self._shown[k]
-            self._place(patch.body, *self._part_at)
             ahead = min(nearest, max(within, 0.0))
-            nearest = min(nearest, self.distance(patch, self._wheel, ahead))
+            nearest = min(nearest, self._from_patch(k, self._wheel, ahead))
         return nearest
 
     def surrounding(self) -> list[str]:
@@ -248,3 +265,17 @@ class World(Arm):
     def _as_solid(self, name: str, body: int) -> Solid:
         self._client.changeDynamics(body, BASE_LINK, collisionMargin=MARGIN)
         return Solid(name, body, BASE_LINK)
+
+
+def _box_around(body: Body) -> tuple[Array, Array]:
+    """Return the lowest and the highest coordinates of a body in the frame it is given in."""
+    T, shape = body.T_parent_body, body.shape
+    if isinstance(shape, TriangleMesh):
+        corners = transform(T, shape.vertices)
+        return corners.min(axis=0), corners.max(axis=0)
+    if isinstance(shape, Box):
+        half = np.array(shape.size) / 2.0
+    else:
+        half = np.array([shape.radius, shape.radius, shape.length / 2.0])
+    reach = np.abs(T[:3, :3]) @ half
+    return T[:3, 3] - reach, T[:3, 3] + reach

@@ -59,6 +59,14 @@ def test_patches_are_all_the_triangles_and_their_bounds_hold():
         points = np.einsum("wk,mki->wmi", weights, patch).reshape(-1, 3)
         nearest = DRUM.distances(points @ T[:3, :3].T + T[:3, 3])[0].min()
         assert nearest >= beside.of_corners(k) >= of_box - 1e-12
+    low, high = np.array([-0.1, 0.1, 0.0]), np.array([0.05, 0.3, 0.2])
+    from_box = patches.from_box(low, high, T)
+    assert from_box.max() > 0.05
+    for patch, bound in zip(patches.triangles, from_box, strict=True):
+        points = np.einsum("wk,mki->wmi", weights, patch).reshape(-1, 3)
+        p_base = points @ T[:3, :3].T + T[:3, 3]
+        between = np.maximum(np.maximum(low - p_base, p_base - high), 0.0)
+        assert np.linalg.norm(between, axis=1).min() >= bound - 1e-12
 
 
 def whole_mesh(client, cell):
