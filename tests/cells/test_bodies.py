@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from opl.cell.collision import CollisionScene, enclosing_bodies
+from opl.cell.collision import CollisionScene
+from opl.cell.enclosing import enclosing_bodies
 from opl.cell.robot import collision_shapes, forward_kinematics
 from opl.cell.workcell import PairRules
 from opl.geometry.frames import pose
