@@ -56,7 +56,8 @@ def certificate_of(problem: GrindingProblem, walls: list[Wall], bound: float) ->
         "penetration": cell.planned_penetration,
         "triangles": part.vertices[part.faces].tolist(),
         "Ts_workpiece_cutter": problem.points.Ts_workpiece_cutter.tolist(),
-        "walls": [asdict(w.sweep) if w.sweep else {"place": w.place} for w in walls],
+        "pass_index": problem.points.pass_index.tolist(),
+        "walls": [wall.chain for wall in walls],
     }
 
 

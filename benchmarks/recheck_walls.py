@@ -185,15 +185,31 @@ class Machine:
         self._T_workpiece_flange = np.linalg.inv(np.array(certificate["T_flange_workpiece"]))
         self._triangles = np.array(certificate["triangles"])  # shape (n, 3, 3)
         self._Ts_workpiece_cutter = np.array(certificate["Ts_workpiece_cutter"])
+        self._pass_index = certificate["pass_index"]
 
-    def wall(self, wall: dict[str, float]) -> Cells:
-        """Return the cells of a wall, those left out in which nothing is allowed."""
-        if "contact_position" not in wall:
-            return self._column(wall["place"], -self._last, self._last)
-        before, after, t = wall["before"], wall["after"], wall["contact_position"]
-        low, high = (after, before) if wall["upwards"] else (before, after)
-        parts = [self._column(low, -self._last, t), self._row(before, after, t)]
-        parts.append(self._column(high, t, self._last))
+    def wall(self, chain: Sequence[Sequence[float]]) -> Cells:
+        """Return the cells of a wall, those left out in which nothing is allowed.
+
+        Its corners are places and contact positions. From the least contact position to the
+        greatest, one of the two the same from each corner to the next: whoever goes on along the
+        pass, and never back, crosses it where it leads upwards or along the pass.
+
+        Raises:
+            ValueError: If the chain is not one, or leads from pass to pass.
+        """
+        if chain[0][1] != -self._last or chain[-1][1] != self._last:
+            raise ValueError("a wall ends within the contact positions of the wheel")
+        places = [place for place, _ in chain]
+        if self._pass_index[int(min(places))] != self._pass_index[int(np.ceil(max(places)))]:
+            raise ValueError("a wall leads from one pass to another")
+        parts = []
+        for (place, t), (there, top) in pairwise(chain):
+            if place == there and top > t:
+                parts.append(self._column(place, t, top))
+            elif top == t:
+                parts.append(self._row(min(place, there), max(place, there), t))
+            elif place != there:
+                raise ValueError("a wall leads across places and contact positions at once")
         for k, part in enumerate(parts):
             part.place[:] += 1e4 * k  # one after the other
         return joined(parts)

@@ -13,13 +13,11 @@ from opl.planning.families import GROWN, Placement
 from opl.planning.images import Seams
 from opl.planning.nodes import inverse_solutions
 from opl.planning.problem import GrindingProblem, wheel_distances
-from opl.planning.rows import Row
 from opl.search.box import JointBox
 from opl.search.in_box import missing as missing_of
 from opl.search.in_box import missing_chords, nearest_points, sampled
 
 FINE = 33  # contact positions of a place at which a box is held against it
-ROW_SAMPLES = 8  # between two cutter points at one contact position
 POSTURES_OF_WORK = 400  # that cost a unit of work
 BORDER = 1e-2  # belt units to look beyond what lies in the box
 
@@ -44,31 +42,6 @@ class Columns:
     t: Array
     q: Array
     free: np.ndarray
-
-    def span(self, box: JointBox) -> tuple[Array, Array]:
-        """Return the least and the greatest contact position of each place in a box, shape (n,)."""
-        inside = self.free & (missing_of(self.q, box) <= GROWN)
-        least = np.where(inside, self.t, np.inf).min(axis=1)
-        return least, np.where(inside, self.t, -np.inf).max(axis=1)
-
-    def around(
-        self, box: JointBox, place: float, t: float, upwards: bool
-    ) -> tuple[float | None, float | None]:
-        """Return the nearest cutter points between which motions in a box must pass t.
-
-        Before a place one where nothing in the box lies beyond t, after it one where nothing lies
-        on the near side of t; None where there is none.
-        """
-        least, most = self.span(box)
-        below, above = most <= t, least >= t
-        index = self.points.pass_index[int(np.searchsorted(self.places, place, side="right")) - 1]
-        own = (self.points.pass_index == index) & (self.places % 1.0 == 0.0)
-        before = self.places[own & (self.places <= place) & (below if upwards else above)]
-        after = self.places[own & (self.places >= place) & (above if upwards else below)]
-        return (
-            float(before[-1]) if len(before) else None,
-            float(after[0]) if len(after) else None,
-        )
 
     def missed(self, box: JointBox, known: Collection[float], allowed: float) -> list[float]:
         """Return the places that a box misses by more than allowed in [rad], the worst first.
@@ -104,12 +77,7 @@ class ColumnSampler:
             places: Fractional cutter points, the cutter points among them, shape (n,).
         """
         problem = self._problem
-        before, points = places.astype(int), problem.points
-        there = CutterPoints(
-            points.frames_at(places),
-            points.pass_index[before],
-            np.interp(places, np.arange(len(points)), points.arc_length),
-        )
+        before, points, there = places.astype(int), problem.points, self.there(places)
         positions = problem.field.contact_positions
         grid = np.broadcast_to(positions, (len(places), len(positions)))
         field = self._placed(points.pass_index, problem.field.q, placements)
@@ -121,9 +89,27 @@ class ColumnSampler:
         # where the part begins to cut is known to a hair only
         last = problem.cell.wheel.last_position
         t = np.clip(np.concatenate([t[:, :1] - BORDER, t, t[:, -1:] + BORDER], axis=1), -last, last)
-        columns = self.at(places, there, placements, t)
+        columns = self._closer(self.at(places, there, placements, t), box)
         if self.collisions:
             self._leave_out_collisions(columns, box)
+        return columns
+
+    def _closer(self, columns: Columns, box: JointBox) -> Columns:
+        """Sample places that a box misses anew, closer around what is nearest to it."""
+        missed, row = nearest_points(columns.q, columns.free, box)
+        t, last = columns.t, columns.t.shape[1] - 1
+        for index, placement in enumerate(columns.placements):
+            own = np.flatnonzero(
+                (columns.points.pass_index == index) & (missed > GROWN) & np.isfinite(missed)
+            )
+            if not len(own):
+                continue
+            low = t[own, np.maximum(np.floor(row[own]).astype(int) - 1, 0)]
+            high = t[own, np.minimum(np.ceil(row[own]).astype(int) + 1, last)]
+            finer = np.linspace(low, high, last + 1, axis=1)
+            places = columns.places[own]
+            found = self.at(places, self.there(places), [placement], finer)
+            t[own], columns.q[own], columns.free[own] = finer, found.q, found.free
         return columns
 
     def _leave_out_collisions(self, columns: Columns, box: JointBox) -> None:
@@ -140,7 +126,7 @@ class ColumnSampler:
             if not near.any():
                 return
             asked |= near
-            free[near] = ~self._problem.scene.collision.collides(columns.q[near])
+            free[near] = ~self.collides(columns.q[near])
 
     def at(
         self, places: Array, there: CutterPoints, placements: Sequence[Placement], t: Array
@@ -153,34 +139,19 @@ class ColumnSampler:
         free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
         return Columns(places, there, tuple(placements), t, q, free)
 
-    def row(
-        self, first: float, last: float, t: float, must: bool, columns: Columns, box: JointBox
-    ) -> Row:
-        """Return the places between two of a pass at one contact position, closer near a box."""
-        places = np.linspace(first, last, ROW_SAMPLES * int(np.ceil(last - first)) + 1)
-        (row,) = self.rows([(places, t, must)], columns)
-        step = places[1] - places[0]
-        near = places[int(np.argmin(missing_of(row.q, box)))]
-        closer = near + step * np.linspace(-1.0, 1.0, 2 * ROW_SAMPLES + 1)
-        (row,) = self.rows([(np.union1d(places, np.clip(closer, first, last)), t, must)], columns)
-        return row
-
-    def rows(self, rows: Sequence[tuple[Array, float, bool]], columns: Columns) -> list[Row]:
-        """Return places of a pass at one contact position each, placed as columns are."""
-        if not rows:
-            return []
-        counts = [len(row[0]) for row in rows]
-        places = np.concatenate([row[0] for row in rows])
-        t = np.repeat([row[1] for row in rows], counts)
+    def there(self, places: Array) -> CutterPoints:
+        """Return fractional cutter points of some passes, shape (n,), as points of their own."""
         points = self._problem.points
-        Ts_workpiece_cutter = points.frames_at(places)[:, None]
-        q = inverse_solutions(self._problem.cell, Ts_workpiece_cutter, t[:, None])
-        index = np.repeat([points.pass_index[int(row[0][0])] for row in rows], counts)
-        placed = self._placed(index, q, columns.placements)[:, 0]
-        return [
-            Row(*row, q)
-            for row, q in zip(rows, np.split(placed, np.cumsum(counts)[:-1]), strict=True)
-        ]
+        index = points.pass_index[places.astype(int)]
+        return CutterPoints(
+            points.frames_at(places),
+            index - index[0],
+            np.interp(places, np.arange(len(points)), points.arc_length),
+        )
+
+    def collides(self, q: Array) -> np.ndarray:
+        """Return which postures collide, q in [rad], shape (n, 6)."""
+        return self._problem.scene.collision.collides(q)
 
     def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m).

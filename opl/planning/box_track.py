@@ -22,7 +22,7 @@ from opl.planning.nodes import NodeField, NodeMatrix
 from opl.planning.open_matrix import Track, open_matrices
 from opl.planning.plan import Found, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem
-from opl.planning.rows import Bulges, Row, levels, shut_edges
+from opl.planning.rows import Bulge, Row, levels, shut_edges
 from opl.planning.symmetry import twins
 from opl.search.box import JointBox
 from opl.search.in_box import missing as missing_of
@@ -34,7 +34,6 @@ SAMPLES = 17  # contact positions of a place
 ROUNDS = 3  # of sampling closer around a track
 MOST_PARTS = 8  # into which an edge that bulges is cut at once
 FINE_SHARE = 3e-5  # of the box: what an edge may bulge
-LEVELS = 4  # contact positions of a sweep that are looked at
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
 MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
@@ -85,7 +84,7 @@ class BoxTracks:
         rows: Sequence[Row],
         box: JointBox,
         room: float,
-        learn: Callable[[Bulges], bool],
+        learn: Callable[[Sequence[Bulge]], bool],
     ) -> Plan | None:
         """Return the motion of the smoothest free track in a box.
 
@@ -109,7 +108,7 @@ class BoxTracks:
         if track is None:
             return self.plan(columns, (), box, room, learn) if rows else None
         bulges = sampled.bulges(track, box.widened(room))
-        if bulges is not None and bulges.sweeps and learn(bulges):
+        if any(bulge.steep for bulge in bulges) and learn(bulges):
             return None
         for _ in range(ROUNDS):
             closer = sampled.closer(track, spacing)
@@ -118,7 +117,7 @@ class BoxTracks:
                 break
             sampled, track, spacing = closer, finer, spacing * 2.0 / (SAMPLES - 1)
         bulges = sampled.bulges(track, box.widened(room))
-        if bulges is not None and learn(bulges):
+        if bulges and learn(bulges):
             return None
         plan = sampled.check(track)
         if plan is None:
@@ -212,39 +211,29 @@ class _Sampled:
         around = search.sampler.at(columns.places, columns.points, columns.placements, t)
         return _Sampled(search, around, self._rows, self._box)
 
-    def bulges(self, track: Track, box: JointBox) -> Bulges | None:
-        """Return where a track leaves the box on its way from place to place, None if nowhere."""
+    def bulges(self, track: Track, box: JointBox) -> list[Bulge]:
+        """Return where a track leaves the box on its way from place to place."""
         problem, nodes = self.problem, self.matrices[track.matrix].nodes
         try:
             path = fill_in(problem.cell, problem.points, nodes, track.rows, problem.interpolation)
         except BrokenEdgeError:
-            return None  # the check finds and blocks it
+            return []  # the check finds and blocks it
         if path.joint_range_sum <= box.size:
-            return None
+            return []
         spanned = nodes.along(track.rows)
         outer = JointBox(spanned.min(axis=0), spanned.max(axis=0))
         excess = missing_of(path.q, outer.widened(max(box.size - outer.size, 0.0)))
-        edge = path.cutter_point.astype(int)
-        bulging = np.unique(edge[excess > 0.0])
-        places = self._columns.places
-        sweeps = []
-        t = path.contact_position
-        for column in bulging:
-            on_edge = np.flatnonzero(edge == column)
-            change = t[min(on_edge[-1] + 1, len(t) - 1)] - t[on_edge[0]]
-            if abs(change) > SWEEP * (places[column + 1] - places[column]):
-                out = on_edge[excess[on_edge] > 0.0]
-                for k in out[np.unique(np.linspace(0, len(out) - 1, LEVELS).astype(int))]:
-                    place = np.interp(path.cutter_point[k], np.arange(len(places)), places)
-                    sweeps.append((float(place), float(t[k]), bool(change > 0.0)))
-        more = []
-        for column in bulging[np.diff(places)[bulging] > SMALLEST_EDGE]:
-            over = excess[edge == column].max() / (box.size * FINE_SHARE)
-            parts = int(
-                np.clip(np.ceil(np.sqrt(1.0 + over)), 2, MOST_PARTS)
-            )  # falls with the square
-            more.append(np.linspace(places[column], places[column + 1], parts + 1)[1:-1])
-        return Bulges(np.concatenate([*more, np.empty(0)]), tuple(sweeps))
+        edge, t = path.cutter_point.astype(int), nodes.t_along(track.rows)
+        places, found = self._columns.places, []
+        for column in np.unique(edge[excess > 0.0]).tolist():
+            first, last = places[column : column + 2].tolist()
+            if last - first > SMALLEST_EDGE:
+                over = excess[edge == column].max() / (box.size * FINE_SHARE)
+                # falls with the square
+                parts = int(np.clip(np.ceil(np.sqrt(1.0 + over)), 2, MOST_PARTS))
+                steep = bool(abs(t[column + 1] - t[column]) > SWEEP * (last - first))
+                found.append(Bulge(first, last, parts, steep))
+        return found
 
     def check(self, track: Track) -> Plan | None:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free."""

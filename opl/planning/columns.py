@@ -10,7 +10,9 @@ or the part deeper in the wheel than any point of it can move within the cell.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -25,12 +27,15 @@ from opl.geometry.toolpath import CutterPoints
 from opl.planning.cut_cells import cells_of, cut_finer
 from opl.planning.enclosed import ROUND_OFF, EnclosedCells, enclosing
 from opl.planning.images import Images
-from opl.search.walls import Image, Line, Piece, Sweep, Wall
+from opl.search.walls import Chain, Image, Line, Piece, Wall
 
 MOST_CUTS = 3  # of such cells, each finer than the one before
-ROW_PARTS = 16  # cells between two places of a wall along a contact position
+ROW_PARTS = 8  # cells between two cutter points along a contact position, before any is cut finer
+PART_OF_A_CHAIN = 2.0  # times the work for a column
 PART_OF_A_WALL = 0.3  # of the work for one: a cell cut finer
 FINER = 8  # cells that one is cut into where a proof needs it
+
+Edge = tuple[int, float, float, float, float]  # number of a chain, place, t, place and t
 
 
 class ColumnWalls:
@@ -56,24 +61,49 @@ class ColumnWalls:
         self.images = images
         self.made = 0.0  # walls made so far; one cell cut finer is part of one
 
-    def walls(self, places: Sequence[float]) -> list[Wall]:
-        """Return the walls at fractional cutter points."""
-        self.made += len(places)
-        Ts_workpiece_cutter = self._points.frames_at(np.asarray(places, dtype=float))
-        grids, cuts = cells_of(self._cell, self._part, Ts_workpiece_cutter)
-        cells = self._cells(Ts_workpiece_cutter, grids, cuts)
-        for _ in range(MOST_CUTS):
-            parts = [np.where(cut, 1, now) for cut, now in zip(cuts, cells.parts(), strict=True)]
-            if not any((now > 1).any() for now in parts):
-                break
-            grids = [cut_finer(t, now) for t, now in zip(grids, parts, strict=True)]
-            cuts = [np.repeat(cut, now) for cut, now in zip(cuts, parts, strict=True)]
-            cells = self._cells(Ts_workpiece_cutter, grids, cuts)
-        passes = self._points.pass_index[np.asarray(places, dtype=int)]
-        return [
-            Wall(int(passes[k]), float(place), tuple(self._pieces(cells, k)))
-            for k, place in enumerate(places)
+    def columns(self, places: Sequence[float]) -> list[Wall]:
+        """Return the walls at fractional cutter points, all contact positions each."""
+        last = self._cell.wheel.last_position
+        return self.walls([((place, -last), (place, last)) for place in places])
+
+    def walls(self, chains: Sequence[Chain]) -> list[Wall]:
+        """Return the walls along chains, each within one pass."""
+        edges = [
+            (number, *one, *other)
+            for number, corners in enumerate(chains)
+            for one, other in pairwise(corners)
         ]
+        # those that lead downwards can be crossed towards the start of the pass only
+        up = [edge for edge in edges if edge[4] > edge[2]]
+        along = [edge for edge in edges if edge[4] == edge[2]]
+        pieces: list[list[Piece]] = [[] for _ in chains]
+        for made, run in ((self._up, up), (self._along, along)):
+            for (number, *_), found in zip(run, made(run) if run else (), strict=True):
+                pieces[number] += found
+        self.made += sum(1.0 if len(corners) == 2 else PART_OF_A_CHAIN for corners in chains)
+        passes = self._points.pass_index[[int(corners[0][0]) for corners in chains]]
+        return [
+            Wall(int(passes[k]), (min(places) + max(places)) / 2.0, tuple(pieces[k]), chains[k])
+            for k, places in enumerate([place for place, _ in corners] for corners in chains)
+        ]
+
+    def _up(self, edges: Sequence[Edge]) -> list[list[Piece]]:
+        """Return the pieces at one place each, from a contact position up to another."""
+        places, least, most = np.array([[edge[1], edge[2], edge[4]] for edge in edges]).T
+        Ts = self._points.frames_at(places)
+        grids, cuts = cells_of(self._cell, self._part, Ts, least, most)
+        cells = _cut_as_needed(partial(self._cells, Ts), grids, cuts)
+        return [list(self._pieces(cells, k)) for k in range(len(edges))]
+
+    def _along(self, edges: Sequence[Edge]) -> list[list[Piece]]:
+        """Return the pieces at one contact position each, from a place to another."""
+        grids = []
+        for _, one, _, other, _ in edges:
+            first, last = min(one, other), max(one, other)
+            inside = np.arange(np.floor(first) + 1.0, np.ceil(last))
+            ends = np.concatenate([[first], inside, [last]])
+            grids.append(cut_finer(ends, np.ceil(np.diff(ends) * ROW_PARTS).astype(int)))
+        return self._rows(grids, [edge[2] for edge in edges])
 
     def finer(self, piece: Piece, cell: int) -> tuple[Piece, ...]:
         """Return one cell of a wall as pieces with smaller cells."""
@@ -87,33 +117,16 @@ class ColumnWalls:
             pieces = list(self._pieces(self._cells(T_workpiece_cutter[None], [grid], [none]), 0))
         return tuple(found for found in pieces if found.family == piece.family)
 
-    def sweeps(self, sweeps: Sequence[Sweep]) -> list[Wall]:
-        """Return the walls of places at one contact position, joined to columns on either side.
-
-        From the bottom up one of the columns, along the contact position to the other, and up that
-        one: every motion from the first column to the second crosses it.
-        """
-        ends = [(s.after, s.before) if s.upwards else (s.before, s.after) for s in sweeps]
-        places = sorted({place for pair in ends for place in pair})
-        column = dict(zip(places, self.walls(places), strict=True))
-        grids = []
-        for s in sweeps:
-            inside = np.arange(np.floor(s.before) + 1.0, np.ceil(s.after))
-            along = np.unique(np.concatenate([[s.before], inside, [s.after]]))
-            grids.append(cut_finer(along, np.full(len(along) - 1, ROW_PARTS)))
-        rows = self._rows(grids, [s.contact_position for s in sweeps])
-        found = []
-        for s, (low, high), row in zip(sweeps, ends, rows, strict=True):
-            t = s.contact_position
-            pieces = [part for piece in column[low].pieces for part in piece.below(t)]
-            pieces += row
-            pieces += [part for piece in column[high].pieces for part in piece.above(t)]
-            index = int(self._points.pass_index[int(s.before)])
-            found.append(Wall(index, (s.before + s.after) / 2.0, tuple(pieces), s))
-        return found
-
     def _rows(self, grids: list[Array], contact_positions: list[float]) -> list[list[Piece]]:
         """Return the pieces along places, each at one contact position."""
+        none = [np.zeros(len(grid) - 1, dtype=bool) for grid in grids]
+        cells = _cut_as_needed(partial(self._cells_along, contact_positions), grids, none)
+        return [list(self._pieces(cells, k, t)) for k, t in enumerate(contact_positions)]
+
+    def _cells_along(
+        self, contact_positions: list[float], grids: list[Array], cuts: list[np.ndarray]
+    ) -> EnclosedCells:
+        """Enclose the postures over all cells of some runs of places."""
         cell, points = self._cell, self._points
         counts = np.array([len(grid) - 1 for grid in grids])
         middle = np.concatenate([(grid[:-1] + grid[1:]) / 2.0 for grid in grids])
@@ -125,9 +138,7 @@ class ColumnWalls:
         t = np.repeat(contact_positions, counts + 1)
         Ts = points.frames_at(np.concatenate(grids))
         q = inverse_kinematics(cell.robot.arm, cell.Ts_base_flange(t, Ts))
-        none = [np.zeros(count, dtype=bool) for count in counts]
-        cells = self._enclosed(q, flange, radius, grids, none, np.empty((len(grids), 4, 4)))
-        return [list(self._pieces(cells, k, t)) for k, t in enumerate(contact_positions)]
+        return self._enclosed(q, flange, radius, grids, cuts, np.empty((len(grids), 4, 4)))
 
     def _pieces(self, cells: EnclosedCells, wall: int, row: float | None = None) -> Iterator[Piece]:
         """Yield the pieces of one of several walls."""
@@ -219,6 +230,29 @@ class ColumnWalls:
             Ts_workpiece_cutter, grids, cuts, first, corners, pad_low, pad_high, known,
             found.middle, found.radius, found.none, np.array(self.images.families),
         )  # fmt: skip
+
+
+def _cut_as_needed(
+    enclose: Callable[[list[Array], list[np.ndarray]], EnclosedCells],
+    grids: list[Array],
+    cuts: list[np.ndarray],
+) -> EnclosedCells:
+    """Return enclosed cells, those of wide pads cut finer.
+
+    Args:
+        enclose: Encloses the cells of some grids.
+        grids: Ends of the cells of each run.
+        cuts: Where nothing is allowed.
+    """
+    cells = enclose(grids, cuts)
+    for _ in range(MOST_CUTS):
+        parts = [np.where(cut, 1, now) for cut, now in zip(cuts, cells.parts(), strict=True)]
+        if not any((now > 1).any() for now in parts):
+            break
+        grids = [cut_finer(t, now) for t, now in zip(grids, parts, strict=True)]
+        cuts = [np.repeat(cut, now) for cut, now in zip(cuts, parts, strict=True)]
+        cells = enclose(grids, cuts)
+    return cells
 
 
 def _runs(kind: np.ndarray) -> list[tuple[int, int]]:

@@ -16,14 +16,24 @@ from opl.cell.wheel_triangle import TOLERANCE
 from opl.cell.workcell import WorkCell
 from opl.geometry import frames
 from opl.geometry.frames import Array
-from opl.geometry.wheel import MM_PER_M
+from opl.geometry.wheel import MM_PER_M, ContactWheel
 
 CELL = 1.0  # belt units that a cell covers at first
-MOST_HALVINGS = 8  # of a cell where something begins
+MOST_HALVINGS = 12  # of a cell where something begins
+
+
+def whole_cells(wheel: ContactWheel) -> Array:
+    """Return the ends of cells over all contact positions, each on the flat or on one edge."""
+    t = np.array([-wheel.last_position])
+    for end in (-wheel.flat_end, wheel.flat_end, wheel.last_position):
+        if end > t[-1]:
+            count = int(np.ceil((end - t[-1]) / CELL))
+            t = np.concatenate([t[:-1], np.linspace(t[-1], end, count + 1)])
+    return t
 
 
 def cells_of(
-    cell: WorkCell, part: PartTree, Ts_workpiece_cutter: Array
+    cell: WorkCell, part: PartTree, Ts_workpiece_cutter: Array, least: Array, most: Array
 ) -> tuple[list[Array], list[np.ndarray]]:
     """Return the ends of cells at each place, and in which the part surely cuts into the wheel.
 
@@ -31,20 +41,17 @@ def cells_of(
         cell: The cell.
         part: The triangles of the part.
         Ts_workpiece_cutter: The places, shape (k, 4, 4).
+        least: Least contact position of each, shape (k,).
+        most: Greatest one.
     """
-    wheel = cell.wheel
-    t = np.array([-wheel.last_position])
-    for end in (-wheel.flat_end, wheel.flat_end, wheel.last_position):
-        if end > t[-1]:
-            count = int(np.ceil((end - t[-1]) / CELL))
-            t = np.concatenate([t[:-1], np.linspace(t[-1], end, count + 1)])
-    k = len(Ts_workpiece_cutter)
-    place = np.repeat(np.arange(k), len(t) - 1)
+    t, k = whole_cells(cell.wheel), len(Ts_workpiece_cutter)
+    low, high = np.maximum(t[:-1], least[:, None]), np.minimum(t[1:], most[:, None])
+    place, some = np.nonzero(low < high)
 
     def surely(place: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
         return _surely_cuts(cell, part, Ts_workpiece_cutter[place], low, high)
 
-    place, low, high, cuts = halved(place, np.tile(t[:-1], k), np.tile(t[1:], k), surely)
+    place, low, high, cuts = halved(place, low[place, some], high[place, some], surely)
     ends = np.searchsorted(place, np.arange(k + 1))
     runs = [slice(a, b) for a, b in pairwise(ends)]
     return [np.append(low[run], high[run][-1:]) for run in runs], [cuts[run] for run in runs]

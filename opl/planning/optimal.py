@@ -16,26 +16,27 @@ from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.box_track import BoxTracks
 from opl.planning.columns import ColumnWalls
 from opl.planning.costs import CostWeights
-from opl.planning.crossings import Crossings
+from opl.planning.cut_cells import whole_cells
 from opl.planning.families import Families, Placement, alike, few_columns, grown
 from opl.planning.holders import Holder, holders
 from opl.planning.images import Images, seams_of
 from opl.planning.obstructed import Obstructions
+from opl.planning.passages import Passages, Rectangles
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
-from opl.planning.rows import Bulges, Row
+from opl.planning.rows import Bulge
 from opl.planning.work import Work
 from opl.search.box import JointBox
 from opl.search.cells import Clear
 from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
+from opl.search.walls import Chain
 
 PROOF_SHARE = 0.9  # of the widening: how far the bound may stay below the path
 ROOM_SHARE = 0.4  # of the widening: how much larger than its box the path may be
 MISSED = 0.05  # of the widening: what a box may miss a cutter point by and still hold it
 RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for next
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
-SWEEP_MISSED = 0.2  # of the widening: what it may miss a contact position by between them
 EARLY_SHARE = 0.3  # of the work: motions in boxes that are not proven to be the least
 FIRST_WORK = 300  # units that may be spent on those at once
 CLEARLY_LESS = 0.005  # of the best: what a motion in such a box should be better by
@@ -98,7 +99,8 @@ class OptimalSearch:
         self._places: set[float] = set()
         self._work = Work(problem.scene, self._walls, self._families, self._tracks)
         self._work.begin_again(self.proof)
-        self._crossings = Crossings(self._sampler, points)
+        positions = whole_cells(problem.cell.wheel)
+        self._rectangles = Rectangles(self._sampler, points, positions)
         self._hope(self._families.smallest_grown())
         first = [0.0, float(len(points) // 2), float(len(points) - 1)]
         self._add(list(dict.fromkeys(first + self._families.unreached())))
@@ -167,10 +169,14 @@ class OptimalSearch:
             return
         looked_at = None
         if alike(placements):
-            columns, _, inner = looked_at = self._look(box, placements)
+            columns, passages, inner = looked_at = self._look(box, placements)
             self._hope(inner)
             allowed = MISSED * self._settings.widen * self.proof.threshold
             missed = missed or columns.missed(box, self._places, allowed)[:MOST_ADDED]
+            if not missed and passages.walls:
+                self._stand_in_the_way(passages.walls[:MOST_ADDED])
+                self.proof.put_back()
+                return
         if missed:
             self._add(missed)
             self.proof.put_back()
@@ -185,14 +191,13 @@ class OptimalSearch:
 
     def _look(
         self, box: JointBox, placements: Sequence[Placement]
-    ) -> tuple[Columns, list[Row], JointBox | None]:
-        """Return places and rows sampled near a box, and the box grown for them."""
-        columns = self._sampler.columns(box, placements, self._crossings.places)
-        rows = self._sampler.rows(self._crossings.rows, columns)
+    ) -> tuple[Columns, Passages, JointBox | None]:
+        """Return places near a box, the ways between them, and the box grown for both."""
+        allowed = MISSED * self._settings.widen * box.size
+        columns = self._sampler.columns(box, placements, self._rectangles.places)
         inner = grown(columns.q, columns.free, box)
-        for row in rows:
-            inner = row.grown(inner) if inner is not None and row.must else inner
-        return columns, rows, inner
+        passages = self._rectangles.held(inner or box, placements, allowed, self._room(box))
+        return columns, passages, None if inner is None else passages.grown(inner)
 
     def _look_for_more(self, box: JointBox, placements: Sequence[Placement]) -> None:
         """Grow a box that is not settled until it holds all; look for a motion in it, if small."""
@@ -242,25 +247,28 @@ class OptimalSearch:
             self.proof.add(wall)
 
     def _add(self, places: list[float]) -> None:
-        for wall in self._walls.walls(places):
+        for wall in self._walls.columns(places):
             self.proof.add(wall)
             self._places.add(wall.place)
 
-    def _try(self, columns: Columns, rows: list[Row], box: JointBox | None) -> bool:
+    def _stand_in_the_way(self, chains: list[Chain]) -> None:
+        """Add chains that no motion in a box gets past."""
+        self._rectangles.take_in(chains)
+        for wall in self._walls.walls(chains):
+            self.proof.add(wall)
+
+    def _try(self, columns: Columns, passages: Passages, box: JointBox | None) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
         if box is None:
             return False
-        learnt, room = False, self._room(box)
+        learnt = False
 
-        def learn(bulges: Bulges) -> bool:
+        def learn(bulges: Sequence[Bulge]) -> bool:
             nonlocal learnt
-            allowed = SWEEP_MISSED * self._settings.widen * box.size
-            learnt, walls = self._crossings.learn(columns, box, room, allowed, bulges)
-            for wall in self._walls.sweeps(walls) if walls else ():
-                self.proof.add(wall)
+            learnt = self._rectangles.refine(bulges)
             return learnt
 
-        self.keep(self._tracks.plan(columns, rows, box, room, learn))
+        self.keep(self._tracks.plan(columns, passages.rows, box, self._room(box), learn))
         return learnt
 
     def _room(self, box: JointBox) -> float:

@@ -1,4 +1,4 @@
-"""Places of a pass at one contact position: where a motion in a box can pass it, and where not."""
+"""Places at one contact position: where a motion in a box can pass it, and where not."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.families import grown
 from opl.search.box import JointBox
-from opl.search.in_box import clipped, missing_chords
+from opl.search.in_box import clipped
 
 SAME = 1e-5  # cutter points that two places are apart at the least
 
@@ -22,22 +21,12 @@ class Row:
     Attributes:
         places: Increasing, shape (m,).
         contact_position: Theirs.
-        must: Whether motions in the box have to pass it there.
         q: Placed postures in [rad], NaN where there are none, shape (m, 6).
     """
 
     places: Array
     contact_position: float
-    must: bool
     q: Array
-
-    def missing(self, box: JointBox) -> float:
-        """Return by how much a box must grow to hold one of them."""
-        return float(missing_chords(self.q[None], ~np.isnan(self.q[None, :, 0]), box)[0])
-
-    def grown(self, box: JointBox) -> JointBox:
-        """Return the box grown until it holds one of them, if there is any."""
-        return grown(self.q[None], ~np.isnan(self.q[None, :, 0]), box) or box
 
     def inside(self, box: JointBox) -> Array:
         """Return where the box holds them: first and last place of every stretch, shape (k, 2)."""
@@ -51,17 +40,20 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Bulges:
+class Bulge:
     """Where a track leaves its box between two places.
 
     Attributes:
-        places: More places there, shape (n,).
-        sweeps: Place and contact position, and whether that rises, where it is outside of the box
-            while the contact moves over the wheel.
+        first: The place before.
+        last: The place after.
+        parts: Into how many parts the way between them should be cut.
+        steep: Whether the contact sweeps over the wheel there.
     """
 
-    places: Array
-    sweeps: tuple[tuple[float, float, bool], ...]
+    first: float
+    last: float
+    parts: int
+    steep: bool
 
 
 def levels(places: Array, rows: Sequence[Row], box: JointBox, otherwise: Array) -> Array:

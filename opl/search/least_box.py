@@ -20,7 +20,7 @@ from opl.search.relaxation import least_box
 from opl.search.subproblems import Candidate, Relaxation, Subproblem
 from opl.search.walls import Image, Piece, Wall
 
-SETTLED = 0.1  # of the gap wanted: what the bend of the spans may lose where none is split further
+SETTLED = 0.04  # of the gap wanted: what the bend of the spans may lose where none is split further
 MOST_TRIMS = 3  # of spans, before one is split
 NUMBERS_OF_A_CELL = 200  # worked on to cut off what no box can hold
 MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before

@@ -1,6 +1,8 @@
 """Walls: curves in joint space of which every motion must pass some point.
 
-A cutter point at every contact position is a wall: the motion grinds the point somewhere. A wall is
+A cutter point at every contact position is a wall: the motion grinds the point somewhere. So is any
+chain of places and contact positions from the least contact position to the greatest, for motions
+that go on along the pass and never back. A wall is
 known as cells: over each, the curve lies within pads of its chord, joint by joint. Cells where
 nothing may be ground are left out, so a wall is several pieces. Each posture of the inverse
 kinematics has pieces of its own, and its images: the same postures after full turns, or with the
@@ -15,6 +17,9 @@ import numpy as np
 
 from opl.geometry.frames import Array
 
+# corners in the rectangle of fractional cutter points and contact positions, along one of the two
+# from each to the next; what leads to lesser contact positions is no part of the wall
+Chain = tuple[tuple[float, float], ...]
 UNKNOWN = 50.0  # [rad] pad where nothing is known; beyond what any joint turns
 
 
@@ -61,17 +66,6 @@ class Piece:
         """Upper faces of it."""
         return np.maximum(self.corners[:-1], self.corners[1:]) + self.pad_high
 
-    def below(self, place: float) -> list[Piece]:
-        """Return what of the piece lies below a place along it, whole cells, if anything."""
-        end = int(np.searchsorted(self.at[:-1], place))
-        return [self.part(0, end)] if end else []
-
-    def above(self, place: float) -> list[Piece]:
-        """Return what of the piece lies above a place along it, whole cells, if anything."""
-        first = int(np.searchsorted(self.at[1:], place, side="right"))
-        n = len(self.pad_low)
-        return [self.part(first, n)] if first < n else []
-
     def part(self, first: int, end: int) -> Piece:
         """Return the cells from ``first`` to before ``end`` alone."""
         corners = slice(first, end + 1)
@@ -114,34 +108,17 @@ class Image:
 
 
 @dataclass(frozen=True)
-class Sweep:
-    """Where the contact moves over the wheel between two places.
-
-    Attributes:
-        before: A place that a motion passes before.
-        after: One that it passes after, on the same pass.
-        contact_position: Which it crosses between them.
-        upwards: Whether from lower contact positions to higher ones.
-    """
-
-    before: float
-    after: float
-    contact_position: float
-    upwards: bool
-
-
-@dataclass(frozen=True)
 class Wall:
     """One wall.
 
     Attributes:
         pass_index: The pass that crosses it.
-        place: Where: the cutter point, fractional between two.
+        place: Where: the cutter point, fractional between two, the middle of a chain.
         pieces: Where it can be crossed; none if it cannot.
-        sweep: What it stands in the way of; None for all contact positions of one place.
+        chain: Along what it runs, from the least contact position to the greatest.
     """
 
     pass_index: int
     place: float
     pieces: tuple[Piece, ...]
-    sweep: Sweep | None = None
+    chain: Chain = ()

@@ -218,7 +218,7 @@ def test_what_is_left_out_of_a_wall_collides_all_over():
     problem = one_row()
     cell = problem.cell
     images = Images(cell.robot, seams_of(problem.field.q), 10.0)
-    wall = ColumnWalls(cell, problem.scene.part, problem.points, images).walls([7.0])[0]
+    wall = ColumnWalls(cell, problem.scene.part, problem.points, images).columns([7.0])[0]
     scene = CollisionScene(cell.widened(0.036))
     obstructions = Obstructions(scene, images)
     T_workpiece_cutter = problem.points.Ts_workpiece_cutter[7]
