@@ -14,7 +14,6 @@ from opl.planning.images import Seams
 from opl.planning.nodes import inverse_solutions
 from opl.planning.problem import GrindingProblem, wheel_distances
 from opl.search.box import JointBox
-from opl.search.in_box import missing as missing_of
 from opl.search.in_box import missing_chords, nearest_points, sampled
 
 FINE = 33  # contact positions of a place at which a box is held against it

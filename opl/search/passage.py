@@ -12,15 +12,12 @@ from itertools import pairwise
 
 import numpy as np
 from numba import njit
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
 
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
 from opl.search.in_box import JUMP
 from opl.search.outside import nearest_on_chord
 
-DOWN = 1e-3  # what a step down costs on the way of a chain, in steps up
 LEFT, BELOW, ABOVE = range(3)  # from where a cell is entered
 
 Corner = tuple[int, int]  # indices of place and contact position
@@ -139,6 +136,58 @@ def passage(up: Array, along: Array, most: float) -> list[tuple[Corner, Corner]]
     return edges[::-1]
 
 
+@njit("int64(boolean[:,::1],boolean[:,::1],int64[::1])", cache=True)
+def _climbed(up, along, before):  # type: ignore[no-untyped-def]
+    """Return the first corner reached of the greatest contact position, -1 if none is.
+
+    Over edges that may be used upwards or along, one step each, and over all downwards for nothing.
+
+    Args:
+        up: Which may be used from each contact position to the next, shape (n, m - 1).
+        along: Which from each place to the next, shape (n - 1, m).
+        before: Filled with the corner before each that was reached, -1 at the start, shape (n m,).
+    """
+    n, m = up.shape[0], along.shape[1]
+    steps = np.full(n * m, n * m)
+    now, following = np.empty(n * m, dtype=np.int64), np.empty(n * m, dtype=np.int64)
+    left, step, waiting = 0, 0, 0
+    for k in range(n):
+        steps[k * m], before[k * m] = 0, -1
+        now[left] = k * m
+        left += 1
+    while left > 0:
+        done = 0
+        while done < left:
+            here = now[done]
+            done += 1
+            k, j = here // m, here % m
+            if j == m - 1:
+                return here
+            for way in range(4):
+                there, cost = -1, 1
+                if way == 0 and j > 0:
+                    there, cost = here - 1, 0
+                elif way == 1 and up[k, j]:
+                    there = here + 1
+                elif way == 2 and k > 0 and along[k - 1, j]:
+                    there = here - m
+                elif way == 3 and k < n - 1 and along[k, j]:
+                    there = here + m
+                if there < 0 or steps[there] <= step + cost:
+                    continue
+                steps[there], before[there] = step + cost, here
+                if cost == 0:
+                    now[left] = there
+                    left += 1
+                else:
+                    following[waiting] = there
+                    waiting += 1
+        step += 1
+        left, waiting = waiting, 0
+        now, following = following, now
+    return -1
+
+
 def chain(up: Array, along: Array, missed: float) -> list[Corner] | None:
     """Return the corners of the shortest chain of edges that miss the box by so much, if any is.
 
@@ -150,33 +199,13 @@ def chain(up: Array, along: Array, missed: float) -> list[Corner] | None:
         along: Likewise.
         missed: What every edge misses the box by at the least, in [rad].
     """
-    n, m = along.shape[0] + 1, along.shape[1]
-    number = np.arange(n * m).reshape(n, m)
-    rising, level = up >= missed, along >= missed
-    below, above = number[:, :-1][rising], number[:, 1:][rising]
-    left, right = number[:-1][level], number[1:][level]
-    start, end = n * m, n * m + 1
-    steps = [
-        (below, above, 1.0),
-        (number[:, 1:].ravel(), number[:, :-1].ravel(), DOWN),
-        (left, right, 1.0),
-        (right, left, 1.0),
-        (np.full(n, start), number[:, 0], 1.0),
-        (number[:, -1], np.full(n, end), 1.0),
-    ]
-    graph = coo_array(
-        (
-            np.concatenate([np.full(len(one), cost) for one, _, cost in steps]),
-            (np.concatenate([s[0] for s in steps]), np.concatenate([s[1] for s in steps])),
-        ),
-        shape=(n * m + 2, n * m + 2),
-    ).tocsr()
-    length, before = dijkstra(graph, indices=start, return_predecessors=True)
-    if not np.isfinite(length[end]):
+    m = along.shape[1]
+    before = np.empty((len(along) + 1) * m, dtype=np.int64)
+    here = int(_climbed(up >= missed, along >= missed, before))
+    if here < 0:
         return None
     way = []
-    here = int(before[end])
-    while here != start:
+    while here >= 0:
         way.append((here // m, here % m))
         here = int(before[here])
     way.reverse()
