@@ -8,8 +8,8 @@ import opl
 
 # what every bound covers, and what it is not about
 COVERED = (
-    "at any contact positions, each pass on an IK branch and count of full turns of its own "
-    "(approach, links and retract not counted)"
+    "at any contact positions, on along each pass and never back, each on an IK branch and count "
+    "of full turns of its own (approach, links and retract not counted)"
 )
 MOST_HOLDERS = 4  # that are named
 OBJECTIVES = {

@@ -98,7 +98,7 @@ def least_cost(problem: GrindingProblem, travel: float, time: float) -> float:
             problem.cell.robot.max_speed,
             problem.process.contact_speed,
         )
-        made = walls.walls(places.astype(float).tolist())
+        made = walls.columns(places.astype(float).tolist())
         families = [_cells(made, family) for family in images.families]
         total += _least_of_pass(problem, places, families, prices)
     return total * (1.0 - SLACK)

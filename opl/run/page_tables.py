@@ -102,8 +102,9 @@ def _certified(report: Report) -> Iterator[str]:
     if path.lower_bound_rad is not None and path.gap is not None:
         yield (
             f"lower bound {path.lower_bound_rad:.6f} rad, gap {100.0 * path.gap:.4f} %: no motion "
-            "along these passes has a smaller joint range sum, at any contact positions, each pass "
-            "on one IK branch and count of full turns (approach, links and retract not counted)"
+            "along these passes has a smaller joint range sum, at any contact positions, on along "
+            "each pass and never back, each on one IK branch and count of full turns (approach, "
+            "links and retract not counted)"
         )
     if not report.fixed.feasible:
         yield f"contact fixed at t = 0 is not feasible: {report.fixed.reason}"

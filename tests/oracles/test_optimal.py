@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -235,6 +235,49 @@ def test_what_is_left_out_of_a_wall_collides_all_over():
     left_out = np.concatenate(left_out)
     assert kept > 50 and len(left_out) > 100
     assert scene.collides(left_out).all()
+
+
+def test_every_motion_crosses_a_chain_within_the_pads_of_its_pieces():
+    problem = one_row()
+    cell, points = problem.cell, problem.points
+    images = Images(cell.robot, seams_of(problem.field.q), 10.0)
+    last = cell.wheel.last_position
+    chain = ((5.0, -last), (5.0, -20.3), (7.4, -20.3), (7.4, 12.0), (6.0, 12.0), (6.0, 3.0))
+    chain = (*chain, (6.6, 3.0), (6.6, last))
+    (wall,) = ColumnWalls(cell, problem.scene.part, points, images).walls([chain])
+    random, held = np.random.default_rng(5), 0
+    for _ in range(60):
+        # on along the pass, never back
+        place, t = np.sort(random.uniform(4.0, 9.0, 6)), random.uniform(-last, last, 6)
+        place[0], place[-1] = 4.0, 9.0
+        crossings = []
+        for (one, low), (other, top) in pairwise(chain):
+            if one == other and top > low:
+                there = float(np.interp(one, place, t))
+                crossings += [(one, there)] if low <= there <= top else []
+            elif low == top:
+                for a, b in pairwise(zip(place, t, strict=True)):
+                    if min(a[1], b[1]) <= low <= max(a[1], b[1]):
+                        at = a[0] + (b[0] - a[0]) * (low - a[1]) / (b[1] - a[1])
+                        crossings += [(at, low)] if min(one, other) <= at <= max(one, other) else []
+        assert crossings
+        for at, there in crossings:
+            T = points.frames_at(np.array([at]))
+            q = inverse_kinematics(cell.robot.arm, cell.Ts_base_flange(np.array([there]), T))[0]
+            for piece in wall.pieces:
+                row = piece.line.T_workpiece_cutter is None
+                own = piece.line.contact_position == there if row else True
+                own &= row or np.allclose(piece.line.T_workpiece_cutter, T[0], atol=1e-12)
+                along = at if row else there
+                if not own or not piece.at[0] <= along <= piece.at[-1]:
+                    continue
+                k = min(int(np.searchsorted(piece.at, along, side="right")) - 1, len(piece.low) - 1)
+                middle = (piece.low[k] + piece.high[k]) / 2.0
+                away = q[piece.family] - middle
+                away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
+                assert (np.abs(away) <= (piece.high[k] - piece.low[k]) / 2.0 + 1e-12).all()
+                held += 1
+    assert held > 40
 
 
 def test_an_interrupted_proof_still_leaves_a_verified_program(tmp_path):
