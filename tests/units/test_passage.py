@@ -1,4 +1,4 @@
-"""Ways through a rectangle and chains that bar them: one exists exactly where the other does not."""
+"""Ways through a rectangle, and chains: one is there exactly where the other is not."""
 
 from itertools import pairwise
 
