@@ -4,6 +4,7 @@ import sys
 
 from benchmarks.measuring import MICRO, SECOND, Row, Timing, timed, timed_process
 from benchmarks.results import FILE, PLOT, write_results
+from benchmarks.stranger_table import Outcome, page
 
 
 def row(name, seconds, unit=SECOND):
@@ -33,3 +34,22 @@ def test_a_time_is_that_of_one_of_what_is_counted():
     calls = []
     found = timed(lambda: calls.append(sum(range(20_000))), 3, count=10)
     assert len(calls) == 4 and found.least <= found.median <= found.most
+
+
+def stranger(index, status, **facts):
+    return Outcome(index, 0, status, "cone", "mh12", "upright", **facts)
+
+
+def test_a_page_of_strangers_counts_what_is_closed_and_what_has_no_bound():
+    outcomes = [
+        stranger(0, "ok", sum_rad=1.0, bound_rad=0.999, search_s=3.0),
+        stranger(1, "ok", sum_rad=1.0, bound_rad=0.999, search_s=12.0),
+        stranger(2, "ok", sum_rad=1.0, bound_rad=0.99, search_s=2.0, cause="a wall | too few"),
+        stranger(3, "not found", search_s=25.0, cause="no path found"),
+        stranger(4, "no_path", search_s=31.0, cause="no path: shut\nat cutter point 3"),
+    ]
+    text = page(7, outcomes)
+    assert "4 jobs searched: 2 with a gap of at most 0.2 %, 1 of them within 10 s" in text
+    assert "1 without a bound; slowest 31.0 s of all drawn. Drawn again: 1 no_path." in text
+    assert "| 2.0 | cone | mh12 | upright | 0 in 0 | ok | no | 1.000 % |" in text
+    assert "a wall / too few |" in text and "cutter point 3" not in text
