@@ -104,7 +104,8 @@ def _serve(pipe: Connection, whole: bool) -> None:
             job, watch = opl.load_job(path), opl.Watch(processor)
             facts = _program(job, path.parent / "out", watch) if whole else _path(job, watch)
         except opl.InputError as error:
-            facts = {"status": "bad input", "cause": str(error)}
+            cause = str(error).replace(f"{path.parent}/", "")  # the same wherever it is run
+            facts = {"status": "bad input", "cause": cause}
         except Exception as error:  # what breaks here is a case, not the end of the benchmark
             facts = {"status": "error", "cause": f"{type(error).__name__}: {error}"}
         facts["search_s"] = processor.of("search") + processor.of("clearance")
