@@ -197,7 +197,7 @@ class Machine:
         Raises:
             ValueError: If the chain is not one, or leads from pass to pass.
         """
-        if chain[0][1] != -self._last or chain[-1][1] != self._last:
+        if max(abs(chain[0][1] + self._last), abs(chain[-1][1] - self._last)) > SURE:
             raise ValueError("a wall ends within the contact positions of the wheel")
         places = [place for place, _ in chain]
         if self._pass_index[int(min(places))] != self._pass_index[int(np.ceil(max(places)))]:

@@ -74,7 +74,8 @@ def test_the_checker_uses_nothing_of_opl():
 @pytest.mark.parametrize("place", [0, 30, 59])
 def test_every_free_posture_lies_in_a_cell_of_the_checker(place):
     problem, (_, certificate) = v_row(), searched()
-    cells = Machine(certificate, COARSE).wall({"place": place})
+    last = problem.cell.wheel.last_position
+    cells = Machine(certificate, COARSE).wall([(place, -last), (place, last)])
     t = np.linspace(-1.0, 1.0, 1001) * problem.cell.wheel.last_position
     Ts = problem.cell.Ts_base_flange(t, problem.points.Ts_workpiece_cutter[place])
     q = inverse_kinematics(problem.cell.robot.arm, Ts)
