@@ -27,7 +27,7 @@ from typing import Any
 import opl
 from benchmarks.stranger_jobs import Stranger, draw_job
 from benchmarks.stranger_table import HEAD, SEARCHED, Outcome, page, row
-from opl.cell.wheel_distance import use_threads
+from opl.files.kernels import use_threads
 from opl.run.preparing import prepare
 from opl.run.searches import search_path
 

@@ -60,17 +60,7 @@ HOMES = {
     "uvicorn": {"service"},
     "distributed": {"work/cluster"},
     "sqlite3": {"store"},
-    "numba": {
-        "cell/chain",
-        "cell/wheel_distance",
-        "cell/wheel_triangle",
-        "cell/separating",
-        "search",
-        "motion/fewest",
-        "motion/long_runs",
-        "motion/corner_error",
-        "motion/line_error",
-    },
+    "numba": {"files/kernels"},
 }
 
 # rooms that run inside of other programs, with Python's own library and what the host has
@@ -271,8 +261,8 @@ def test_the_search_knows_arrays_and_no_robot():
     for name in searches:
         own, others = imports_of(PACKAGE, name, modules_of(PACKAGE)[name])
         own = {other for other in own if room_of(other) != "search"}
-        assert own <= {"geometry.frames", "files.kernel_cache"}, name
-        assert others <= {*sys.stdlib_module_names, "numpy", "numba"}, name
+        assert own <= {"geometry.frames", "files.kernels"}, name
+        assert others <= {*sys.stdlib_module_names, "numpy"}, name
 
 
 def test_the_command_line_uses_nothing_but_the_front_door():

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numba import njit
 from numpy.typing import NDArray
 
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 
 ANY_AXIS = 3  # a joint that turns about another axis than x, y or z of its frame
@@ -71,7 +71,7 @@ def _direction(joint: pin.JointModel) -> Array:
     return np.asarray(joint.extract().axis if number is None else np.eye(3)[number])
 
 
-@njit(cache=True)
+@kernel()
 def _product(A, B, C):  # type: ignore[no-untyped-def]
     """Set C to A B, poses all, with the additions in the order of pinocchio."""
     for j in range(3):
@@ -83,7 +83,7 @@ def _product(A, B, C):  # type: ignore[no-untyped-def]
     C[2, 3] = A[2, 3] + (A[2, 0] * B[0, 3] + (A[2, 1] * B[1, 3] + A[2, 2] * B[2, 3]))
 
 
-@njit(cache=True)
+@kernel()
 def _turned_about(T, axis, c, s, C):  # type: ignore[no-untyped-def]
     """Set C to a pose turned about its axis of that number: one column is a cross product."""
     mixed, other, crossed = (1, 2, 2) if axis == 0 else (2, 0, 0) if axis == 1 else (0, 1, 1)
@@ -95,7 +95,7 @@ def _turned_about(T, axis, c, s, C):  # type: ignore[no-untyped-def]
         C[i, crossed] = C[j, axis] * C[k, mixed] - C[k, axis] * C[j, mixed]
 
 
-@njit(cache=True)
+@kernel()
 def _turn(direction, c, s, T):  # type: ignore[no-untyped-def]
     """Set the rotation of a pose to the turn about a unit vector."""
     x, y, z = direction
@@ -107,10 +107,9 @@ def _turn(direction, c, s, T):  # type: ignore[no-untyped-def]
     T[1, 2], T[2, 1] = dy * z - sx, dy * z + sx
 
 
-@njit(
+@kernel(
     "void(float64[:,::1],float64[:,:,::1],int64[::1],float64[:,::1],float64[:,:],float64[:,:],"
-    "float64[:,:,::1])",
-    cache=True,
+    "float64[:,:,::1])"
 )
 def _poses(q, before_joint, axis, directions, base, flange, found):  # type: ignore[no-untyped-def]
     """Set the poses of the flange in the base frame, see `Chain.poses`."""

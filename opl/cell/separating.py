@@ -7,13 +7,14 @@ cylinder about z, shape (3,); in [m].
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from opl.files.kernels import kernel
 
 DIRECTIONS = 18  # that are tried for a pair
 SHORTEST = 1e-4  # of a vector that gives a direction
 
 
-@njit(cache=True)
+@kernel()
 def _reach(T, size, x, y, z):  # type: ignore[no-untyped-def]
     """How far a body reaches from its middle along a unit vector."""
     c = abs(x * T[0, 2] + y * T[1, 2] + z * T[2, 2])
@@ -24,7 +25,7 @@ def _reach(T, size, x, y, z):  # type: ignore[no-untyped-def]
     return a * size[0] + b * size[1] + c * size[2]
 
 
-@njit(cache=True)
+@kernel()
 def _between(T, size, other, other_size, way):  # type: ignore[no-untyped-def]
     """What is between two bodies along a vector of any length, -inf if that is none."""
     length = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
@@ -35,7 +36,7 @@ def _between(T, size, other, other_size, way):  # type: ignore[no-untyped-def]
     return abs(away) - _reach(T, size, x, y, z) - _reach(other, other_size, x, y, z)
 
 
-@njit(cache=True)
+@kernel()
 def _towards(T, size, other, way):  # type: ignore[no-untyped-def]
     """Set a vector from the nearest point of a body to the middle of another one."""
     dx, dy, dz = other[0, 3] - T[0, 3], other[1, 3] - T[1, 3], other[2, 3] - T[2, 3]
@@ -55,7 +56,7 @@ def _towards(T, size, other, way):  # type: ignore[no-untyped-def]
         way[k] = a * T[k, 0] + b * T[k, 1] + c * T[k, 2]
 
 
-@njit(cache=True)
+@kernel()
 def _direction(T, size, other, other_size, number, way):  # type: ignore[no-untyped-def]
     """Set one of the `DIRECTIONS` likely ones, as a vector of any length; 0 where it is none."""
     way[:] = 0.0
@@ -87,7 +88,7 @@ def _direction(T, size, other, other_size, number, way):  # type: ignore[no-unty
             way[2] = T[0, i] * other[1, j] - T[1, i] * other[0, j]
 
 
-@njit(cache=True)
+@kernel()
 def _product(A, B, C):  # type: ignore[no-untyped-def]
     """Set C to A B, poses all."""
     for i in range(3):
@@ -96,7 +97,7 @@ def _product(A, B, C):  # type: ignore[no-untyped-def]
         C[i, 3] += A[i, 3]
 
 
-@njit(cache=True)
+@kernel()
 def _turn_about(axis, angle, T):  # type: ignore[no-untyped-def]
     """Set the rotation of a pose to the turn about a unit axis."""
     s, c = np.sin(angle), np.cos(angle)
@@ -107,11 +108,10 @@ def _turn_about(axis, angle, T):  # type: ignore[no-untyped-def]
     T[2, 0], T[2, 1], T[2, 2] = d * z * x - s * y, d * z * y + s * x, c + d * z * z
 
 
-@njit(
+@kernel(
     "void(float64[:,::1],float64[:,:,::1],float64[:,::1],int64[::1],float64[:,:,::1],"
     "float64[:,::1],float64[:,::1],int64[:,::1],float64[::1],float64,float64[::1],float64[::1],"
-    "int64[::1],boolean[:,::1])",
-    cache=True,
+    "int64[::1],boolean[:,::1])"
 )
 def separate(  # type: ignore[no-untyped-def]
     q,

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange, set_num_threads
 
 from opl.cell.wheel_triangle import (
     DEEPEST,
@@ -18,6 +17,7 @@ from opl.cell.wheel_triangle import (
     distance_of_point,
     nearest_on_triangle,
 )
+from opl.files.kernels import kernel, prange
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.wheel import ContactWheel
@@ -108,12 +108,7 @@ def signed_wheel_distance(
     return distances.reshape(shape)
 
 
-def use_threads(count: int) -> None:
-    """Limit the threads that distances are computed in, where processes share the cores."""
-    set_num_threads(count)
-
-
-@njit("float64(float64[:,::1],float64[:,::1],int64,float64,float64)", cache=True)
+@kernel("float64(float64[:,::1],float64[:,::1],int64,float64,float64)")
 def _sphere_bound(T, spheres, index, half_width, radius):  # type: ignore[no-untyped-def]
     """Lower bound on the distance of anything in a sphere."""
     p, q, r = spheres[index, 0], spheres[index, 1], spheres[index, 2]
@@ -124,10 +119,9 @@ def _sphere_bound(T, spheres, index, half_width, radius):  # type: ignore[no-unt
     return value - spheres[index, 3]
 
 
-@njit(
+@kernel(
     "Tuple((float64,int64))(float64[:,::1],float64[:,:,::1],float64[:,::1],int64[::1],int64[::1],"
-    "float64,float64,float64)",
-    cache=True,
+    "float64,float64,float64)"
 )
 def _part_distance(  # type: ignore[no-untyped-def]
     T, triangles, spheres, first, child, half_width, radius, needed
@@ -170,7 +164,7 @@ _POSES = (
 )
 
 
-@njit(_POSES, cache=True, parallel=True)
+@kernel(_POSES, threads=True)
 def _distances(  # type: ignore[no-untyped-def]
     poses, triangles, spheres, first, child, half_width, radius, needs, distances, looks
 ):
@@ -180,7 +174,7 @@ def _distances(  # type: ignore[no-untyped-def]
         )
 
 
-@njit(_POSES, cache=True)
+@kernel(_POSES)
 def _few_distances(  # type: ignore[no-untyped-def]
     poses, triangles, spheres, first, child, half_width, radius, needs, distances, looks
 ):

@@ -15,7 +15,8 @@ those of the last kind have to be looked for.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from opl.files.kernels import kernel
 
 TOLERANCE = 2e-6  # [m] distances returned are at most this much too large
 DEEPEST = 96  # pieces that wait at once; halving to a micrometre needs far fewer
@@ -26,7 +27,7 @@ _CLOSER = 24  # times that the bracket around a shortest one is made smaller, by
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
 
-@njit("float64(float64[:,::1],float64,float64,float64,float64,float64)", cache=True)
+@kernel("float64(float64[:,::1],float64,float64,float64,float64,float64)")
 def _out_along(corners, half_width, radius, nx, ny, nz):  # type: ignore[no-untyped-def]
     """Return how far a triangle is beyond all of the wheel in a direction, of any length.
 
@@ -42,7 +43,7 @@ def _out_along(corners, half_width, radius, nx, ny, nz):  # type: ignore[no-unty
     return (least - half_width * abs(nx) - radius * np.sqrt(ny * ny + nz * nz)) / length
 
 
-@njit("float64(float64[:,::1],float64,float64,float64[:,::1],float64)", cache=True)
+@kernel("float64(float64[:,::1],float64,float64,float64[:,::1],float64)")
 def _out_around(corners, half_width, radius, across, angle):  # type: ignore[no-untyped-def]
     """Return the same for the direction at an angle between the two of ``across``, shape (2, 3)."""
     c, s = np.cos(angle), np.sin(angle)
@@ -56,7 +57,7 @@ def _out_around(corners, half_width, radius, across, angle):  # type: ignore[no-
     )
 
 
-@njit("float64(float64[::1],float64,float64,float64)", cache=True)
+@kernel("float64(float64[::1],float64,float64,float64)")
 def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-def]
     """Return minus the length of the shortest way out of a triangle that is in the wheel.
 
@@ -127,7 +128,7 @@ def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-de
     return most
 
 
-@njit("UniTuple(float64,4)(float64,float64,float64,float64,float64)", cache=True)
+@kernel("UniTuple(float64,4)(float64,float64,float64,float64,float64)")
 def distance_of_point(x, y, z, half_width, radius):  # type: ignore[no-untyped-def]
     """Signed distance to the wheel as in `ContactWheel.signed_distance`, and its gradient."""
     away = np.sqrt(y * y + (z - radius) ** 2)
@@ -144,7 +145,7 @@ def distance_of_point(x, y, z, half_width, radius):  # type: ignore[no-untyped-d
     return value, along if x >= 0.0 else -along, scale * y, scale * (z - radius)
 
 
-@njit("float64(float64,float64,float64,float64,float64,float64)", cache=True)
+@kernel("float64(float64,float64,float64,float64,float64,float64)")
 def _mean_bound(beside0, beside1, beside2, beyond0, beyond1, beyond2):  # type: ignore[no-untyped-def]
     """Largest lower bound that a mean of two linear functions gives, from their values at corners.
 
@@ -158,9 +159,8 @@ def _mean_bound(beside0, beside1, beside2, beyond0, beyond1, beyond2):  # type: 
     return min(share * beside0 + rest * beyond0, share * beside2 + rest * beyond2)
 
 
-@njit(
-    "float64(float64[:,::1],float64[:,:,::1],int64,float64,float64,float64,float64,float64[:,::1])",
-    cache=True,
+@kernel(
+    "float64(float64[:,::1],float64[:,:,::1],int64,float64,float64,float64,float64,float64[:,::1])"
 )
 def nearest_on_triangle(  # type: ignore[no-untyped-def]
     T, triangles, index, half_width, radius, needed, best, room

@@ -7,8 +7,8 @@ half-way. The chord between is looked at: less is cut off by every other roundin
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from opl.files.kernels import kernel
 from opl.motion.line_error import Run, Screws, off_target
 
 _SHARES = tuple(n / 8.0 for n in range(1, 8))  # of the way along the chord
@@ -25,11 +25,11 @@ def corner_error(screws: Screws, run: Run, corner: tuple[int, int, int], zone: f
             than half-way.
     """
     arm = screws.axes, screws.T_base_flange
-    found = rounded_off(*arm, *run.arrays[:4], run.tool, *corner, zone)  # type: ignore[call-arg]
+    found = rounded_off(*arm, *run.arrays[:4], run.tool, *corner, zone)
     return float(found)
 
 
-@njit(cache=True)
+@kernel()
 def rounded_off(axes, T0, q, places, targets, freedom, tool, i, j, k, zone):  # type: ignore[no-untyped-def]
     """Return how far along its normal the contact is off in [m] if the corner at j is cut off."""
     T, point, off, other = np.empty((3, 4)), np.empty(6), np.empty(6), np.empty(6)
@@ -66,14 +66,14 @@ def rounded_off(axes, T0, q, places, targets, freedom, tool, i, j, k, zone):  # 
     return worst
 
 
-@njit(cache=True)
+@kernel()
 def _off_but(axes, T0, q, place, target, free, T, off):  # type: ignore[no-untyped-def]
     """Put how far a place is from its target into off, but for what the contact may do there."""
     off_target(axes, T0, q, place, target, T, off)
     off[free] = 0.0
 
 
-@njit(cache=True)
+@kernel()
 def _cut(tool, corner, end, zone):  # type: ignore[no-untyped-def]
     """Return which share of a line may be cut off at a corner."""
     length = np.sqrt(np.square(tool[end] - tool[corner]).sum())

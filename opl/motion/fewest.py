@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from opl.files.kernels import kernel
 from opl.motion.corner_error import rounded_off
 from opl.motion.gradual import LEAST_COUNTED
 from opl.motion.line_error import Run, Screws, straight_off
@@ -88,11 +88,11 @@ def chain_of(
     arm = screws.axes, screws.T_base_flange
     limits = rule.shortest, rule.ratio, rule.zone, rule.corner
     values = (value[kept] for value in run.arrays)
-    chain = _chain(*arm, *values, *limits, lines, corners, kept)  # type: ignore[call-arg]
+    chain = _chain(*arm, *values, *limits, lines, corners, kept)
     return kept[chain] if len(chain) else None
 
 
-@njit(cache=True)
+@kernel()
 def _lines(axes, T0, q, places, targets, freedom, room, allowed, pace, barred):  # type: ignore[no-untyped-def]
     """Return the lines that keep their contact by where they end: starts, first ones, errors."""
     n = len(q)
@@ -136,7 +136,7 @@ def _lines(axes, T0, q, places, targets, freedom, room, allowed, pace, barred): 
     return starts[:count], first, errors[:count]
 
 
-@njit(cache=True)
+@kernel()
 def _even(pace, i, j, k, ratio):  # type: ignore[no-untyped-def]
     """Return whether the speeds of the lines from i to j and on to k are near enough."""
     if k == i + 2:
@@ -148,7 +148,7 @@ def _even(pace, i, j, k, ratio):  # type: ignore[no-untyped-def]
     return max(one / other, other / one) <= ratio * (1.0 + 1e-9)
 
 
-@njit(cache=True)
+@kernel()
 def _chain(  # type: ignore[no-untyped-def]
     axes, T0, q, places, targets, freedom, room, allowed, pace, tool,
     shortest, ratio, zone, most, barred, wide, at,

@@ -11,10 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from opl.cell.robot import Robot, forward_kinematics
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array, inverse
 
 LEVER = 0.05  # [m] from the ground point; weighs angles against distances
@@ -101,11 +101,11 @@ def line_errors(screws: Screws, run: Run, start: int, end: int) -> tuple[Array, 
     """
     shares, errors = np.empty((2, end - start - 1))
     arm = screws.axes, screws.T_base_flange
-    _along(*arm, *run.arrays[:-1], start, end, shares, errors)  # type: ignore[call-arg]
+    _along(*arm, *run.arrays[:-1], start, end, shares, errors)
     return shares, errors
 
 
-@njit(cache=True)
+@kernel()
 def _flange(axes, T0, q, T):  # type: ignore[no-untyped-def]
     """Put the flange pose of a configuration into T, shape (3, 4)."""
     for a in range(3):
@@ -126,7 +126,7 @@ def _flange(axes, T0, q, T):  # type: ignore[no-untyped-def]
             T[a, 3] += axes[joint, 3 + a]
 
 
-@njit(cache=True)
+@kernel()
 def off_target(axes, T0, q, place, target, T, off):  # type: ignore[no-untyped-def]
     """Put how far a place is from its target, seen from there, into off, shape (6,)."""
     _flange(axes, T0, q, T)
@@ -149,7 +149,7 @@ def off_target(axes, T0, q, place, target, T, off):  # type: ignore[no-untyped-d
         off[3 + b] = half * (target[0, b] * w0 + target[1, b] * w1 + target[2, b] * w2)
 
 
-@njit(cache=True)
+@kernel()
 def _left(off, freedom, room):  # type: ignore[no-untyped-def]
     """Return what is left of an error where the contact may slide or roll."""
     total = 0.0
@@ -161,7 +161,7 @@ def _left(off, freedom, room):  # type: ignore[no-untyped-def]
     return np.sqrt(total)
 
 
-@njit(cache=True)
+@kernel()
 def _pass_by(axes, T0, q, places, targets, freedom, room, pace, i, j, k, least, T, work):  # type: ignore[no-untyped-def]
     """Return at which fraction the line from i to j passes place k, and its error there."""
     point, off, ahead = work[0], work[1], work[2]
@@ -188,7 +188,7 @@ def _pass_by(axes, T0, q, places, targets, freedom, room, pace, i, j, k, least, 
     return s, _left(off, freedom[k], room[k])
 
 
-@njit(cache=True)
+@kernel()
 def _along(axes, T0, q, places, targets, freedom, room, allowed, pace, i, j, shares, errors):  # type: ignore[no-untyped-def]
     """Fill in where the line from i to j passes the places between, none before the one ahead."""
     T, work, last = np.empty((3, 4)), np.empty((3, 6)), 0.0
@@ -199,7 +199,7 @@ def _along(axes, T0, q, places, targets, freedom, room, allowed, pace, i, j, sha
         shares[k - i - 1], errors[k - i - 1] = last, error
 
 
-@njit(cache=True)
+@kernel()
 def _bow(before, here, after, allowed, k):  # type: ignore[no-untyped-def]
     """Return the vertex of the parabola through errors at place k and both of its neighbours.
 
@@ -213,7 +213,7 @@ def _bow(before, here, after, allowed, k):  # type: ignore[no-untyped-def]
     return (here - 0.5 * slope * slope / bend) / (allowed[k] + share * (beside - allowed[k]))
 
 
-@njit(cache=True)
+@kernel()
 def straight_off(  # type: ignore[no-untyped-def]
     axes, T0, q, places, targets, freedom, room, allowed, pace, i, j, suspect, T, work
 ):
@@ -245,7 +245,7 @@ def straight_off(  # type: ignore[no-untyped-def]
     return worst, -1
 
 
-@njit(cache=True)
+@kernel()
 def _keeps_pace(pace, i, j, k, share):  # type: ignore[no-untyped-def]
     """Return whether the line from i to j gives the way to place k from the one before its time.
 

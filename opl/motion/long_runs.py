@@ -12,9 +12,9 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from opl.files.kernels import kernel
 from opl.motion.fewest import ChainRule, chain_of, fewest
 from opl.motion.line_error import Run, Screws, straight_off
 
@@ -47,11 +47,11 @@ def fewest_of_long(
         return fewest(screws, run, rule, blocked)
     arm, values = (screws.axes, screws.T_base_flange), run.arrays[:-1]
     for share in LEFT_OUT:
-        kept, refused = _kept(*arm, *values, share, stride), blocked  # type: ignore[call-arg]
+        kept, refused = _kept(*arm, *values, share, stride), blocked
         while (chain := chain_of(screws, run, rule, refused, kept)) is not None:
             missed: list[int] = []
             for line in pairwise(chain.tolist()):
-                off, place = _off(*arm, *values, *line)  # type: ignore[call-arg]
+                off, place = _off(*arm, *values, *line)
                 if off:
                     refused |= {line}
                     missed += [place]
@@ -61,7 +61,7 @@ def fewest_of_long(
     return fewest(screws, run, rule, blocked)
 
 
-@njit(cache=True)
+@kernel()
 def _kept(  # type: ignore[no-untyped-def]
     axes, T0, q, places, targets, freedom, room, allowed, pace, share, most
 ):
@@ -86,7 +86,7 @@ def _kept(  # type: ignore[no-untyped-def]
     return np.array(kept)
 
 
-@njit(cache=True)
+@kernel()
 def _off(axes, T0, q, places, targets, freedom, room, allowed, pace, start, end):  # type: ignore[no-untyped-def]
     """Return whether a line is off by more than is allowed somewhere, and a place that tells so."""
     T, work = np.empty((3, 4)), np.empty((3, 6))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from opl.files.kernels import kernel
 from opl.search.outside import nearest_on_chord
 from opl.search.relaxation import ROUND_OFF, pressed
 
@@ -12,10 +12,9 @@ MOST_ROUNDS = 12  # of cutting spans off; more would cut little
 STILL = 1e-6  # [rad] a core that grows by less in a round has stopped growing
 
 
-@njit(
+@kernel(
     "int64(float64[:,::1],int64[:,::1],int64[::1],int64,float64[::1],float64[::1],float64,"
-    "float64[::1])",
-    cache=True,
+    "float64[::1])"
 )
 def tighten(cells, spans, pass_index, n_keys, low, high, closing, sizes):  # type: ignore[no-untyped-def]
     """Cut off what no box below a size can hold; return how many spans are left, 0 if none can be.
@@ -99,7 +98,7 @@ def tighten(cells, spans, pass_index, n_keys, low, high, closing, sizes):  # typ
     return n
 
 
-@njit("float64(float64[:,::1],int64,float64[::1],float64[::1],float64[::1])", cache=True)
+@kernel("float64(float64[:,::1],int64,float64[::1],float64[::1],float64[::1])")
 def _pressed(cells, cell, prices, low, high):  # type: ignore[no-untyped-def]
     """Return how far a cell presses the faces of a core outwards at the least, at their prices."""
     start, end = 0.0, 0.0
@@ -110,10 +109,7 @@ def _pressed(cells, cell, prices, low, high):  # type: ignore[no-untyped-def]
     return min(start, end)
 
 
-@njit(
-    "int64(float64[:,::1],int64[:,::1],int64,float64[:,::1],float64[::1],float64[::1],float64)",
-    cache=True,
-)
+@kernel("int64(float64[:,::1],int64[:,::1],int64,float64[:,::1],float64[::1],float64[::1],float64)")
 def trim(cells, spans, n_walls, prices, low, high, left):  # type: ignore[no-untyped-def]
     """Cut cells off the ends of spans that no box below a size can hold; return how many are left.
 
@@ -152,7 +148,7 @@ def trim(cells, spans, n_walls, prices, low, high, left):  # type: ignore[no-unt
     return n
 
 
-@njit("float64(float64[:,::1],int64,int64,float64[::1],float64[::1])", cache=True)
+@kernel("float64(float64[:,::1],int64,int64,float64[::1],float64[::1])")
 def distance(cells, first, end, low, high):  # type: ignore[no-untyped-def]
     """Return by how much a box misses the chords of a span, in [rad]."""
     best = np.inf

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from opl.files.kernels import kernel
 from opl.search.ladder import Ladder, allowed
 
 
@@ -40,10 +40,9 @@ def impasses(ladder: Ladder, blocked: np.ndarray) -> list[tuple[int, int]]:
     return found
 
 
-@njit(
+@kernel(
     "boolean[:,::1](float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
-    "int16[:,:,::1],int64[::1],int64)",
-    cache=True,
+    "int16[:,:,::1],int64[::1],int64)"
 )
 def _edges(  # type: ignore[no-untyped-def]
     q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked, column

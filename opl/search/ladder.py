@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 
 
@@ -88,10 +88,9 @@ def middle_count(contact_step: float, max_contact_step: float) -> int:
     return max(int(np.ceil(abs(contact_step) / max_contact_step - 1e-9)) - 1, 0)
 
 
-@njit(
+@kernel(
     "boolean(float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
-    "int16[:,:,::1],int64,int64,int64)",
-    cache=True,
+    "int16[:,:,::1],int64,int64,int64)"
 )
 def continuous(  # type: ignore[no-untyped-def]
     q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, column, here, row
@@ -111,17 +110,16 @@ def continuous(  # type: ignore[no-untyped-def]
     return True
 
 
-@njit("boolean(int64[::1],int64)", cache=True)
+@kernel("boolean(int64[::1],int64)")
 def contains(keys, key):  # type: ignore[no-untyped-def]
     """Return whether a number is among sorted ones."""
     place = np.searchsorted(keys, key)
     return place < len(keys) and keys[place] == key
 
 
-@njit(
+@kernel(
     "boolean(float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
-    "int16[:,:,::1],int64[::1],int64,int64,int64)",
-    cache=True,
+    "int16[:,:,::1],int64[::1],int64,int64,int64)"
 )
 def allowed(  # type: ignore[no-untyped-def]
     q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked, column, here, row

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from opl.files.kernels import kernel
 
 BISECTIONS = 24  # of a chord; its nearest point is then known to a ten millionth of its length
 
 
-@njit("UniTuple(float64,2)(float64[:],float64[:],float64[::1],float64[::1],float64)", cache=True)
+@kernel("UniTuple(float64,2)(float64[:],float64[:],float64[::1],float64[::1],float64)")
 def nearest_on_chord(a, b, low, high, best):  # type: ignore[no-untyped-def]
     """Return by how much a box misses a chord, and where on it, 0 to 1.
 
@@ -48,10 +49,9 @@ def nearest_on_chord(a, b, low, high, best):  # type: ignore[no-untyped-def]
     return best, place
 
 
-@njit(
+@kernel(
     "void(float64[:,:,::1],boolean[:,::1],float64[::1],float64[::1],float64,float64[::1],"
-    "float64[::1])",
-    cache=True,
+    "float64[::1])"
 )
 def outside(q, free, low, high, longest, missing, at):  # type: ignore[no-untyped-def]
     """Find the point of each column that a box has to grow least for.

@@ -14,8 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from opl.files.kernels import kernel
 from opl.search.ladder import Ladder, contains, continuous
 
 
@@ -75,7 +75,7 @@ _FIELD = (
 )
 
 
-@njit(f"void({_FIELD},boolean[:,::1])", cache=True)
+@kernel(f"void({_FIELD},boolean[:,::1])")
 def _add_dead_ends(  # type: ignore[no-untyped-def]
     q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked, dead
 ):
@@ -99,7 +99,7 @@ def _add_dead_ends(  # type: ignore[no-untyped-def]
             dead[column, here] = not leads_on
 
 
-@njit(f"Tuple((int64,float64,int64))({_FIELD},boolean[:,::1],int64,float64,int64[::1])", cache=True)
+@kernel(f"Tuple((int64,float64,int64))({_FIELD},boolean[:,::1],int64,float64,int64[::1])")
 def _descend(  # type: ignore[no-untyped-def]
     q,
     free,

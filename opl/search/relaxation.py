@@ -11,7 +11,8 @@ computed anew from them, over all cells.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from opl.files.kernels import kernel
 
 ROUND_OFF = 1e-9  # [rad] of the sums that make a bound
 MOST_PIVOTS = 400  # for one set of points
@@ -23,7 +24,7 @@ ENOUGH = 0.1  # of what is left to be closed: how near to the best prices are go
 CLOSE = 1e-5  # [rad] what points still left out may be worth together
 
 
-@njit("float64(float64[:,::1],int64,int64,int64,float64[::1],float64[::1])", cache=True)
+@kernel("float64(float64[:,::1],int64,int64,int64,float64[::1],float64[::1])")
 def pressed(cells, cell, end, face, low, high):  # type: ignore[no-untyped-def]
     """Return how far one end of a cell, 0 or 1, presses a face of a core outwards at the least.
 
@@ -35,7 +36,7 @@ def pressed(cells, cell, end, face, low, high):  # type: ignore[no-untyped-def]
     return low[j] - cells[cell, 6 * end + j] - cells[cell, 18 + j]
 
 
-@njit("int64(float64[:,::1],int64[::1],int64,int64,boolean)", cache=True)
+@kernel("int64(float64[:,::1],int64[::1],int64,int64,boolean)")
 def _pivot(table, basis, n_rows, n_columns, dual):  # type: ignore[no-untyped-def]
     """Bring a table of the simplex method to its optimum; return how many steps that took.
 
@@ -87,11 +88,10 @@ def _pivot(table, basis, n_rows, n_columns, dual):  # type: ignore[no-untyped-de
     return MOST_PIVOTS
 
 
-@njit(
+@kernel(
     "UniTuple(float64,2)(float64[:,::1],int64[:,::1],int64,float64[::1],float64[::1],float64,"
     "float64[:,::1],"
-    "float64[::1],float64[::1],float64[:,::1])",
-    cache=True,
+    "float64[::1],float64[::1],float64[:,::1])"
 )
 def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, prices):  # type: ignore[no-untyped-def]
     """Return a bound on the box that holds a core and a point of each wall, in [rad].

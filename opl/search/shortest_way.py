@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 
 
@@ -142,7 +142,7 @@ def _fill(
     )
 
 
-@njit("float64(float64,float64[:,::1],float64[:,::1],int64,int64,int64)", cache=True)
+@kernel("float64(float64,float64[:,::1],float64[:,::1],int64,int64,int64)")
 def _pads(price, pad_low, pad_high, a, b, joint):  # type: ignore[no-untyped-def]
     """Return the least of a price times what the pads of two cells add to the way from a to b."""
     if price > 0.0:
@@ -150,11 +150,10 @@ def _pads(price, pad_low, pad_high, a, b, joint):  # type: ignore[no-untyped-def
     return price * (pad_high[b, joint] - pad_low[a, joint])
 
 
-@njit(
+@kernel(
     "void(float64[:,::1],float64[:,::1],float64[:,::1],float64[:,::1],float64[::1],float64[::1],"
     "int64[::1],float64,float64,float64[::1],float64[::1],float64,float64[::1],float64[::1],"
-    "boolean,float64[::1])",
-    cache=True,
+    "boolean,float64[::1])"
 )
 def _pass_on(  # type: ignore[no-untyped-def]
     start, along, pad_low, pad_high, t_low, t_high, first, travel, time, seconds, max_speed,

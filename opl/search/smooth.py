@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 from opl.search.ladder import Ladder, allowed
 
@@ -125,11 +125,10 @@ def smoothest_within(
     return cheapest
 
 
-@njit(
+@kernel(
     "float64(float64[:,:,::1],boolean[:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
     "int16[:,:,::1],int64[::1],float64[::1],float64,float64,float64[::1],float64[::1],float64,float64[:,::1],"
-    "int64[::1])",
-    cache=True,
+    "int64[::1])"
 )
 def _cheapest(  # type: ignore[no-untyped-def]
     q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked,

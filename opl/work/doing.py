@@ -13,10 +13,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from opl.cell.wheel_distance import use_threads
 from opl.errors import Cancelled, InputError, OplError
 from opl.files.claiming import write_files
 from opl.files.confining import confine_to
+from opl.files.kernels import load_kernels, use_threads
 from opl.files.resources import folder
 from opl.geometry.faces import list_faces
 from opl.job import keys
@@ -48,6 +48,7 @@ def prepare(memory: int | None, warm: bool) -> None:
         warm: Compute something once, so that the first task finds all loaded.
     """
     use_threads(1)  # the processes share the cores
+    load_kernels()
     if memory is not None:
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     if warm:

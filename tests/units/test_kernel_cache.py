@@ -44,7 +44,7 @@ def test_kernels_of_other_code_are_not_taken(tmp_path, monkeypatch):
     package.mkdir()
 
     def place(kernel, other):
-        (package / "kernel.py").write_text(f"from numba import njit\n{kernel}")
+        (package / "kernel.py").write_text(f"from opl.files.kernels import kernel\n{kernel}")
         (package / "other.py").write_text(other)
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "given"))
         settle_kernel_cache(package)

@@ -1,0 +1,87 @@
+"""Functions that numba compiles, loaded when they are first called.
+
+To load numba and what it has compiled takes longer than what many commands do. Until it is called a
+kernel is a plain object. One that is kept on the disk holds what it calls, so only those that
+Python calls are loaded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, cached_property
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+from opl.files.kernel_cache import settle_kernel_cache
+
+prange = range  # numba's own in a kernel with threads
+
+_made: list[Kernel] = []
+
+
+class Kernel:
+    """A function to be compiled.
+
+    Args:
+        function: Takes scalars and arrays; what it calls are kernels, or what numba knows.
+        signature: Types of result and arguments in the words of numba; None if they are those that
+            it is called with.
+        threads: Whether loops over `prange` are shared among threads.
+    """
+
+    def __init__(self, function: FunctionType, signature: str | None, threads: bool) -> None:
+        self.__wrapped__ = function
+        self.__doc__ = function.__doc__
+        self._signature = signature
+        self._threads = threads
+
+    def __call__(self, *arguments: Any) -> Any:  # noqa: D102
+        return self.compiled(*arguments)
+
+    @cached_property
+    def compiled(self) -> Any:
+        """The compiled function, from the disk if it lies there."""
+        numba = _numba()
+        function = self.__wrapped__
+        if self._threads:
+            known = {**function.__globals__, "prange": numba.prange}
+            function = FunctionType(function.__code__, known)
+        types = () if self._signature is None else (self._signature,)
+        return numba.njit(*types, cache=True, parallel=self._threads)(function)
+
+
+def kernel(signature: str | None = None, threads: bool = False) -> Callable[[Any], Kernel]:
+    """Return what makes a `Kernel` of a function, with arguments as there."""
+
+    def make(function: FunctionType) -> Kernel:
+        made = Kernel(function, signature, threads)
+        _made.append(made)
+        return made
+
+    return make
+
+
+def load_kernels() -> None:
+    """Load all kernels of the modules that are loaded, so that no job waits for them."""
+    for made in _made:
+        _ = made.compiled
+
+
+def use_threads(count: int) -> None:
+    """Limit the threads of kernels, where processes share the cores."""
+    _numba().set_num_threads(count)
+
+
+@cache
+def _numba() -> Any:
+    """Return numba, to which a kernel is the compiled function."""
+    settle_kernel_cache(Path(__file__).parents[1])  # before numba looks for it
+    import numba
+    from numba.extending import typeof_impl
+
+    @typeof_impl.register(Kernel)
+    def type_of(made: Kernel, _context: Any) -> Any:
+        return numba.typeof(made.compiled)  # type: ignore[no-untyped-call]
+
+    return numba

@@ -1,0 +1,61 @@
+"""Kernels are loaded when they are called, not before."""
+
+import subprocess
+import sys
+
+import numba
+import numpy as np
+import pytest
+
+from opl.files.kernels import kernel, prange
+
+
+@kernel("float64(float64)")
+def _twice(x):
+    return 2.0 * x
+
+
+@kernel()
+def _thrice(x):
+    return x + _twice(x)
+
+
+def _all_thrice(x, y):
+    for k in prange(len(x)):
+        y[k] = _thrice(x[k])
+
+
+@pytest.mark.parametrize("threads", [False, True])
+def test_a_kernel_calls_kernels_and_may_share_a_loop_among_threads(tmp_path, monkeypatch, threads):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))  # the code of cached ones is gone
+    made = kernel("void(float64[::1],float64[::1])", threads)(_all_thrice)
+    x, y = np.arange(5.0), np.zeros(5)
+    made(x, y)
+    assert y.tolist() == (3.0 * x).tolist()
+    assert _thrice(2.0) == 6.0 and _twice(2.0) == 4.0
+    (code,) = made.compiled.inspect_llvm().values()
+    assert ("numba_parallel_for" in code) == threads
+
+
+def test_types_are_those_of_the_signature():
+    with pytest.raises(TypeError, match="No matching definition"):
+        _twice("two")
+
+
+def test_numba_is_loaded_at_the_first_call_and_only_what_is_called():
+    script = """
+import sys
+import numpy as np
+from opl.cell import chain, separating, wheel_distance
+from opl.motion import corner_error, fewest
+from opl.search import recursive, relaxation
+print("numba" in sys.modules)
+from opl.files import kernels
+wheel_distance._few_distances.compiled
+print(*(made.__wrapped__.__name__ for made in kernels._made if "compiled" in vars(made)))
+kernels.load_kernels()
+print(all("compiled" in vars(made) for made in kernels._made))
+"""
+    for _ in range(2):  # the first may have to compile
+        ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert ended.stdout.splitlines() == ["False", "_few_distances", "True"], ended.stderr
