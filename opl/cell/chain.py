@@ -1,23 +1,25 @@
-"""Flange poses of many configurations in one compiled call.
+"""Flange poses of many configurations in one call.
 
 The arithmetic is that of pinocchio, step by step and in its order of additions, so poses are the
-same to the last digit.
+same to the last digit: by compiled code, and by numpy until any compiled code is loaded, which
+takes as long as hundreds of calls.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import count
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
-from opl.files.kernels import kernel
+from opl.files.kernels import kernel, kernels_are_loaded
 from opl.geometry.frames import Array
 
 ANY_AXIS = 3  # a joint that turns about another axis than x, y or z of its frame
-_ALIGNED = {"JointModelRX": 0, "JointModelRY": 1, "JointModelRZ": 2}
-_UNALIGNED = "JointModelRevoluteUnaligned"
+FEW = 200  # calls
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,42 +39,34 @@ class Chain:
     directions: Array
     T_world_base: Array
     T_joint_flange: Array
-
-    @classmethod
-    def of(cls, model: pin.Model, base: str, flange: str) -> Chain | None:
-        """Return what leads from one frame of a model to another; None if that is no chain."""
-        joints = [model.joints[k] for k in range(1, model.njoints)]
-        first, last = (model.frames[model.getFrameId(name)] for name in (base, flange))
-        in_a_row = list(model.parents)[1:] == list(range(len(joints)))
-        at_ends = first.parentJoint == 0 and last.parentJoint == len(joints)
-        turning = all(joint.shortname() in (*_ALIGNED, _UNALIGNED) for joint in joints)
-        if not (in_a_row and at_ends and turning):
-            return None
-        return cls(
-            np.array([T.homogeneous for T in list(model.jointPlacements)[1:]]),
-            np.array([_ALIGNED.get(joint.shortname(), ANY_AXIS) for joint in joints]),
-            np.array([_direction(joint) for joint in joints]),
-            first.placement.homogeneous,
-            last.placement.homogeneous,
-        )
+    _calls: Iterator[int] = field(default_factory=count, repr=False)
 
     def poses(self, q: Array) -> Array:
         """Return the flange in the base frame, (n, 4, 4), at configurations in [rad], (n, j)."""
-        Ts_base_flange = np.zeros((len(q), 4, 4))
         arrays = self.Ts_before_joint, self.axis, self.directions
         ends = self.T_world_base, self.T_joint_flange
-        # compiled for arrays that can be written to
-        _poses(np.array(q, dtype=float, order="C"), *arrays, *ends, Ts_base_flange)
-        return Ts_base_flange
+        if kernels_are_loaded() or next(self._calls) >= FEW:
+            Ts_base_flange = np.zeros((len(q), 4, 4))
+            # compiled for arrays that can be written to
+            _poses(np.array(q, dtype=float, order="C"), *arrays, *ends, Ts_base_flange)
+            return Ts_base_flange
+        # cosines of numpy may differ in the last digit from those of the C library
+        c, s = (np.array([[turn(angle) for angle in row] for row in q.T]) for turn in (_cos, _sin))
+        room, found = np.zeros((3, 4, 4, len(q))), np.zeros((4, 4, len(q)))
+        _pose.plain(c, s, *arrays, *ends, room, found)
+        return np.ascontiguousarray(np.moveaxis(found, -1, 0))
 
 
-def _direction(joint: pin.JointModel) -> Array:
-    number = _ALIGNED.get(joint.shortname())
-    return np.asarray(joint.extract().axis if number is None else np.eye(3)[number])
+def _cos(angle: float) -> float:
+    return math.cos(angle) if math.isfinite(angle) else math.nan
+
+
+def _sin(angle: float) -> float:
+    return math.sin(angle) if math.isfinite(angle) else math.nan
 
 
 @kernel()
-def _product(A, B, C):  # type: ignore[no-untyped-def]
+def product(A, B, C):  # type: ignore[no-untyped-def]
     """Set C to A B, poses all, with the additions in the order of pinocchio."""
     for j in range(3):
         for i in range(2):
@@ -107,35 +101,41 @@ def _turn(direction, c, s, T):  # type: ignore[no-untyped-def]
     T[1, 2], T[2, 1] = dy * z - sx, dy * z + sx
 
 
+@kernel()
+def _pose(c, s, before_joint, axis, directions, base, flange, room, found):  # type: ignore[no-untyped-def]
+    """Set the pose of the flange in the base frame, of cosines and sines of the joints."""
+    placed, moved, turn = room[0], room[1], room[2]
+    for k in range(len(axis)):
+        if axis[k] == ANY_AXIS:
+            _turn(directions[k], c[k], s[k], turn)
+            product(before_joint[k], turn, moved)
+        else:
+            _turned_about(before_joint[k], axis[k], c[k], s[k], moved)
+        if k == 0:
+            placed[:] = moved
+        else:
+            product(placed.copy(), moved, placed)
+    product(placed, flange, moved)
+    for i in range(3):
+        for j in range(3):
+            found[i, j] = (
+                base[0, i] * moved[0, j] + base[1, i] * moved[1, j] + base[2, i] * moved[2, j]
+            )
+        found[i, 3] = (
+            base[0, i] * (moved[0, 3] - base[0, 3])
+            + base[1, i] * (moved[1, 3] - base[1, 3])
+            + base[2, i] * (moved[2, 3] - base[2, 3])
+        )
+    found[3, 3] = 1.0
+
+
 @kernel(
     "void(float64[:,::1],float64[:,:,::1],int64[::1],float64[:,::1],float64[:,:],float64[:,:],"
     "float64[:,:,::1])"
 )
 def _poses(q, before_joint, axis, directions, base, flange, found):  # type: ignore[no-untyped-def]
     """Set the poses of the flange in the base frame, see `Chain.poses`."""
-    n_joints = len(axis)
-    placed, moved, turn = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((4, 4))
+    room = np.zeros((3, 4, 4))
     for n in range(len(q)):
-        for k in range(n_joints):
-            c, s = np.cos(q[n, k]), np.sin(q[n, k])
-            if axis[k] == ANY_AXIS:
-                _turn(directions[k], c, s, turn)
-                _product(before_joint[k], turn, moved)
-            else:
-                _turned_about(before_joint[k], axis[k], c, s, moved)
-            if k == 0:
-                placed[:] = moved
-            else:
-                _product(placed.copy(), moved, placed)
-        _product(placed, flange, moved)
-        for i in range(3):
-            for j in range(3):
-                found[n, i, j] = (
-                    base[0, i] * moved[0, j] + base[1, i] * moved[1, j] + base[2, i] * moved[2, j]
-                )
-            found[n, i, 3] = (
-                base[0, i] * (moved[0, 3] - base[0, 3])
-                + base[1, i] * (moved[1, 3] - base[1, 3])
-                + base[2, i] * (moved[2, 3] - base[2, 3])
-            )
-        found[n, 3, 3] = 1.0
+        c, s = np.cos(q[n]), np.sin(q[n])
+        _pose(c, s, before_joint, axis, directions, base, flange, room, found[n])

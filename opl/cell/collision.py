@@ -14,7 +14,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.robot import collision_shapes
+from opl.cell.robot_shapes import collision_shapes
 from opl.cell.separation import Bodies, Separation
 from opl.cell.workcell import PART, SECOND_OPINION, SECOND_OPINION_OF_A_LINK, WHEEL, WorkCell
 from opl.geometry.frames import Array, transform

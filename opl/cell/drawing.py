@@ -11,7 +11,8 @@ import pinocchio as pin
 
 from opl.cell.full_turns import full_turns, principal
 from opl.cell.parallel_axes import ParallelAxesArm
-from opl.cell.robot import Robot, collision_shapes
+from opl.cell.robot import Robot
+from opl.cell.robot_shapes import collision_shapes
 from opl.cell.triangle import bend_to
 from opl.geometry.frames import Array, transform
 

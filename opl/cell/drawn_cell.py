@@ -12,8 +12,9 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
-from opl.cell.robot import Robot, collision_shapes, link_names
+from opl.cell.robot import Robot, link_names
 from opl.cell.robot_file import N_JOINTS
+from opl.cell.robot_shapes import collision_shapes
 from opl.cell.workcell import PART, WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh

@@ -15,14 +15,13 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 
-from opl.cell.chain import Chain
 from opl.cell.full_turns import angular_distance
 from opl.cell.inverse_kinematics import Arm, inverse_kinematics
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot_file import N_JOINTS, RobotFile, read_robot_file
 from opl.cell.spherical_wrist import SphericalWristArm
+from opl.cell.urdf_chain import UrdfChain, read_chain
 from opl.cell.urdf_tree import UrdfTree
 from opl.errors import InputError
 from opl.files.confining import require_inside
@@ -32,6 +31,7 @@ from opl.geometry.frames import Array, from_roll_pitch_yaw, read_only
 # In which a joint is taken to reach its top speed where nobody knows its acceleration, in [s].
 # Integrators guess 0.1 s for arms of this kind; slower is the safe side.
 ASSUMED_RAMP = 0.4
+_ENDS = "base", "tool0"
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +144,8 @@ def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
     if not robot.urdf.is_file():
         raise InputError(str(path), f"urdf: no such file, got {robot.urdf.name!r}")
     UrdfTree(robot.urdf).require_shapes_on_joints()
+    if name_or_folder not in known_robots():
+        _check_by_pinocchio(robot.urdf)  # tests do that with those that come with opl
     _check_urdf(robot)
     if not _arm_fits_urdf(robot):
         raise InputError(str(path), f"arm: is not the arm that {robot.urdf.name} describes")
@@ -153,7 +155,9 @@ def load_robot(name_or_folder: str, relative_to: Path | None = None) -> Robot:
 def forward_kinematics(robot: Robot, q: Array) -> Array:
     """Return the flange poses Ts_base_flange, (..., 4, 4), of configurations in [rad], (..., 6)."""
     configurations = np.asarray(q, dtype=float).reshape(-1, N_JOINTS)
-    return _chain(robot.urdf).poses(configurations).reshape(*np.shape(q)[:-1], 4, 4)
+    chain = _joints(robot.urdf).chain
+    assert chain is not None, "see load_robot"
+    return chain.poses(configurations).reshape(*np.shape(q)[:-1], 4, 4)
 
 
 def controller_poses(robot: Robot, q: Array) -> Array:
@@ -163,51 +167,38 @@ def controller_poses(robot: Robot, q: Array) -> Array:
 
 def link_names(robot: Robot) -> tuple[str, ...]:
     """Return the links that carry its shapes, from the foot to the one with the flange."""
-    model = _model(robot.urdf)
-    bodies = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
-    return tuple(
-        next(str(frame.name) for frame in bodies if frame.parentJoint == joint)
-        for joint in range(N_JOINTS + 1)
-    )
-
-
-def collision_shapes(robot: Robot) -> tuple[pin.Model, pin.GeometryModel]:
-    """Return the joints of a robot and the shapes they move, new ones at each call."""
-    model = pin.buildModelFromUrdf(str(robot.urdf))
-    shapes = pin.GeometryModel()  # one that pinocchio makes itself is never let go of
-    places = [str(robot.urdf.parent)]  # where relative names of meshes start
-    pin.buildGeomFromUrdf(model, str(robot.urdf), pin.GeometryType.COLLISION, shapes, places)
-    return model, shapes
+    return _joints(robot.urdf).links
 
 
 @lru_cache(maxsize=16)  # a service may see a robot of its own in each job
-def _model(urdf: Path) -> pin.Model:
-    return pin.buildModelFromUrdf(str(urdf))
+def _joints(urdf: Path) -> UrdfChain:
+    return read_chain(UrdfTree(urdf), *_ENDS)
 
 
-@lru_cache(maxsize=16)
-def _chain(urdf: Path) -> Chain:
-    chain = Chain.of(_model(urdf), "base", "tool0")
-    if chain is None:
-        raise InputError(str(urdf), "must have its joints one after the other, from base to tool0")
-    return chain
+def _check_by_pinocchio(urdf: Path) -> None:
+    """Refuse a URDF that pinocchio, which moves the solids, does not read."""
+    import pinocchio as pin
+
+    try:
+        pin.buildModelFromUrdf(str(urdf))
+    except ValueError as error:
+        raise InputError(str(urdf), "is not a URDF of one robot") from error
 
 
 def _check_urdf(robot: Robot) -> None:
     """Refuse a URDF that has other joints, or lacks a frame."""
-    try:
-        model = _model(robot.urdf)
-    except ValueError as error:
-        raise InputError(str(robot.urdf), "is not a URDF of one robot") from error
-    joints = tuple(model.names)[1:]  # the first is the universe
-    if joints != robot.joint_names or model.nq != N_JOINTS:
+    found = _joints(robot.urdf)
+    joints = tuple(joint.name for joint in found.joints)
+    if joints != robot.joint_names or any(joint.kind != "revolute" for joint in found.joints):
         wanted = " ".join(robot.joint_names)
         message = f"must have the revolute joints {wanted} in this order, has {' '.join(joints)}"
         raise InputError(str(robot.urdf), message)
-    missing = [frame for frame in ("base", "tool0") if not model.existFrame(frame)]
+    missing = [link for link in _ENDS if link not in found.all_links]
     if missing:
         raise InputError(str(robot.urdf), f"must have links base and tool0, lacks {missing[0]}")
-    _chain(robot.urdf)
+    if found.chain is None:
+        message = "must have its joints one after the other, from base to tool0"
+        raise InputError(str(robot.urdf), message)
 
 
 def _arm_fits_urdf(robot: Robot) -> bool:

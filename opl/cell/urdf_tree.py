@@ -67,7 +67,11 @@ class UrdfTree:
             raise InputError(
                 str(self._path), f"must have one root link, has {', '.join(free) or 'none'}"
             )
-        self._root_link = free[0]
+        self.root_link = free[0]
+
+    def joints(self) -> list[ET.Element]:
+        """Return the elements of all joints, in the order of the file."""
+        return self._root.findall("joint")
 
     def _require_no_ring(self) -> None:
         for link in self._joints:
@@ -91,7 +95,7 @@ class UrdfTree:
             return None
         carrier, T_root_base = self._carrier(BASE)
         aside = np.hypot(*T_root_base[:2, 3])
-        if carrier != self._root_link or max(aside, 1.0 - T_root_base[2, 2]) > _EXACT:
+        if carrier != self.root_link or max(aside, 1.0 - T_root_base[2, 2]) > _EXACT:
             raise InputError(
                 str(self._path),
                 f"link {BASE} must be fixed to the root link, straight above it, or be left out",
@@ -104,11 +108,11 @@ class UrdfTree:
         if BASE in self._links():
             self._rename_base()
         ET.SubElement(self._root, "link", name=BASE)
-        name = f"{self._root_link}-{BASE}"
+        name = f"{self.root_link}-{BASE}"
         while name in {joint.get("name") for joint in self._root.findall("joint")}:
             name += "_frame"
         joint = ET.SubElement(self._root, "joint", name=name, type="fixed")
-        ET.SubElement(joint, "parent", link=self._root_link)
+        ET.SubElement(joint, "parent", link=self.root_link)
         ET.SubElement(joint, "child", link=BASE)
         ET.SubElement(joint, "origin", xyz=f"0 0 {height!r}", rpy=_NOWHERE)
         self._joints[BASE] = joint
@@ -201,11 +205,11 @@ class UrdfTree:
 
     def _rename_base(self) -> None:
         """Give the URDF's own base another name, for what hangs on it stays where it is."""
-        name = "base_link" if self._root_link == BASE else "controller_base"
+        name = "base_link" if self.root_link == BASE else "controller_base"
         while name in self._links():
             name += "_frame"
-        if self._root_link == BASE:
-            self._root_link = name
+        if self.root_link == BASE:
+            self.root_link = name
         for link in self._root.findall("link"):
             if link.get("name") == BASE:
                 link.set("name", name)

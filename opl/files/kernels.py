@@ -50,6 +50,21 @@ class Kernel:
         types = () if self._signature is None else (self._signature,)
         return numba.njit(*types, cache=True, parallel=self._threads)(function)
 
+    @cached_property
+    def plain(self) -> Any:
+        """The function in Python alone, which takes arrays where it is compiled for scalars."""
+        function = self.__wrapped__
+        known = {**function.__globals__}
+        for name in function.__code__.co_names:
+            if isinstance(known.get(name), Kernel):
+                known[name] = known[name].plain
+        return FunctionType(function.__code__, known)
+
+
+def kernels_are_loaded() -> bool:
+    """Return whether numba is loaded, so that a further kernel takes next to no time."""
+    return _numba.cache_info().currsize > 0
+
 
 def kernel(signature: str | None = None, threads: bool = False) -> Callable[[Any], Kernel]:
     """Return what makes a `Kernel` of a function, with arguments as there."""

@@ -1,4 +1,4 @@
-"""TOPP-RA, without the half second that loading its plots takes: nothing is plotted here."""
+"""The highest path speeds by TOPP-RA, without the half second that loading its plots takes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,10 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from types import ModuleType
 from typing import Any
+
+import numpy as np
+
+from opl.geometry.frames import Array
 
 _PACKAGE, _NAME = "matplotlib", "pyplot"
 
@@ -39,4 +43,79 @@ with _plots_on_demand():
     from toppra.constraint import LinearConstraint
     from toppra.interpolator import AbstractGeometricPath
 
-__all__ = ["TOPPRA", "AbstractGeometricPath", "LinearConstraint"]
+
+def path_speeds(
+    place: Array,
+    slope: Array,
+    bend: Array,
+    speed: Array,
+    acceleration: Array,
+    enters: bool,
+    leaves: bool,
+) -> Array | None:
+    """Return the highest path speed at each place, shape (g,), None if toppra finds none.
+
+    Args:
+        place: Places on a line of configurations in [s], ascending, shape (g,).
+        slope: Of the line there in [rad/s], shape (g, 6).
+        bend: Its change on each piece in [rad/s^2], shape (g - 1, 6).
+        speed: Largest speed of each joint in [rad/s], shape (6,).
+        acceleration: Largest acceleration in [rad/s^2], shape (6,).
+        enters: Whether it comes at full path speed; else from rest.
+        leaves: Whether it goes at full path speed; else it comes to rest.
+    """
+    constraint = _Limits(place, slope, bend, speed, acceleration)
+    search = TOPPRA([constraint], _Place(place), gridpoints=place, solver_wrapper="seidel")
+    search.compute_parameterization(float(enters), float(leaves))
+    found: Array | None = search.problem_data.sd_vec
+    return found
+
+
+class _Place(AbstractGeometricPath):  # type: ignore[misc]
+    """All that toppra needs of a path whose constraint brings its own derivatives."""
+
+    def __init__(self, place: Array) -> None:
+        self._ends = place[[0, -1]]
+
+    @property
+    def dof(self) -> int:
+        return 1
+
+    @property
+    def path_interval(self) -> Array:
+        return self._ends
+
+
+class _Limits(LinearConstraint):  # type: ignore[misc]
+    """Speed and acceleration of all joints, at both ends of each piece of the grid.
+
+    toppra's own constraint takes second derivatives at the grid alone; where they jump, it would
+    take those of the wrong side.
+    """
+
+    def __init__(
+        self, place: Array, slope: Array, bend: Array, speed: Array, acceleration: Array
+    ) -> None:
+        super().__init__()
+        self.identical = True
+        length = np.diff(place)[:, None]
+        # u: half the change of the squared path speed with the place, x: its square at the start
+        at_start, at_end = slope[:-1], slope[1:] + 2.0 * length * bend
+        scale = np.tile(acceleration, 2)
+        self._of_u = np.hstack([at_start, at_end]) / scale
+        self._of_x = np.hstack([bend, bend]) / scale
+        steepest = np.maximum(np.abs(slope[:-1]), np.abs(slope[1:])) / speed
+        # Corners are passed no faster than they can be passed evenly. Without this the search
+        # takes some so fast that it has to all but stop within them, where a joint turns back.
+        sharpest = (np.abs(bend) / acceleration).max(axis=1)
+        cap = 1.0 / np.maximum(np.maximum(steepest.max(axis=1) ** 2, sharpest), 1.0)
+        self._most = np.minimum(np.append(cap, cap[-1]), np.insert(cap, 0, cap[0]))
+
+    def compute_constraint_params(
+        self, path: AbstractGeometricPath, gridpoints: Array, *args: Any, **kwargs: Any
+    ) -> tuple[Any, ...]:
+        n, m = self._of_u.shape
+        of_u, of_x = (np.vstack([rows, rows[-1:]]) for rows in (self._of_u, self._of_x))
+        both = np.vstack([np.eye(m), -np.eye(m)])
+        bounds = np.column_stack([np.zeros(n + 1), self._most])
+        return of_u, of_x, np.zeros((n + 1, m)), both, np.ones(2 * m), None, bounds

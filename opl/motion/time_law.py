@@ -9,14 +9,11 @@ largest at the ends of such a piece, and limits that are kept there are kept eve
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from opl.errors import TimeLawError, UnsafeError
 from opl.geometry.frames import Array
-from opl.motion.engine import TOPPRA, AbstractGeometricPath, LinearConstraint
 from opl.motion.rounded import SAME_PLACE, RoundedLine
 
 # What a sampled joint speed or acceleration may be beyond its limit, as a fraction: round-off.
@@ -156,9 +153,12 @@ def _path_speed(
     steady = np.ones(len(place))
     hot = np.maximum(*_loads(slope, bend, place, steady, limits)).max(axis=1) > 1.0
     hot[[0, -1]] |= at_rest
+    counted = np.append(0, np.cumsum(hot))
+    index = np.arange(len(hot))
     last, around = len(place) - 1, AROUND
     while True:
-        near = maximum_filter1d(hot.astype(int), 2 * around + 1, mode="constant")
+        before, after = np.maximum(index - around, 0), np.minimum(index + around + 1, len(hot))
+        near = (counted[after] > counted[before]).astype(int)
         edges = np.flatnonzero(np.diff(near, prepend=0, append=0))
         path_speed: Array = steady.copy()
         for start, end in edges.reshape(-1, 2):
@@ -184,10 +184,9 @@ def _fastest_path_speed(
     Where it does not enter or leave at full path speed, it is at rest. `place` and `slope` have
     shapes (g,) and (g, 6), `bend`, of the pieces, (g - 1, 6).
     """
-    constraint = _Limits(place, slope, bend, limits)
-    search = TOPPRA([constraint], _Place(place), gridpoints=place, solver_wrapper="seidel")
-    search.compute_parameterization(float(enters), float(leaves))
-    found = search.problem_data.sd_vec
+    from opl.motion.engine import path_speeds  # with all that toppra loads
+
+    found = path_speeds(place, slope, bend, limits.speed, limits.acceleration, enters, leaves)
     if found is None or np.isnan(found).any() or (np.maximum(found[:-1], found[1:]) <= 0.0).any():
         return None
     return np.asarray(found)
@@ -211,51 +210,3 @@ def require_limits(law: TimeLaw, limits: JointLimits) -> None:
                 f"the time law uses {100.0 * over.max():.2f} % of the {what} of joint "
                 f"{int(over.argmax()) + 1}"
             )
-
-
-class _Place(AbstractGeometricPath):  # type: ignore[misc]
-    """All that toppra needs of a path whose constraint brings its own derivatives."""
-
-    def __init__(self, place: Array) -> None:
-        self._ends = place[[0, -1]]
-
-    @property
-    def dof(self) -> int:
-        return 1
-
-    @property
-    def path_interval(self) -> Array:
-        return self._ends
-
-
-class _Limits(LinearConstraint):  # type: ignore[misc]
-    """Speed and acceleration of all joints, at both ends of each piece of the grid.
-
-    toppra's own constraint takes second derivatives at the grid alone; where they jump, it would
-    take those of the wrong side.
-    """
-
-    def __init__(self, place: Array, slope: Array, bend: Array, limits: JointLimits) -> None:
-        super().__init__()
-        self.identical = True
-        length = np.diff(place)[:, None]
-        # u: half the change of the squared path speed with the place, x: its square at the start
-        at_start, at_end = slope[:-1], slope[1:] + 2.0 * length * bend
-        scale = np.tile(limits.acceleration, 2)
-        self._of_u = np.hstack([at_start, at_end]) / scale
-        self._of_x = np.hstack([bend, bend]) / scale
-        steepest = np.maximum(np.abs(slope[:-1]), np.abs(slope[1:])) / limits.speed
-        # Corners are passed no faster than they can be passed evenly. Without this the search
-        # takes some so fast that it has to all but stop within them, where a joint turns back.
-        sharpest = (np.abs(bend) / limits.acceleration).max(axis=1)
-        cap = 1.0 / np.maximum(np.maximum(steepest.max(axis=1) ** 2, sharpest), 1.0)
-        self._most = np.minimum(np.append(cap, cap[-1]), np.insert(cap, 0, cap[0]))
-
-    def compute_constraint_params(
-        self, path: AbstractGeometricPath, gridpoints: Array, *args: Any, **kwargs: Any
-    ) -> tuple[Any, ...]:
-        n, m = self._of_u.shape
-        of_u, of_x = (np.vstack([rows, rows[-1:]]) for rows in (self._of_u, self._of_x))
-        both = np.vstack([np.eye(m), -np.eye(m)])
-        bounds = np.column_stack([np.zeros(n + 1), self._most])
-        return of_u, of_x, np.zeros((n + 1, m)), both, np.ones(2 * m), None, bounds

@@ -100,10 +100,12 @@ def _described(listing: Listing, robot: Robot) -> list[str]:
         lines.append(f"calls: {', '.join(dict.fromkeys(name for name, _ in listing.calls))}")
     lines += [f"caution: {doubt.where}: {doubt.message}" for doubt in listing.doubts]
     lines.append("")
+    q = [move.target for move in moves if move.target.shape != (4, 4)]
+    poses = iter(controller_poses(robot, np.reshape(q, (-1, len(robot.joint_names)))))
     for one in listing.statements:
         lines.append(f"{one.line:5d}  {one.text}")
         if one.move is not None:
-            lines += [f"       {text}" for text in _where(one.move, robot)]
+            lines += [f"       {text}" for text in _where(one.move, poses, robot)]
     return lines
 
 
@@ -140,12 +142,12 @@ def pose_coordinates(values: Sequence[float]) -> tuple[Coordinate, ...]:
     )
 
 
-def _where(move: ReadMove, robot: Robot) -> Iterator[str]:
+def _where(move: ReadMove, poses: Iterator[Array], robot: Robot) -> Iterator[str]:
     if move.target.shape == (4, 4):
         yield f"in {move.frame}: " + pose_text(pose_values(move.target))
         return
     yield angles_text(move.target, robot)
-    yield "flange " + pose_text(pose_values(controller_poses(robot, move.target)))
+    yield "flange " + pose_text(pose_values(next(poses)))
 
 
 def angles_text(q: Array, robot: Robot) -> str:

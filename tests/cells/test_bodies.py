@@ -12,7 +12,8 @@ from hypothesis.extra.numpy import arrays
 
 from opl.cell.collision import CollisionScene
 from opl.cell.enclosing import enclosing_bodies
-from opl.cell.robot import collision_shapes, forward_kinematics
+from opl.cell.robot import forward_kinematics
+from opl.cell.robot_shapes import collision_shapes
 from opl.cell.workcell import PairRules
 from opl.geometry.frames import pose
 from opl.geometry.mesh import TriangleMesh, winding_number

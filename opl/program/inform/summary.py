@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from opl.cell.robot import Robot, forward_kinematics
+from opl.geometry.frames import Array
 from opl.program.inform.job import ROBOT_KINDS, InformJob, Instruction, Position
 from opl.program.inform.times import job_configurations
 from opl.program.listing import angles_text, pose_text, pose_values
@@ -74,16 +75,18 @@ def _moves(job: InformJob) -> Iterator[str]:
 def _steps(job: InformJob, robot: Robot) -> Iterator[str]:
     places = {(p.kind, p.number): k for k, p in enumerate(job.positions)}
     q = job_configurations(job, robot, np.eye(4), np.eye(4))
+    Ts_base_flange = forward_kinematics(robot, q)
     for step in job.instructions:
         yield f"{step.line:5d}  {job.lines[step.line - 1].expandtabs(2).rstrip()}"
         for label in step.positions if step.moves else ():
             if label in places:
-                yield from _where(job.positions[places[label]], q[places[label]], robot)
+                k = places[label]
+                yield from _where(job.positions[k], q[k], Ts_base_flange[k], robot)
             else:
                 yield f"       {label[0]}{label[1]:03d} is not in the file, the controller has it"
 
 
-def _where(position: Position, q: np.ndarray, robot: Robot) -> Iterator[str]:
+def _where(position: Position, q: Array, T_base_flange: Array, robot: Robot) -> Iterator[str]:
     label = f"       {position.label}"
     pulses = position.coordinates == "PULSE"
     if position.kind not in ROBOT_KINDS or (pulses and np.isnan(q).any()):
@@ -94,7 +97,7 @@ def _where(position: Position, q: np.ndarray, robot: Robot) -> Iterator[str]:
     if not np.isnan(q).any() and (pulses or frame_known):
         yield f"{label} {angles_text(q, robot)}"
         if pulses:
-            yield f"{label} flange {pose_text(pose_values(forward_kinematics(robot, q)))}"
+            yield f"{label} flange {pose_text(pose_values(T_base_flange))}"
     if not pulses:
         frame = f"USER {position.user}" if position.frame == "USER" else position.frame or "?"
         known = len(position.values) >= 6
