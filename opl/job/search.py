@@ -13,10 +13,13 @@ from pydantic import ConfigDict, Field, model_validator
 from opl.files.documents import Document
 from opl.files.quantities import NotNegative, between
 from opl.job.bodies import MM
-from opl.planning.costs import CostWeights, ObjectiveWeights
-from opl.planning.filling import Interpolation
-from opl.planning.multi_start import Start
-from opl.planning.optimal import OptimalSettings
+from opl.planning.settings import (
+    CostWeights,
+    Interpolation,
+    ObjectiveWeights,
+    OptimalSettings,
+    Start,
+)
 
 # contact positions are in mm on the wheel's flat and in degrees of roll about its edges
 _BeltUnits = Annotated[float, Field(ge=0.05, le=10_000.0, json_schema_extra={"unit": "mm or deg"})]

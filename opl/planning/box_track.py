@@ -15,7 +15,7 @@ import numpy as np
 from opl.cell.collision import CollisionScene
 from opl.geometry.frames import Array
 from opl.planning.box_columns import Columns, ColumnSampler
-from opl.planning.costs import CostWeights, track_cost
+from opl.planning.costs import track_cost
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.images import wrist_flips
 from opl.planning.nodes import NodeField, NodeMatrix
@@ -23,6 +23,7 @@ from opl.planning.open_matrix import Track, open_matrices
 from opl.planning.plan import Found, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulge, Row, levels, shut_edges
+from opl.planning.settings import CostWeights
 from opl.planning.symmetry import twins
 from opl.search.box import JointBox
 from opl.search.in_box import missing as missing_of

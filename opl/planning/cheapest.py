@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from opl.planning.costs import CostWeights, track_cost
+from opl.planning.costs import track_cost
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
 from opl.planning.plan import Plan, first_free
 from opl.planning.problem import GrindingProblem
+from opl.planning.settings import CostWeights
 from opl.planning.symmetry import twins
 from opl.search.smooth import smoothest
 

@@ -2,61 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import singularity_margins
-from opl.geometry.frames import Array
-from opl.motion.figures import Figures
 from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
+from opl.planning.settings import CostWeights
 from opl.search.smooth import TrackCost
 
 NEAR_LIMIT = np.deg2rad(10.0)  # from where on nearness to a joint limit is charged
 NEAR_SINGULARITY = 0.2  # as in `singularity_margins`; for the wrist 11.5 degrees
-
-
-@dataclass(frozen=True)
-class CostWeights:
-    """Prices, all in the same unit as joint travel with weight 1, [rad].
-
-    Attributes:
-        joint_weights: For each radian that a joint turns, shape (6,).
-        contact_weight: For each belt unit that t moves on the wheel: the belt dwells meanwhile.
-        time_weight: For each second on the wheel.
-        limit_weight: For a node at a joint limit; falls to 0 at `NEAR_LIMIT` from it.
-        singularity_weight: For a node in a singularity; falls to 0 at `NEAR_SINGULARITY`.
-        push_away: Nodes that keep less than this beyond the required clearance from everything but
-            the wheel are charged, in [m]; 0 charges none.
-        push_weight: For such a node.
-    """
-
-    joint_weights: Array
-    contact_weight: float
-    time_weight: float
-    limit_weight: float
-    singularity_weight: float
-    push_away: float
-    push_weight: float
-
-
-@dataclass(frozen=True)
-class ObjectiveWeights:
-    """Prices of a radian of joint range sum, a radian of joint travel, a second on the wheel."""
-
-    joint_range: float
-    travel: float
-    time: float
-
-    def value(self, figures: Figures) -> float:
-        """Return the weighted sum of a path's figures."""
-        return (
-            self.joint_range * figures.joint_range_sum
-            + self.travel * figures.joint_travel
-            + self.time * figures.seconds
-        )
 
 
 def track_cost(

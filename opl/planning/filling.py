@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from opl.cell.full_turns import nearest_turn
@@ -14,6 +12,7 @@ from opl.geometry.frames import Array, transform
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.path import GrindingPath
 from opl.planning.nodes import NodeMatrix
+from opl.planning.settings import Interpolation
 from opl.search.ladder import middle_count
 
 
@@ -29,22 +28,6 @@ class BrokenEdgeError(Exception):
         super().__init__(f"edge from cutter point {column}: {cause}")
         self.column = column
         self.cause = cause
-
-
-@dataclass(frozen=True)
-class Interpolation:
-    """How the path between nodes is filled in.
-
-    Attributes:
-        max_contact_step: Largest difference of t between adjacent configurations, delta T.
-        max_contact_error: Largest distance of the ground point from where it should touch the
-            wheel, in the middle between two configurations, in [m]. More are put in to keep it.
-        max_joint_step: Largest change of a joint between adjacent configurations in [rad].
-    """
-
-    max_contact_step: float
-    max_contact_error: float
-    max_joint_step: float
 
 
 MOST_HALVINGS = 6  # of a move between intermediate nodes; 64 times denser always was enough

@@ -8,10 +8,11 @@ import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
-from opl.planning.multi_start import Start, tracks_from_best_start, try_recursive
+from opl.planning.multi_start import tracks_from_best_start, try_recursive
 from opl.planning.open_matrix import OpenMatrix
 from opl.planning.plan import Found
 from opl.planning.problem import GrindingProblem, build_problem
+from opl.planning.settings import Start
 
 MOST_CHECKS = 50  # of contact-fixed motions, which differ in the counts of turns only
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from opl.planning.optimal import OptimalSearch, OptimalSettings
+from opl.planning.optimal import OptimalSearch
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
+from opl.planning.settings import OptimalSettings
 
 OTHERWISE_SHARE = 0.3  # of the work: a motion sought in another way, where the proof found none
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from enum import Enum
 
 import numpy as np
 
@@ -12,15 +11,9 @@ from opl.geometry.frames import Array
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
 from opl.planning.plan import Plan, SearchOutcome, first_free, propose_and_check
 from opl.planning.problem import GrindingProblem
+from opl.planning.settings import Start
 from opl.planning.symmetry import twins
 from opl.search.recursive import Descent, add_dead_ends, descend
-
-
-class Start(str, Enum):
-    """Where the search starts in the first column."""
-
-    BEST = "best"  # every start node is tried, the one with the least joint range sum is kept
-    NEAREST = "nearest"  # Node_1 of the paper: nearest to home
 
 
 def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:

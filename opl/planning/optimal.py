@@ -8,14 +8,12 @@ smoothest motion is sought, until nothing can be smaller than the best by more t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.box_track import BoxTracks
 from opl.planning.columns import ColumnWalls
-from opl.planning.costs import CostWeights
 from opl.planning.cut_cells import whole_cells
 from opl.planning.families import Families, Placement, alike, few_columns, grown
 from opl.planning.holders import Holder, holders
@@ -25,6 +23,7 @@ from opl.planning.passages import Passages, Rectangles
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulge
+from opl.planning.settings import OptimalSettings
 from opl.planning.work import Work
 from opl.search.box import JointBox
 from opl.search.cells import Clear
@@ -42,24 +41,6 @@ FIRST_WORK = 300  # units that may be spent on those at once
 CLEARLY_LESS = 0.005  # of the best: what a motion in such a box should be better by
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
-
-
-@dataclass(frozen=True)
-class OptimalSettings:
-    """What is wanted of the optimal method.
-
-    Attributes:
-        widen: Fraction by which the joint range sum may exceed the lower bound for the sake of a
-            smoother track.
-        max_contact_change: Largest change of t between neighbouring columns in belt units.
-        costs: What a track is charged for inside the box.
-        max_subproblems: How much is tried, in units of work.
-    """
-
-    widen: float
-    max_contact_change: float
-    costs: CostWeights
-    max_subproblems: int
 
 
 class OptimalSearch:

@@ -14,9 +14,9 @@ from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.process_settings import ProcessSettings
-from opl.planning.filling import Interpolation
 from opl.planning.nodes import NodeField, NodeMatrix, blocks_of, build_nodes
 from opl.planning.scene import PlanningScene
+from opl.planning.settings import Interpolation
 from opl.search.ladder import Ladder
 
 

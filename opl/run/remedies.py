@@ -12,11 +12,12 @@ from opl.geometry.frames import from_roll_pitch_yaw
 from opl.geometry.toolpath import CutterPoints
 from opl.job import keys
 from opl.job.load import Job
-from opl.planning.multi_start import Start, try_recursive
+from opl.planning.multi_start import try_recursive
 from opl.planning.plan import Found
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import free_at
 from opl.planning.scene import planning_scene
+from opl.planning.settings import Start
 from opl.run.preparing import problem_in
 
 MM = 1e3

@@ -11,14 +11,14 @@ from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.motion.short_ways import shortened
 from opl.planning.borders import Nameable, clear_of_borders
 from opl.planning.cheapest import plan_cheapest
-from opl.planning.costs import ObjectiveWeights
 from opl.planning.equals import quickest_of_equals
 from opl.planning.least_cost import least_cost
 from opl.planning.least_range import plan_optimal
-from opl.planning.multi_start import Start, plan_recursive, try_recursive
+from opl.planning.multi_start import plan_recursive, try_recursive
 from opl.planning.plan import Exhausted, Found, ObjectiveValue, OutOfBudget, Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import no_path
+from opl.planning.settings import ObjectiveWeights, Start
 from opl.planning.weighted import plan_weighted
 from opl.run.values import Prepared
 

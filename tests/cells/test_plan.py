@@ -16,7 +16,6 @@ from opl.motion.whole_motion import UnreachableApproachError, whole_motion
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.fixed_contact import keep_contact, runs_of
 from opl.planning.multi_start import (
-    Start,
     plan_recursive,
     tracks_from_best_start,
     try_recursive,
@@ -24,6 +23,7 @@ from opl.planning.multi_start import (
 from opl.planning.open_matrix import open_matrices
 from opl.planning.plan import Exhausted, Found, OutOfBudget
 from opl.planning.reasons import explain, unreachable_points
+from opl.planning.settings import Start
 from opl.planning.survey import NodeState, survey_nodes
 from opl.run import searches
 from tests.support.bare_cells import Ghosts, with_obstacle

@@ -15,12 +15,12 @@ from opl.motion.collision_check import RESOLUTION, densify
 from opl.motion.figures import figures_of_path
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.columns import ColumnWalls
-from opl.planning.costs import ObjectiveWeights
 from opl.planning.images import Images, seams_of
 from opl.planning.least_cost import least_cost
 from opl.planning.least_range import plan_optimal
 from opl.planning.multi_start import plan_recursive
 from opl.planning.obstructed import Obstructions
+from opl.planning.settings import ObjectiveWeights
 from opl.planning.weighted import plan_weighted
 from opl.verification.replay import replay
 from tests.support.bare_cells import Ghosts
