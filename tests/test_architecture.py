@@ -311,7 +311,42 @@ def test_what_is_cheap_imports_nothing_heavy(module):
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     loaded = {name.split(".")[0] for name in ended.stdout.split()}
     assert "opl" in loaded
-    assert not loaded & {"numpy", "pydantic", "yaml", *HOMES.keys() - {"click", "rich"}}
+    assert not loaded & {"numpy", "pydantic", "yaml", *HOMES.keys() - {"click"}}
+
+
+# what nothing needs that only reads: libraries with one home, and all of scipy
+HEAVY = {"scipy", *HOMES.keys() - {"click", "yaml"}}
+SHOWN = Path(__file__).parent / "golden" / "SAMPLE.JBI"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "printed"),
+    [
+        (["show", SHOWN], 0, "flange x"),
+        (["show", SHOWN, "--diff", SHOWN], 0, "both do the same"),
+        (["check", "job.yaml"], 2, "nmae: unknown key"),
+        (["verify", "job.yaml", SHOWN], 2, "nmae: unknown key"),
+        (["run", "job.yaml"], 2, "nmae: unknown key"),
+        (["robots", "show", "mh24", "--json"], 0, "reach_mm"),
+    ],
+)
+def test_commands_that_read_and_refuse_load_nothing_heavy(tmp_path, arguments, status, printed):
+    (tmp_path / "job.yaml").write_text("nmae: A\n")
+    script = """
+import sys
+from opl.cli.commands import main
+try:
+    main(sys.argv[1:])
+finally:
+    print(*sys.modules, file=sys.stderr)
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", script, *arguments], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert ended.returncode == status
+    assert printed in ended.stdout + ended.stderr
+    loaded = {name.split(".")[0] for name in ended.stderr.splitlines()[-1].split()}
+    assert "numpy" in loaded and not loaded & HEAVY
 
 
 def test_an_unknown_name_is_not_in_the_front_door():

@@ -14,7 +14,6 @@ import click
 import opl
 from opl.cli.inputs import FILE
 from opl.cli.logs import log_to
-from opl.cli.run_text import show_batch
 from opl.cli.stopping import STATUS, Stopped, stopped_by_raising
 
 
@@ -132,6 +131,8 @@ def _show_rows(rows: Sequence[opl.BatchRow], as_json: bool) -> None:
     if as_json:
         click.echo(opl.to_json(rows))
     else:
+        from opl.cli.run_text import show_batch  # with rich
+
         show_batch(rows)
 
 

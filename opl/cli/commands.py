@@ -16,7 +16,6 @@ from opl.cli.pages import show_page, view
 from opl.cli.programs import show, templates, verify
 from opl.cli.progress import progress_bar
 from opl.cli.robots import robots
-from opl.cli.run_text import show_run
 from opl.cli.services import plugin, serve, watch
 from opl.cli.stopping import stopped_at_once
 
@@ -95,6 +94,8 @@ def run_job(
     if as_json:
         click.echo(opl.to_json(report))
     elif not quiet:
+        from opl.cli.run_text import show_run  # with rich
+
         show_run(report, loaded, written, verbose)
     if opened:
         show_page(opl.find_page(folder, folder))

@@ -9,7 +9,6 @@ import click
 
 import opl
 from opl.cli.inputs import FILE
-from opl.cli.run_text import show_proof
 
 EXISTING = click.Path(dir_okay=False, path_type=Path)
 
@@ -66,6 +65,8 @@ def verify(job: Path, programs: tuple[Path, ...], as_json: bool, quiet: bool) ->
     if as_json:
         click.echo(opl.to_json(proof.report))
     elif not quiet:
+        from opl.cli.run_text import show_proof  # with rich
+
         robot = loaded.cell.robot
         show_proof(proof.report, robot.title, robot.joint_names)
     if not proof.proven:

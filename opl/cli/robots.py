@@ -9,7 +9,6 @@ from typing import Any
 import click
 
 import opl
-from opl.cli.robot_text import show_robot, show_robots
 
 FILE = click.Path(dir_okay=False, path_type=Path)
 FOLDER = click.Path(file_okay=False, path_type=Path)
@@ -29,6 +28,8 @@ def robots(context: click.Context, as_json: bool) -> None:
     if as_json:
         click.echo(opl.to_json([_figures(robot) for robot in known]))
     else:
+        from opl.cli.robot_text import show_robots  # with rich
+
         show_robots(known)
 
 
@@ -63,6 +64,8 @@ def show_data(name: str, as_json: bool, picture: Path | None) -> None:
         figures = {**_figures(robot), **file.model_dump(exclude={"name", "title", "maker"})}
         click.echo(opl.to_json(figures))
     else:
+        from opl.cli.robot_text import show_robot  # with rich
+
         show_robot(robot, file)
         if picture is not None:
             click.echo(f"wrote {picture}")

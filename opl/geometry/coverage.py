@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
@@ -51,6 +50,8 @@ class AreaSamples:
 
 def uncovered(samples: AreaSamples, points: CutterPoints, pitch: float) -> NDArray[np.bool_]:
     """Return which samples are more than half a pitch [m] away from every pass, shape (k,)."""
+    from scipy.spatial import cKDTree
+
     looks, spacing = _looks_along(points, pitch)[0], pitch / _LOOKS_PER_PITCH
     distance, _ = cKDTree(looks).query(samples.points)
     # the nearest look may be half a spacing further along than the path itself
@@ -70,6 +71,8 @@ def lying_on_others(
     Returns:
         Pairs of passes, the earlier one first.
     """
+    from scipy.spatial import cKDTree
+
     looks, owner = _looks_along(cutter_points, pitch)
     reach = float(np.hypot(tolerance, 0.5 * pitch / _LOOKS_PER_PITCH))
     points, pass_index = cutter_points.Ts_workpiece_cutter[:, :3, 3], cutter_points.pass_index

@@ -9,14 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline, PPoly
-from scipy.spatial import cKDTree
 
 from opl.geometry.frames import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline, PPoly
 
 # ends nearer than this meet [m]: ten times what CAD systems take for the same point
 MEETING = 1e-5
@@ -70,6 +71,8 @@ def hermite_through(points: Array, tangents: Array) -> tuple[CubicHermiteSpline,
     Each piece is as long as the circular arc with its chord and its turn. Points are in [m] and
     tangents of unit length, shape (k, 3); turns in [rad], shape (k - 1,).
     """
+    from scipy.interpolate import CubicHermiteSpline
+
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     turns = np.arccos(np.clip(np.sum(tangents[1:] * tangents[:-1], axis=1), -1.0, 1.0))
     arcs = chords / np.sinc(turns / (2.0 * np.pi))
@@ -99,6 +102,8 @@ class ChainedCurve:
     @cached_property
     def positions(self) -> PPoly:
         """Points in [m], (...,) to (..., 3)."""
+        from scipy.interpolate import PPoly
+
         coefficients, nodes = [], [np.zeros(1)]
         for piece, offset in zip(self.pieces, self.offsets, strict=False):
             x, c = piece.curve.positions.x, piece.curve.positions.c
@@ -231,6 +236,8 @@ def _pieces(curve: SurfaceCurve) -> tuple[Piece, ...]:
 
 def _followers(ends: Array) -> dict[int, int]:
     """Return which curve continues which, at most one each; ends of shape (n, 2, 4, 4)."""
+    from scipy.spatial import cKDTree
+
     starts = cKDTree(ends[:, 0, :3, 3])
     near = starts.query_ball_point(ends[:, 1, :3, 3], MEETING)
     pairs = []

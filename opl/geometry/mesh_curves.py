@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import PPoly
 
 from opl.geometry.frames import Array, from_axes, in_mm
 from opl.geometry.mesh import TriangleMesh
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 # a vertex nearer to the plane than this fraction of the mesh's size is moved off it
 _ON_PLANE = 1e-9
@@ -43,6 +46,8 @@ class MeshCurve:
 
         The other arguments are its attributes; None if it has no length.
         """
+        from scipy.interpolate import PPoly
+
         steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
         kept = np.append(True, steps > _SAME)
         points, normals, tensors = points[kept], normals[kept], tensors[kept]

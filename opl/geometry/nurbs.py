@@ -7,11 +7,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import comb
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import NdBSpline
 
 from opl.geometry.frames import Array, in_mm, read_only
+
+if TYPE_CHECKING:
+    from scipy.interpolate import NdBSpline
 
 # du x dv below this fraction of its average over the surface is taken for zero
 _DEGENERATE_AREA = 1e-9
@@ -77,6 +80,8 @@ class NurbsSurface:
             raise ValueError(f"weights: must be positive, got {weights.min():g}")
         _check_knots("u", self.degree_u, self.knots_u, points.shape[0])
         _check_knots("v", self.degree_v, self.knots_v, points.shape[1])
+
+        from scipy.interpolate import NdBSpline  # longer to load than to read most files
 
         homogeneous = np.concatenate([weights[..., None] * points, weights[..., None]], axis=-1)
         spline = NdBSpline(

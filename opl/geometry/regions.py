@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh
@@ -35,6 +33,9 @@ def smooth_regions(mesh: TriangleMesh, crease: float) -> np.ndarray:
     Neighbours belong together unless their normals differ by more than ``crease`` [rad]. All
     triangles must have areas.
     """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     normals, areas = face_normals(mesh)
     pairs = neighbours(mesh)
     cosine = np.sum(normals[pairs[:, 0]] * normals[pairs[:, 1]], axis=1)

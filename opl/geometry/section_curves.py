@@ -8,17 +8,18 @@ interpolation in the arc length reproduces the curve.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from contourpy import LineType, contour_generator
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from opl.geometry.curves import curvature_jumps, hermite_through
 from opl.geometry.frames import Array
 from opl.geometry.section import CONVERGED, MAX_NEWTON_STEPS, ON_PLANE, Section, Trace
 from opl.geometry.surface_grid import SurfaceGrid
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
 
 # how far beside a knot its two sides are looked at, as a fraction of the distance to the next node
 _BESIDE = 1e-6
@@ -91,6 +92,8 @@ def section_curves(section: Section, grid: SurfaceGrid, tolerance: float) -> lis
         DegenerateNormalError: Where a curve runs through a place without normal.
         ValueError: Where the plane touches the surface, or a curve cannot be followed.
     """
+    from contourpy import LineType, contour_generator
+
     heights = grid.points @ section.plane_normal
     # a plane through the border itself is sought just inside, then brought to its place
     hair = 1e-7 * np.ptp(heights)

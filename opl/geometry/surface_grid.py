@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from opl.geometry.frames import Array
 from opl.geometry.nurbs import NurbsSurface
@@ -51,6 +50,8 @@ def extent_along(surface: NurbsSurface, grid: SurfaceGrid, direction: Array) -> 
 
     The direction d has unit length, shape (3,).
     """
+    from scipy.optimize import minimize
+
     lower, upper = surface.domain
 
     def extreme(sign: float) -> float:

@@ -21,7 +21,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from opl.geometry.frames import Array, inverse, pose, rotation_angle, transform
 from opl.geometry.rotations import from_rotation_vector, turn_of_change
@@ -220,6 +219,7 @@ def _starts(rows: _Equations) -> list[Array]:
 
 def _fit(rows: _Equations, T_base_start: Array) -> Array:
     """Return the pose that a least-squares fit ends at."""
+    from scipy.optimize import least_squares
 
     def moved(change: Array) -> Array:
         turn = from_rotation_vector(change[:3])

@@ -7,25 +7,19 @@ a name it does not get is an error instead of an empty place.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
-
-from jinja2 import StrictUndefined, TemplateSyntaxError
-from jinja2.sandbox import ImmutableSandboxedEnvironment
+from typing import TYPE_CHECKING
 
 from opl.errors import InputError
 from opl.files.apart import apart
 from opl.files.reading import MB, read_text
 from opl.files.resources import folder
 
-MOST_TEMPLATE, MOST_TEXT = MB, 50 * MB
+if TYPE_CHECKING:
+    from jinja2.sandbox import ImmutableSandboxedEnvironment
 
-_ENVIRONMENT = ImmutableSandboxedEnvironment(
-    undefined=StrictUndefined,
-    autoescape=False,  # jobs and tables, no HTML
-    keep_trailing_newline=True,
-    trim_blocks=True,
-    lstrip_blocks=True,
-)
+MOST_TEMPLATE, MOST_TEXT = MB, 50 * MB
 
 
 def fill(template: Path, values: Mapping[str, object]) -> str:
@@ -41,9 +35,25 @@ def fill(template: Path, values: Mapping[str, object]) -> str:
     return apart(_rendered, source, str(template), dict(values), about=str(template))
 
 
+@cache
+def _environment() -> ImmutableSandboxedEnvironment:
+    from jinja2 import StrictUndefined
+    from jinja2.sandbox import ImmutableSandboxedEnvironment
+
+    return ImmutableSandboxedEnvironment(
+        undefined=StrictUndefined,
+        autoescape=False,  # jobs and tables, no HTML
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
 def _rendered(source: str, template: str, values: Mapping[str, object]) -> str:
+    from jinja2 import TemplateSyntaxError
+
     try:
-        text = _ENVIRONMENT.from_string(source).render(values)
+        text = _environment().from_string(source).render(values)
         if len(text) > MOST_TEXT:
             raise ValueError(f"gives more than {MOST_TEXT / MB:g} MB of text")
         return text

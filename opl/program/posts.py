@@ -14,7 +14,7 @@ are written and not read back, and nothing claims more.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import Enum
@@ -167,17 +167,15 @@ def find_post(name: str) -> Post:
     return post
 
 
-def readers() -> dict[str, Reader]:
-    """Return the reader of each suffix of files that opl can read, by the suffix in capitals."""
-    found: dict[str, Reader] = {}
+def readers() -> Iterator[tuple[str, Reader]]:
+    """Yield suffixes of files that opl can read, in capitals, with the reader; the first counts."""
     for name in known_posts():
         try:
             reader = find_post(name).reader
         except InputError:
             continue  # a post that cannot be loaded is an error for the job that names it only
         if reader is not None:
-            found.setdefault(reader.suffix.upper(), reader)
-    return found
+            yield reader.suffix.upper(), reader
 
 
 def reader_for(path: Path) -> Reader:
@@ -186,10 +184,12 @@ def reader_for(path: Path) -> Reader:
     Raises:
         InputError: If no post reads such files.
     """
-    known = readers()
-    if path.suffix.upper() not in known:
-        raise InputError(str(path), f"is no program that can be read: {', '.join(sorted(known))}")
-    return known[path.suffix.upper()]
+    known = set()
+    for suffix, reader in readers():  # each is loaded when its turn comes
+        if suffix == path.suffix.upper():
+            return reader
+        known.add(suffix)
+    raise InputError(str(path), f"is no program that can be read: {', '.join(sorted(known))}")
 
 
 def pass_times(

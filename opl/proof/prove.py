@@ -129,7 +129,7 @@ def _require_language(job: Job, files: Mapping[str, bytes], reader: Reader) -> N
     """Refuse files that by their names are of another language than the job's controller."""
     for name in files:
         suffix = Path(name).suffix.upper()
-        if suffix in readers() and suffix != reader.suffix.upper():
+        if suffix in dict(readers()) and suffix != reader.suffix.upper():
             raise InputError(
                 job.source.at(keys.PROGRAM_CONTROLLER),
                 f"{job.program.controller} takes {reader.suffix} files, got {name}",
