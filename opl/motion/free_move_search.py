@@ -17,7 +17,6 @@ from opl.cell.collision import CollisionScene
 from opl.cell.wheel_distance import PartTree
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
-from opl.motion.sampling import fewest, sample_path
 from opl.motion.straight_moves import StraightMoves
 
 MOST_CHECKED = 60_000  # configurations, of one search
@@ -95,6 +94,10 @@ class FreeMoveSearch:
 
     def _like_a_known_one(self, start: Array, goal: Array) -> Array | None:
         """Return a path that shares one end with a known one and is joined to its other end."""
+        if not self._paths:
+            return None
+        from opl.motion.sampling import fewest
+
         for known in self._paths:
             for path in (known, known[::-1]):
                 if np.array_equal(path[0], start) and self.joined(path[-1], goal):
@@ -122,6 +125,8 @@ class FreeMoveSearch:
 
     def _sample(self, start: Array, goal: Array) -> Array:
         """Search a path in coordinates in which a metre is the farthest that a point can move."""
+        from opl.motion.sampling import sample_path  # with OMPL, which most jobs do without
+
         robot, moves = self.cell.robot, self._moves
         low = np.maximum(robot.lower, np.minimum(start, goal) - BEYOND)
         high = np.minimum(robot.upper, np.maximum(start, goal) + BEYOND)

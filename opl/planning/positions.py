@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +27,11 @@ from opl.motion.long_runs import fewest_of_long
 from opl.motion.motion import Motion
 from opl.motion.process_settings import ProcessSettings
 from opl.motion.timing import on_wheel, time_motion
-from opl.planning.scene import PlanningScene
 from opl.planning.speed_steps import with_moves_cut
+
+if TYPE_CHECKING:
+    from opl.planning.scene import PlanningScene
+
 
 # Part of the allowed contact error that is used, bows between places included: in the
 # proof, which looks at others, a little more is found.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from opl.cell.robot import Robot
 from opl.files.digests import digest
 from opl.job.search import Objective
 from opl.motion.feed import SlowStretch
-from opl.planning.holders import Holder
 from opl.program.moves import CycleTime
 from opl.proof.corners import CornerProof
 from opl.proof.read_back import FileProof
@@ -27,6 +26,10 @@ from opl.run.values import Planned, Prepared, Proven, Refused, Written
 from opl.verification.extremes import Extreme
 from opl.verification.replay import Verification
 from opl.version import VERSION
+
+if TYPE_CHECKING:
+    from opl.planning.holders import Holder
+
 
 MM = 1e3
 

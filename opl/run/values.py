@@ -10,29 +10,31 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-from opl.cell.nearest import Nearest
 from opl.errors import NoPathError, OplError, UnsafeError
-from opl.files.beside import Beside
-from opl.findings import Finding
-from opl.geometry.frames import Array
-from opl.geometry.inspection import Inspection
-from opl.geometry.passes import LaidPasses
-from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job
-from opl.motion.feed import SlowStretch
-from opl.motion.figures import Figures
-from opl.motion.motion import Motion, TimedMotion, VerifiedMotion
-from opl.motion.timing import Timing
-from opl.planning.fixed_contact import FixedContact
-from opl.planning.plan import Plan
-from opl.planning.problem import GrindingProblem
-from opl.planning.survey import NodeSurvey, survey_nodes, widest_branch
-from opl.program.moves import Program
-from opl.proof.read_back import FileProof
-from opl.run.watch import Stage
-from opl.verification.replay import Verification
+
+if TYPE_CHECKING:  # what a stage makes of a value is loaded with the stage
+    from opl.cell.nearest import Nearest
+    from opl.files.beside import Beside
+    from opl.findings import Finding
+    from opl.geometry.frames import Array
+    from opl.geometry.inspection import Inspection
+    from opl.geometry.passes import LaidPasses
+    from opl.geometry.toolpath import CutterPoints
+    from opl.job.load import Job
+    from opl.motion.feed import SlowStretch
+    from opl.motion.figures import Figures
+    from opl.motion.motion import Motion, TimedMotion, VerifiedMotion
+    from opl.motion.timing import Timing
+    from opl.planning.fixed_contact import FixedContact
+    from opl.planning.plan import Plan
+    from opl.planning.problem import GrindingProblem
+    from opl.planning.survey import NodeSurvey
+    from opl.program.moves import Program
+    from opl.proof.read_back import FileProof
+    from opl.run.watch import Stage
+    from opl.verification.replay import Verification
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +79,8 @@ class Prepared:
     @cached_property
     def survey(self) -> NodeSurvey:
         """Every node of the IK branch that comes farthest, for pictures."""
+        from opl.planning.survey import survey_nodes, widest_branch
+
         problem = self.problem
         return survey_nodes(problem, widest_branch(problem), problem.process.home)
 

@@ -189,7 +189,7 @@ def test_what_is_joined_to_an_end_sought_in_vain_is_not_sought_again(monkeypatch
     def searched(*arguments):
         raise AssertionError("searched again")
 
-    monkeypatch.setattr("opl.motion.free_move_search.sample_path", searched)
+    monkeypatch.setattr("opl.motion.sampling.sample_path", searched)
     near = AWAY + np.deg2rad([2.0, 0.0, 0.0, 0.0, 0.0, 5.0])
     with pytest.raises(BlockedMoveError) as second:
         search.find(near, HOME)
