@@ -1,7 +1,8 @@
 """The robot: joints, limits, speeds and pulses from ``robots/<name>/``, and forward kinematics.
 
-Forward kinematics is pinocchio's, on the URDF. The closed form of `opl.cell.inverse_kinematics` has
-its own numbers, in ``robot.yaml``; a robot whose two descriptions disagree is refused.
+Forward kinematics is that of the URDF, to the last digit as pinocchio has it. The closed form of
+`opl.cell.inverse_kinematics` has its own numbers, in ``robot.yaml``; a robot whose two descriptions
+disagree is refused.
 
 Base frame of every robot that comes with opl, whatever its maker counts from: on axis 1 at the
 height of axis 2, z up, x ahead. So a cell stays as it is when another arm takes its place.
