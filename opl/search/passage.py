@@ -11,8 +11,8 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numba import njit
 
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
 from opl.search.in_box import JUMP
@@ -23,7 +23,7 @@ LEFT, BELOW, ABOVE = range(3)  # from where a cell is entered
 Corner = tuple[int, int]  # indices of place and contact position
 
 
-@njit("float64(float64[:],float64[:],boolean,boolean,float64[::1],float64[::1])", cache=True)
+@kernel("float64(float64[:],float64[:],boolean,boolean,float64[::1],float64[::1])")
 def _missed(a, b, free_a, free_b, low, high):  # type: ignore[no-untyped-def]
     """Return by how much a box misses an edge, as far as its ends tell; infinite with none free."""
     jump, away_a, away_b = False, 0.0, 0.0
@@ -39,9 +39,8 @@ def _missed(a, b, free_a, free_b, low, high):  # type: ignore[no-untyped-def]
     return found
 
 
-@njit(
-    "void(float64[:,:,::1],boolean[:,::1],float64[::1],float64[::1],float64[:,::1],float64[:,::1])",
-    cache=True,
+@kernel(
+    "void(float64[:,:,::1],boolean[:,::1],float64[::1],float64[::1],float64[:,::1],float64[:,::1])"
 )
 def _edges_missed(q, free, low, high, up, along):  # type: ignore[no-untyped-def]
     n, m = free.shape
@@ -71,7 +70,7 @@ def edges_missed(q: Array, free: np.ndarray, box: JointBox) -> tuple[Array, Arra
     return up, along
 
 
-@njit("void(float64[:,::1],float64[:,::1],boolean,float64[:,::1],int8[:,::1])", cache=True)
+@kernel("void(float64[:,::1],float64[:,::1],boolean,float64[:,::1],int8[:,::1])")
 def _entered(up, along, worst, least, come):  # type: ignore[no-untyped-def]
     """Find how little edges must miss the box to enter each cell, and from where it is entered.
 
@@ -136,7 +135,7 @@ def passage(up: Array, along: Array, most: float) -> list[tuple[Corner, Corner]]
     return edges[::-1]
 
 
-@njit("int64(boolean[:,::1],boolean[:,::1],int64[::1])", cache=True)
+@kernel("int64(boolean[:,::1],boolean[:,::1],int64[::1])")
 def _climbed(up, along, before):  # type: ignore[no-untyped-def]
     """Return the first corner reached of the greatest contact position, -1 if none is.
 
