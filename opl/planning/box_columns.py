@@ -11,7 +11,7 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.families import GROWN, Placement
 from opl.planning.images import Seams
-from opl.planning.nodes import inverse_solutions
+from opl.planning.nodes import blocks_of, inverse_solutions
 from opl.planning.problem import GrindingProblem, wheel_distances
 from opl.search.box import JointBox
 from opl.search.in_box import missing_chords, nearest_points, sampled
@@ -76,15 +76,15 @@ class ColumnSampler:
             places: Fractional cutter points, the cutter points among them, shape (n,).
         """
         problem = self._problem
-        before, points, there = places.astype(int), problem.points, self.there(places)
+        there = self.there(places)
         positions = problem.field.contact_positions
         grid = np.broadcast_to(positions, (len(places), len(positions)))
-        field = self._placed(points.pass_index, problem.field.q, placements)
-        after = np.ceil(places).astype(int)
-        # between cutter points near enough to see where the box may be met
-        coarse = field[before] + (places - before)[:, None, None] * (field[after] - field[before])
-        free = ~self._cuts(places, there, grid) & ~np.isnan(coarse[..., 0])
-        t, _ = sampled(grid, coarse, free, box, FINE, whole=True)
+        cuts = self._cuts(places, there, grid)
+        t = np.empty((len(places), FINE))
+        for block in blocks_of(*grid.shape):
+            coarse = self._coarse(places[block], placements)
+            free = ~cuts[block] & ~np.isnan(coarse[..., 0])
+            t[block], _ = sampled(grid[block], coarse, free, box, FINE, whole=True)
         # where the part begins to cut is known to a hair only
         last = problem.cell.wheel.last_position
         t = np.clip(np.concatenate([t[:, :1] - BORDER, t, t[:, -1:] + BORDER], axis=1), -last, last)
@@ -110,6 +110,19 @@ class ColumnSampler:
             found = self.at(places, self.there(places), [placement], finer)
             t[own], columns.q[own], columns.free[own] = finer, found.q, found.free
         return columns
+
+    def _coarse(self, places: Array, placements: Sequence[Placement]) -> Array:
+        """Return postures of places at the field's contact positions, shape (n, M, 6).
+
+        Between cutter points near enough to see where a box may be met.
+        """
+        before, after = places.astype(int), np.ceil(places).astype(int)
+        columns = np.union1d(before, after)
+        pass_index = self._problem.points.pass_index[columns]
+        field = self._placed(pass_index, self._problem.field.q[columns], placements)
+        here = field[np.searchsorted(columns, before)]
+        there = field[np.searchsorted(columns, after)]
+        return np.asarray(here + (places - before)[:, None, None] * (there - here))
 
     def _leave_out_collisions(self, columns: Columns, box: JointBox) -> None:
         """Leave postures that collide out of columns, until those nearest to a box are free."""

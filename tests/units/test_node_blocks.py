@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from opl.planning import nodes as nodes_module
+from opl.planning.box_columns import ColumnSampler
+from opl.planning.families import Families
+from opl.planning.images import Images, seams_of
 from opl.planning.nodes import build_nodes
 from opl.planning.open_matrix import Track, open_matrices
 from opl.planning.problem import wheel_distances
@@ -63,3 +66,24 @@ def test_tracks_of_one_row_a_position_are_followed_like_those_of_several():
         assert any(np.array_equal(one.rows, rows) for one in double)
         found += 1
     assert found
+
+
+def test_places_near_a_box_are_sampled_alike_in_blocks(monkeypatch):
+    problem = small_problem()
+    points, robot = problem.points, problem.cell.robot
+    seams = seams_of(problem.field.q)
+    families = Families(
+        Images(robot, seams, 10.0), problem.field.q, problem.cuts, points.pass_index
+    )
+    box = families.smallest_grown()
+    placements, _ = families.hold(box, {}, set(), 0.1)
+    whole = np.arange(len(points), dtype=float)
+    between = whole[:-1][np.diff(points.pass_index) == 0] + 0.3
+    places = np.union1d(whole, between)
+    at_once = ColumnSampler(problem, seams).columns(box, placements, places)
+    monkeypatch.setattr(nodes_module, "AT_ONCE", 1)
+    in_blocks = ColumnSampler(problem, seams).columns(box, placements, places)
+    assert np.isfinite(at_once.q[..., 0]).any(axis=1).all()
+    np.testing.assert_array_equal(in_blocks.t, at_once.t)
+    np.testing.assert_array_equal(in_blocks.q, at_once.q)
+    np.testing.assert_array_equal(in_blocks.free, at_once.free)
