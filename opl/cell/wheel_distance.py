@@ -93,8 +93,9 @@ def signed_wheel_distance(
 
     Returns:
         Distance per pose, shape (...); where the part cuts into the wheel minus the longest of its
-        triangles' ways out. Less than ``needed`` exactly where the part is too near, and then too
-        large by `TOLERANCE` at most; otherwise that of some point of the part.
+        triangles' ways out. Too large by `TOLERANCE` at most where the part is too near, so what is
+        nearer than ``needed`` by more than that is less than ``needed``; otherwise that of some
+        point of the part.
     """
     shape = Ts_contact0_workpiece.shape[:-2]
     needs = np.array(np.broadcast_to(needed, shape), dtype=float).reshape(-1)
