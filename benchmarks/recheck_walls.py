@@ -35,8 +35,10 @@ COARSE = 2e-5  # [rad] sum of the pads of a cell that is looked at first
 SMALLEST = 1.0 / 1024.0  # cell that is not cut further then
 HALVINGS = 12
 ROW_PARTS = 16  # cells between two cutter points at one contact position
-WITNESSES = 16  # triangles of the part in which a point deep in the wheel is sought
-DEPTH = 8  # how often they are cut into four
+TRIED = 8  # triangles of the part that are sought to be deep in the wheel
+WITNESSES = 12  # points of one
+CLOSER = 16  # times that the deepest point is looked for, each time twice as near
+GRID = np.array([(i, j, 12 - i - j) for i in range(13) for j in range(13 - i)]) / 12.0
 
 Flags = NDArray[np.bool_]
 
@@ -369,55 +371,124 @@ class Machine:
         return low[~deep], high[~deep]
 
     def _too_deep(self, T_cutter_workpiece: Array, low: Array, high: Array) -> tuple[Flags, Flags]:
-        """Return where a point of the part is too deep all over a cell, and where in its middle."""
+        """Return where the part is too deep all over a cell, and where it is in its middle.
+
+        That it is, some points of one of its triangles show.
+        """
         deep, middle = np.zeros(len(low), dtype=bool), np.zeros(len(low), dtype=bool)
         cutter = self._triangles @ T_cutter_workpiece[:3, :3].T + T_cutter_workpiece[:3, 3]
         for k, t in enumerate((low + high) / 2.0):
             slide = np.clip(t, -self._flat, self._flat)
             roll = np.deg2rad(t - slide)
-            point, depth = self._deepest(cutter, np.cos(roll), np.sin(roll), 1e-3 * slide)
-            middle[k] = depth > self._allowed
-            if middle[k]:
-                cell = self._contact(low[k : k + 1], high[k : k + 1])
-                x, y, z = (
-                    (dot(cell[r], [still(v, low[:1]) for v in point]) + cell[r][3]).value
-                    for r in range(3)
-                )
-                side = np.maximum(np.abs(x.low), np.abs(x.high))
-                height = z - exactly(np.full(1, self._radius))
-                across, along = (np.maximum(np.abs(v.low), np.abs(v.high)) for v in (y, height))
-                least = np.minimum(self._width / 2.0 - side, self._radius - np.hypot(across, along))
-                deep[k] = (least > self._allowed + SURE)[0]
+            c, s = np.cos(roll), np.sin(roll)
+            x = c * cutter[..., 0] + s * cutter[..., 2] - 1e-3 * slide
+            z = c * cutter[..., 2] - s * cutter[..., 0] - self._radius
+            seen = np.stack([x, cutter[..., 1], z], axis=-1)
+            for triangle in self._hopeful(seen):
+                weights, depth = self._witnesses(seen[triangle])
+                if depth <= self._allowed:
+                    continue
+                middle[k] = True
+                points = weights @ cutter[triangle]
+                ends = np.full(len(points), low[k]), np.full(len(points), high[k])
+                if self._least_depth(points, *ends) > self._allowed + SURE:
+                    deep[k] = True
+                    break
         return deep, middle
 
-    def _deepest(
-        self, triangles: Array, cosine: float, sine: float, slide: float
-    ) -> tuple[Array, float]:
-        """Return a point of triangles that is deep in the wheel, and how deep."""
-        best, depth = triangles[0, 0], -np.inf
-        for _ in range(DEPTH + 1):
-            x = cosine * triangles[..., 0] + sine * triangles[..., 2] - slide
-            z = cosine * triangles[..., 2] - sine * triangles[..., 0] - self._radius
-            y = triangles[..., 1]
-            corners = np.minimum(self._width / 2.0 - np.abs(x), self._radius - np.hypot(y, z))
-            found = np.unravel_index(int(np.argmax(corners)), corners.shape)
-            if corners[found] > depth:
-                best, depth = triangles[found], float(corners[found])
-            # both depths are concave: below the least |x|, and below the slope at the middle
-            beside = np.where(np.ptp(np.sign(x), axis=1) > 1.0, 0.0, np.abs(x).min(axis=1))
-            my, mz = y.mean(axis=1, keepdims=True), z.mean(axis=1, keepdims=True)
-            away = np.maximum(np.hypot(my, mz), 1e-9)
-            radial = self._radius - ((y * my + z * mz) / away).min(axis=1)
-            hope = np.minimum(self._width / 2.0 - beside, radial)
-            worth = np.flatnonzero(hope > max(depth, self._allowed))
-            worth = worth[np.argsort(-hope[worth], kind="stable")[:WITNESSES]]
-            if not len(worth):
+    def _hopeful(self, triangles: Array) -> NDArray[np.int64]:
+        """Return the triangles that may be too deep, seen from the middle of the wheel."""
+        x, y, z = np.moveaxis(triangles, -1, 0)
+        # no deeper than along the axle, nor than square to it towards the middle of the triangle
+        beside = np.where(np.ptp(np.sign(x), axis=1) > 1.0, 0.0, np.abs(x).min(axis=1))
+        my, mz = y.mean(axis=1, keepdims=True), z.mean(axis=1, keepdims=True)
+        away = np.maximum(np.hypot(my, mz), 1e-9)
+        radial = self._radius - ((y * my + z * mz) / away).min(axis=1)
+        hope = np.minimum(self._width / 2.0 - beside, radial)
+        worth = np.flatnonzero(hope > self._allowed)
+        return worth[np.argsort(-hope[worth], kind="stable")[:TRIED]]
+
+    def _witnesses(self, triangle: Array) -> tuple[Array, float]:
+        """Return points of a triangle, as shares of its corners, and how deep they show it to be.
+
+        At each tilt from square to the axle to along it, some point has to be deep that way. Points
+        are added for the tilt at which those before show least.
+        """
+        shares: list[Array] = []
+        tilt, end, depth = np.pi / 4.0, 0, -np.inf
+        for _ in range(WITNESSES):
+            shares.append(self._deepest(triangle, tilt, end))
+            points = np.array(shares) @ triangle
+            ways = self._ways(*points.T[[0, 0]], np.hypot(points[:, 1], points[:, 2]))
+            found, tilt, end = least_of_most(*ways)
+            if found <= depth + 1e-9:
                 break
-            a, b, c = np.moveaxis(triangles[worth], 1, 0)
-            ab, bc, ca = (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0
-            quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
-            triangles = np.concatenate([np.stack(corner, axis=1) for corner in quarters])
-        return best, depth
+            depth = found
+        return np.array(shares), depth
+
+    def _deepest(self, triangle: Array, tilt: float, end: int) -> Array:
+        """Return about the point of a triangle that is deepest at a tilt to one end of the axle."""
+        middle, size = np.full(3, 1.0 / 3.0), 1.0
+        for _ in range(CLOSER):
+            shares = middle + size * (GRID - 1.0 / 3.0)
+            shares = np.maximum(shares, 0.0)
+            shares /= shares.sum(axis=1, keepdims=True)
+            x, y, z = (shares @ triangle).T
+            radial, ends = self._ways(x, x, np.hypot(y, z))
+            deepest = int(np.argmax(np.cos(tilt) * radial + np.sin(tilt) * ends[end]))
+            middle, size = shares[deepest], size * 0.5
+        return np.asarray(middle)
+
+    def _ways(self, x_low: Array, x_high: Array, away: Array) -> tuple[Array, Array]:
+        """Return how deep points are square to the axle, and towards both its ends, at the least.
+
+        Args:
+            x_low: Least place along the axle from the middle of the wheel, shape (n,).
+            x_high: Greatest.
+            away: Farthest from the axle.
+        """
+        half = self._width / 2.0
+        return self._radius - away, np.array([half - x_high, half + x_low])
+
+    def _least_depth(self, points: Array, low: Array, high: Array) -> float:
+        """Return how deep a triangle is at the least all over a cell, by points of it."""
+        cell = self._contact(low, high)
+        x, y, z = (
+            (dot(cell[r], [still(v, low) for v in points.T]) + cell[r][3]).value for r in range(3)
+        )
+        height = z - exactly(np.full(len(points), self._radius))
+        across, along = (np.maximum(np.abs(v.low), np.abs(v.high)) for v in (y, height))
+        return least_of_most(*self._ways(x.low, x.high, np.hypot(across, along)))[0]
+
+
+def least_of_most(radial: Array, ends: Array) -> tuple[float, float, int]:
+    """Return the shortest way out of the wheel of a body with points so deep in it, at the least.
+
+    In a direction tilted by ``a`` from square to the axle towards one of its ends, a body overlaps
+    the wheel by no less than the most of ``radial cos a + end sin a`` over its points: the support
+    of a cylinder is that of its radius and that of its half width, added up. Between two tilts at
+    which such a sum is positive it is concave, so it is no less than at the worse of the two.
+
+    Args:
+        radial: How deep each point is square to the axle, shape (n,).
+        ends: And towards each end of the axle, shape (2, n).
+
+    Returns:
+        The least over all tilts of the most over the points, the tilt in [rad], and to which end.
+    """
+    worst = (np.inf, 0.0, 0)
+    for end, axial in enumerate(ends):
+        # where two points are as deep as each other
+        rise, run = radial[:, None] - radial, axial - axial[:, None]
+        crossing = np.arctan2(np.abs(rise), np.abs(run))[(rise * run > 0.0)]
+        tilts = np.unique(np.concatenate([[0.0, np.pi / 4.0, np.pi / 2.0], crossing]))
+        depth = np.cos(tilts)[:, None] * radial + np.sin(tilts)[:, None] * axial
+        least = np.minimum(depth[:-1], depth[1:]).max(axis=1)
+        at = int(np.argmin(least))
+        if least[at] < worst[0]:
+            tilt = tilts[at + int(depth[at].max() > depth[at + 1].max())]
+            worst = (float(least[at]), float(tilt), end)
+    return worst
 
 
 def halves(low: Array, high: Array, which: Flags) -> tuple[Array, Array]:
