@@ -62,8 +62,8 @@ def fill_in(
         jumps = on_wheel & (np.abs(np.diff(q, axis=0)).max(axis=1) > rule.max_joint_step)
         if jumps.any():
             raise BrokenEdgeError(int(place[:-1][jumps][0]), "continuity")
-        error = _contact_error_between(cell, points, t_node, place, q)
-        coarse = np.flatnonzero(on_wheel & (error > rule.max_contact_error))
+        error = _contact_error_between(cell, points, t_node, place, q, on_wheel)
+        coarse = np.flatnonzero(error > rule.max_contact_error)
         if not len(coarse):
             return GrindingPath(nodes.ik_branch, q, t, place, pass_index)
         halves = (place[coarse] + place[coarse + 1]) / 2.0
@@ -93,16 +93,24 @@ def _solve(
 
 
 def _contact_error_between(
-    cell: WorkCell, points: CutterPoints, t_node: Array, place: Array, q: Array
+    cell: WorkCell,
+    points: CutterPoints,
+    t_node: Array,
+    place: Array,
+    q: Array,
+    on_wheel: np.ndarray,
 ) -> Array:
     """Return how far the ground point is from its place on the wheel in the middle of each move.
 
-    Distances in [m], shape (n - 1,), without meaning where the move leaves the wheel; of n
-    configurations at fractional cutter points, and the contact position at each of N cutter points.
+    Distances in [m], shape (n - 1,), 0 where the move is not ``on_wheel``: between passes there is
+    no frame, as normals may be opposite; of n configurations at fractional cutter points, and the
+    contact position at each of N cutter points.
     """
-    middle = (place[:-1] + place[1:]) / 2.0
-    T_base_flange = forward_kinematics(cell.robot, (q[:-1] + q[1:]) / 2.0)
+    middle = ((place[:-1] + place[1:]) / 2.0)[on_wheel]
+    T_base_flange = forward_kinematics(cell.robot, ((q[:-1] + q[1:]) / 2.0)[on_wheel])
     p_workpiece = points.frames_at(middle)[:, :3, 3]
     p_base = transform(T_base_flange @ cell.T_flange_workpiece, p_workpiece)
     t = np.interp(middle, np.arange(len(t_node)), t_node)
-    return np.asarray(np.linalg.norm(p_base - cell.wheel.T_base_contact(t)[:, :3, 3], axis=1))
+    error = np.zeros(len(on_wheel))
+    error[on_wheel] = np.linalg.norm(p_base - cell.wheel.T_base_contact(t)[:, :3, 3], axis=1)
+    return error

@@ -194,6 +194,16 @@ def test_a_smaller_error_gets_more_nodes():
     np.testing.assert_array_equal(fine.q[[0, -1]], coarse.q)
 
 
+def test_nothing_is_interpolated_between_passes_on_opposite_sides():
+    cell, points, nodes, rows = two_points()
+    frames = points.Ts_workpiece_cutter.copy()
+    frames[1, :3, :3] = frames[0, :3, :3] @ np.diag([1.0, -1.0, -1.0])
+    points = replace(points, Ts_workpiece_cutter=frames, pass_index=np.array([0, 1]))
+    with np.errstate(all="raise"):
+        path = fill_in(cell, points, nodes, rows, small_problem().interpolation)
+    assert path.n_intermediate == 0
+
+
 def test_a_joint_turned_by_more_than_half_a_turn_is_followed():
     # the same wrist one turn further: nodes between must be turned as well
     cell, points, nodes, rows = two_points()
