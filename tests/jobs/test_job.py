@@ -140,7 +140,7 @@ def test_a_job_may_name_its_own_joint_accelerations(tmp_path):
             "passes.max_chord_error_mm: 0.0001 mm makes about",
         ),
         (
-            {"search.contact_positions": 2000, "passes.max_step_mm": 0.5},
+            {"search.contact_positions": 2000, "passes.max_step_mm": 0.2},
             "search.contact_positions: 2000 at each of",
         ),
         ({"wheel.max_roll_deg": 120}, "wheel.max_roll_deg: must be at most 90, got 120"),
