@@ -19,6 +19,8 @@ LOCK = HIDDEN + "lock"
 # what this process holds: folders, and which of them were made for it, by the open lock
 _HELD: dict[int | None, tuple[Path, list[Path]]] = {}
 
+ATTEMPTS = 20  # to make a folder and lock it while others remove it
+
 
 @dataclass(frozen=True)
 class Claim:
@@ -74,9 +76,17 @@ def claimed(folder: Path) -> Iterator[Claim]:
     lock = None
     try:
         try:
-            for one in reversed(missing):
-                one.mkdir(exist_ok=True)
-            lock = _lock(place, folder)
+            for attempt in range(ATTEMPTS):
+                try:
+                    for one in reversed(missing):
+                        one.mkdir(exist_ok=True)
+                    lock = _lock(place, folder)
+                    break
+                except FileNotFoundError:
+                    # a run that held it until now has removed what it had made and left empty
+                    missing = _missing(place) or missing
+                    if attempt == ATTEMPTS - 1:
+                        raise
             recover(place)
         except OSError as error:
             raise unwritable(folder, error) from error
