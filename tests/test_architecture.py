@@ -49,7 +49,7 @@ HOMES = {
     "click": {"cli"},
     "rich": {"cli"},
     "matplotlib": {"report"},
-    "trimesh": {"geometry/mesh"},
+    "trimesh": {"geometry/mesh_file"},
     "contourpy": {"geometry/section_curves"},
     "OCP": {"geometry/cad"},
     "xacro": {"cell/xacro_file"},

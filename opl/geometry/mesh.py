@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from opl.errors import InputError
-from opl.files.reading import MB, read_bytes
 from opl.geometry.crossings import crossing_triangles
 from opl.geometry.frames import Array, in_mm, read_only
-
-if TYPE_CHECKING:
-    import trimesh
-
-# more of them take gigabytes and minutes to be looked through
-MOST_TRIANGLES = 400_000
-MOST_BYTES = 100 * MB
+from opl.geometry.mesh_file import read_triangles
 
 _METRES = {"mm": 1e-3, "m": 1.0}
-_SUFFIXES = (".stl", ".ply", ".obj")
 
 # a closed mesh with less than this fraction of the volume of its bounding cube is flat
 _FLAT_VOLUME = 1e-9
@@ -75,6 +66,12 @@ class TriangleMesh:
         return bool((np.unique(edges, axis=0, return_counts=True)[1] % 2 == 0).all())
 
     @property
+    def faces_one_way(self) -> bool:
+        """Return whether no two neighbouring triangles face opposite sides."""
+        directed = self.edges.reshape(-1, 2)
+        return len(np.unique(directed, axis=0)) == len(directed)
+
+    @property
     def volume(self) -> float:
         """Return the enclosed volume in [m^3], negative if the triangles face inwards."""
         a, b, c = np.moveaxis(self.triangles, 1, 0)
@@ -122,12 +119,13 @@ def load_mesh(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
         InputError: If the file cannot be read, has no triangles, or if they do not enclose a
             volume or cross each other.
     """
-    mesh = _read(path)
-    if not mesh.is_watertight:
-        raise InputError(str(path), f"is not closed: {_open_edges(mesh, unit)}")
-    if not mesh.is_winding_consistent:
+    corners, faces = read_triangles(path)
+    solid = TriangleMesh(_METRES[unit] * corners, faces)
+    edges, counts = np.unique(np.sort(solid.edges.reshape(-1, 2)), axis=0, return_counts=True)
+    if (counts != 2).any():
+        raise InputError(str(path), f"is not closed: {_open_edges(solid, edges[counts != 2])}")
+    if not solid.faces_one_way:
         raise InputError(str(path), "has neighbouring triangles that face opposite sides")
-    solid = TriangleMesh(_METRES[unit] * np.asarray(mesh.vertices), np.asarray(mesh.faces))
     if abs(solid.volume) <= _FLAT_VOLUME * np.ptp(solid.vertices, axis=0).max() ** 3:
         raise InputError(str(path), "encloses no volume")
     crossing = crossing_triangles(solid.triangles)
@@ -146,8 +144,7 @@ def load_triangles(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
             triangles face opposite sides.
     """
     mesh = load_shell(path, unit)
-    directed = mesh.edges.reshape(-1, 2)
-    if len(np.unique(directed, axis=0)) < len(directed):
+    if not mesh.faces_one_way:
         raise InputError(str(path), "has neighbouring triangles that face opposite sides")
     return mesh
 
@@ -160,50 +157,21 @@ def load_shell(path: Path, unit: Literal["mm", "m"]) -> TriangleMesh:
     Raises:
         InputError: If the file cannot be read or has no triangles with an area.
     """
-    mesh = _read(path)
-    a, b, c = np.moveaxis(np.asarray(mesh.triangles), 1, 0)
+    corners, faces = read_triangles(path)
+    a, b, c = np.moveaxis(corners[faces], 1, 0)
     longest = np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=2).max(axis=0)
     twice_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     flat = twice_area <= _FLAT_AREA * longest**2
     if flat.all():
         raise InputError(str(path), "holds no triangle with an area")
-    return TriangleMesh(_METRES[unit] * np.asarray(mesh.vertices), np.asarray(mesh.faces)[~flat])
+    return TriangleMesh(_METRES[unit] * corners, faces[~flat])
 
 
-def _read(path: Path) -> trimesh.Trimesh:
-    """Return what a file holds, in its own unit, corners at the same place merged."""
-    import trimesh  # with all that it loads, longer than most commands take that read no mesh
-
-    if path.suffix.lower() not in _SUFFIXES:
-        raise InputError(str(path), f"must be one of {', '.join(_SUFFIXES)}")
-    content = read_bytes(path, MOST_BYTES)
-    try:
-        mesh = trimesh.load_mesh(BytesIO(content), file_type=path.suffix.lower()[1:])
-        if len(mesh.faces) > MOST_TRIANGLES:
-            raise ValueError(f"has {len(mesh.faces)} triangles, at most {MOST_TRIANGLES} are taken")
-        if mesh.faces.shape[1:] != (3,) or mesh.vertices.shape[1:] != (3,):
-            raise ValueError("its triangles are none")
-        if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
-            raise ValueError(f"its triangles name corners beyond its {len(mesh.vertices)}")
-        mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    # trimesh lets whatever its parsers stumble over through: ValueError, KeyError, struct.error ...
-    except Exception as error:
-        raise InputError(str(path), f"is not a mesh: {error}") from error
-    if mesh.is_empty or not len(mesh.faces):
-        raise InputError(str(path), "holds no triangles")
-    if not np.isfinite(mesh.vertices).all():
-        raise InputError(str(path), "has corners that are not finite")
-    return mesh
-
-
-def _open_edges(mesh: trimesh.Trimesh, unit: Literal["mm", "m"]) -> str:
-    """Return where a mesh that is not closed is open."""
-    edges, counts = np.unique(np.sort(mesh.edges, axis=1), axis=0, return_counts=True)
-    wrong = edges[counts != 2]
-    middle = _METRES[unit] * np.asarray(mesh.vertices)[wrong[0]].mean(axis=0)
+def _open_edges(solid: TriangleMesh, wrong: NDArray[np.int64]) -> str:
+    """Return where a mesh is open, given the vertices of edges that are not those of two."""
     return (
-        f"{len(wrong)} edges are not those of two triangles, one of them near {in_mm(middle)}; a "
-        "solid without holes is needed"
+        f"{len(wrong)} edges are not those of two triangles, one of them near "
+        f"{in_mm(solid.vertices[wrong[0]].mean(axis=0))}; a solid without holes is needed"
     )
 
 

@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 from opl.errors import InputError
 from opl.files.resources import folder
 from opl.geometry.mesh import TriangleMesh, load_mesh
+from opl.geometry.mesh_file import read_triangles
 from tests.support.surfaces import load_surface, profile_distance
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [30.0, 0.0, 0.0], [0.0, 20.0, 0.0], [0.0, 0.0, 10.0]])
@@ -23,6 +24,22 @@ def test_every_format_gives_the_same_solid_in_metres(tmp_path, suffix):
     assert mesh.vertices.shape == (4, 3)
     assert mesh.faces.shape == (4, 3)
     assert mesh.volume == pytest.approx(30e-3 * 20e-3 * 10e-3 / 6.0)
+
+
+@pytest.mark.parametrize("name", ["v_shape/v_shape.stl", "faucet/faucet.stl"])
+def test_binary_stl_is_read_as_trimesh_reads_it(name):
+    path = folder("workpieces") / name
+    theirs = trimesh.load_mesh(path)
+    corners, triangles = read_triangles(path)
+    assert np.array_equal(corners, theirs.vertices)
+    assert np.array_equal(triangles, theirs.faces)
+
+
+def test_text_that_calls_itself_stl_is_read_too(tmp_path):
+    path = tmp_path / "part.stl"
+    solid = trimesh.Trimesh(CORNERS, TETRAHEDRON, process=False)
+    path.write_text(trimesh.exchange.stl.export_stl_ascii(solid))
+    assert load_mesh(path, "mm").volume == pytest.approx(30e-3 * 20e-3 * 10e-3 / 6.0)
 
 
 def test_a_file_in_metres_stays_as_it_is(tmp_path):
