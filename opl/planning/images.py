@@ -46,30 +46,30 @@ def seams_of(q: Array) -> Seams:
         q: Principal angles in [rad], NaN where there are none, shape (N, M, 8, 6).
     """
     start, kept = np.full((8, 6), -np.pi), np.zeros((8, 6), dtype=bool)
-    with np.errstate(invalid="ignore"):
-        jump = np.maximum(*(_largest_jump(np.diff(q, axis=axis)) for axis in (0, 1)))
     margin = SEAM_GAP / 2.0
     margins = np.zeros((8, 6))
-    for family in range(8):
-        for joint in range(6):
-            angles = np.sort(q[:, :, family, joint], axis=None)
-            angles = angles[~np.isnan(angles)]
-            if not len(angles):
-                continue
-            gaps = np.diff(angles, append=angles[0] + 2.0 * np.pi)
-            widest = int(np.argmax(gaps))
-            kept[family, joint] = gaps[widest] > SEAM_GAP and jump[family, joint] < margin
-            start[family, joint] = angles[widest] + gaps[widest] / 2.0
-            if kept[family, joint]:
-                margins[family, joint] = gaps[widest] / 2.0 - margin
+    # one joint at a time: what is made of all at once is a copy of all
+    for family, joint in np.ndindex(8, 6):
+        found = q[:, :, family, joint]
+        angles = np.sort(found, axis=None)
+        angles = angles[~np.isnan(angles)]
+        if not len(angles):
+            continue
+        gaps = np.diff(angles, append=angles[0] + 2.0 * np.pi)
+        widest = int(np.argmax(gaps))
+        jump = max(_largest_jump(np.diff(found, axis=axis)) for axis in (0, 1))
+        kept[family, joint] = gaps[widest] > SEAM_GAP and jump < margin
+        start[family, joint] = angles[widest] + gaps[widest] / 2.0
+        if kept[family, joint]:
+            margins[family, joint] = gaps[widest] / 2.0 - margin
     low, high = start + margins, start + 2.0 * np.pi - margins
     return Seams(start, kept, low, high)
 
 
-def _largest_jump(change: Array) -> Array:
-    """Return the largest change of each angle between neighbouring nodes in [rad], shape (8, 6)."""
+def _largest_jump(change: Array) -> float:
+    """Return the largest change of an angle between neighbouring nodes in [rad], any shape."""
     around = np.abs(change - 2.0 * np.pi * np.round(change / (2.0 * np.pi)))
-    return np.asarray(np.nan_to_num(around).max(axis=(0, 1), initial=0.0))
+    return float(np.nan_to_num(around).max(initial=0.0))
 
 
 def wrist_flips(arm: Arm) -> list[tuple[Array, Array]]:

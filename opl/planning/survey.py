@@ -16,6 +16,7 @@ from opl.cell.nearest import Nearest, nearest_pairs
 from opl.cell.robot import Robot
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
+from opl.planning.nodes import blocks_of
 from opl.planning.problem import GrindingProblem
 
 # clearances are measured at about so many cutter points and contact positions, evenly
@@ -133,10 +134,15 @@ def _turned(q: Array, near: Array, robot: Robot) -> Array:
 
     Angles that no full turn brings within the range of their joint stay near.
     """
-    wanted = np.round((np.broadcast_to(near, (len(q), 6))[:, None] - q) / _TURN)
-    least, most = np.ceil((robot.lower - q) / _TURN), np.floor((robot.upper - q) / _TURN)
-    turns = np.where(least <= most, np.clip(wanted, least, most), wanted)
-    return np.asarray(q + _TURN * turns)
+    turned = np.empty(q.shape)
+    near = np.broadcast_to(near, (len(q), 6))[:, None]
+    for block in blocks_of(*q.shape[:2]):
+        own = q[block]
+        wanted = np.round((near[block] - own) / _TURN)
+        least, most = np.ceil((robot.lower - own) / _TURN), np.floor((robot.upper - own) / _TURN)
+        turns = np.where(least <= most, np.clip(wanted, least, most), wanted)
+        turned[block] = own + _TURN * turns
+    return turned
 
 
 def _some(count: int, most: int) -> np.ndarray:

@@ -30,6 +30,7 @@ HATCHES: tuple[Callable[[Any, Any], Any], ...] = (
 )
 LEAST, MOST = 0.005, 0.1  # [m] clearance that is shown darkest, and lightest
 LEAST_PIXELS = (1200, 420)  # across and up
+STRIP = 200  # columns painted at a time
 NEAR_SINGULAR = 0.1  # of the margin that is 0 at a singularity; the viewer's is the same
 MOST_TICKS = 16  # numbers of passes below the chart
 MM = 1e3
@@ -99,28 +100,51 @@ def chart_image(
             the darker, the less of it there is at the place measured nearest to them.
         grid: Cutter points and contact positions at which it was measured.
     """
-    near = np.ix_(*(_nearest(places, n) for places, n in zip(grid, states.shape, strict=True)))
-    room = clearance[near]
+    columns, rows = (_nearest(places, n) for places, n in zip(grid, states.shape, strict=True))
+    across, up = (-(-least // n) for least, n in zip(LEAST_PIXELS, states.shape, strict=True))
+    image = np.empty((up * states.shape[1], across * states.shape[0], 3), dtype=np.uint8)
+    for first in range(0, len(states), STRIP):
+        strip = slice(first, first + STRIP)
+        room = clearance[np.ix_(columns[strip], rows)]
+        pixels = slice(across * first, across * (first + STRIP))
+        image[:, pixels] = _pixels(
+            states[strip], singular[strip], room, (across, up), across * first
+        )
+    file = io.BytesIO()
+    # no version in it
+    metadata: dict[str, Any] = {"Software": None}
+    imsave(file, image, format="png", metadata=metadata)
+    return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode("ascii")
+
+
+def _pixels(
+    states: np.ndarray, singular: np.ndarray, room: Array, size: tuple[int, int], left: int
+) -> np.ndarray:
+    """Return the pixels of some columns of the chart, of uint8, shape (height, width, 3).
+
+    Args:
+        states: Code of each node, shape (n, M).
+        singular: Which are near a singularity, shape (n, M).
+        room: Clearance measured nearest to each in [m], shape (n, M).
+        size: Pixels of a node across and up.
+        left: Pixels to the left of these columns.
+    """
     part = np.clip(np.log(np.maximum(room, 1e-4) / LEAST) / np.log(MOST / LEAST), 0.0, 1.0)
     colours = np.array([to_rgb(STATE_COLOURS[code]) for code in range(len(HATCHES))])[states]
     shaded = (states == 0) & ~np.isnan(room)
     tight, roomy = np.array(to_rgb("#8cbd9d")), np.array(to_rgb("#f6fbf7"))
     colours[shaded] = (tight + part[..., None] * (roomy - tight))[shaded]
-    across, up = (-(-least // n) for least, n in zip(LEAST_PIXELS, states.shape, strict=True))
 
     def pixels(cells: np.ndarray) -> np.ndarray:
-        return np.asarray(cells.repeat(across, axis=0).repeat(up, axis=1).swapaxes(0, 1)[::-1])
+        of_columns = cells.repeat(size[0], axis=0).repeat(size[1], axis=1)
+        return np.asarray(of_columns.swapaxes(0, 1)[::-1])
 
     image, code = pixels(colours), pixels(states)
-    y, x = np.ogrid[: code.shape[0], : code.shape[1]]
+    y, x = np.ogrid[: code.shape[0], left : left + code.shape[1]]
     for state, hatch in enumerate(HATCHES):
         image[(code == state) & hatch(x, y)] *= 0.45
     image[pixels(singular & (states == 0)) & ((x % 9 - 4) ** 2 + (y % 9 - 4) ** 2 == 4)] *= 0.3
-    file = io.BytesIO()
-    # no version in it
-    metadata: dict[str, Any] = {"Software": None}
-    imsave(file, np.clip(image, 0.0, 1.0), format="png", metadata=metadata)
-    return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode("ascii")
+    return np.asarray((np.clip(image, 0.0, 1.0) * 255).astype(np.uint8))
 
 
 def _tick(side: str, part: float, said: str) -> str:

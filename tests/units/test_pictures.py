@@ -11,7 +11,7 @@ import pytest
 
 from opl.cell.robot import load_robot
 from opl.motion.path import GrindingPath
-from opl.report import pictures
+from opl.report import chart, pictures
 from opl.report.canvas import png, svg
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -204,3 +204,16 @@ def test_what_holds_the_joint_range_sum_up_is_marked_on_the_path():
     held = contact_chart(**contact_arguments(), held_at=[12.0, 171.5])
     assert "holds the joint range sum up" in texts(held)
     assert "holds the joint range sum up" not in texts(contact_svg())
+
+
+def test_a_chart_painted_in_strips_is_the_same(monkeypatch):
+    random = np.random.default_rng(3)
+    states = random.integers(0, len(chart.HATCHES), (23, 14))
+    states[:, :7] = 0
+    clearance = np.where(random.random((6, 4)) < 0.2, np.nan, random.uniform(0.0, 0.2, (6, 4)))
+    grid = np.array([0, 4, 9, 13, 18, 22]), np.array([0, 5, 9, 13])
+    singular = random.random(states.shape) < 0.3
+    whole = chart.chart_image(states, singular, clearance, grid)
+    for strip in (1, 5):
+        monkeypatch.setattr(chart, "STRIP", strip)
+        assert chart.chart_image(states, singular, clearance, grid) == whole
