@@ -90,7 +90,7 @@ def _kinematics(job: Job, runs: int) -> Iterator[Row]:
 def _collisions(problem: GrindingProblem, runs: int) -> Iterator[Row]:
     scene = problem.scene.collision
     branch = widest_branch(problem)
-    q = problem.field.q[:, :, branch]
+    q = problem.angles(branch, np.arange(len(problem.points)))
     at = ~np.isnan(q[..., 0]) & ~problem.cuts
     nodes = q[at]
     ours = timed(lambda: scene.collides(nodes), runs, len(nodes))

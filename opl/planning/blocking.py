@@ -131,7 +131,7 @@ def _away(
 ) -> Array | None:
     """Return where approach or retract of a node is farthest off, None if it cannot be made."""
     cell, points, process, nodes = problem.cell, problem.points, problem.process, matrix.nodes
-    t, q = nodes.contact_position[column, row], nodes.q[column, row]
+    t, q = nodes.contact_position[column, row], nodes.at(column, row)
     try:
         away = lead(cell, points, process, kind, nodes.ik_branch, column, t, q)
     except UnreachableApproachError:

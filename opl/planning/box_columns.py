@@ -11,8 +11,9 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.families import GROWN, Placement
 from opl.planning.images import Seams
-from opl.planning.nodes import blocks_of, inverse_solutions
+from opl.planning.nodes import inverse_solutions
 from opl.planning.problem import GrindingProblem, wheel_distances
+from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
 from opl.search.in_box import missing_chords, nearest_points, sampled
 
@@ -119,7 +120,11 @@ class ColumnSampler:
         before, after = places.astype(int), np.ceil(places).astype(int)
         columns = np.union1d(before, after)
         pass_index = self._problem.points.pass_index[columns]
-        field = self._placed(pass_index, self._problem.field.q[columns], placements)
+        field = np.empty((len(columns), len(self._problem.field.contact_positions), 6))
+        for index, placement in enumerate(placements):
+            own = pass_index == index
+            angles = self._problem.angles(placement.family, columns[own])
+            field[own] = self._placed(angles, placement)
         here = field[np.searchsorted(columns, before)]
         there = field[np.searchsorted(columns, after)]
         return np.asarray(here + (places - before)[:, None, None] * (there - here))
@@ -146,8 +151,14 @@ class ColumnSampler:
         """Return the postures of places at contact positions, shape (n, m)."""
         problem = self._problem
         self.work += t.size / POSTURES_OF_WORK
-        q = inverse_solutions(problem.cell, there.Ts_workpiece_cutter[:, None], t)
-        q = self._placed(there.pass_index, q, placements)
+        q = np.empty((*t.shape, 6))
+        for block in blocks_of(*t.shape):
+            frames = there.Ts_workpiece_cutter[block, None]
+            solutions = inverse_solutions(problem.cell, frames, t[block])
+            for index, placement in enumerate(placements):
+                own = np.flatnonzero(there.pass_index[block] == index)
+                angles = solutions[own][:, :, placement.family]
+                q[block][own] = self._placed(angles, placement)
         free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
         return Columns(places, there, tuple(placements), t, q, free)
 
@@ -181,12 +192,7 @@ class ColumnSampler:
         found = distance < -self._problem.cell.planned_penetration
         return np.asarray(np.where(unsure, found, near == 4))
 
-    def _placed(self, pass_index: np.ndarray, q: Array, placements: Sequence[Placement]) -> Array:
-        """Return the placed postures of all inverse solutions, shape (n, m, 6)."""
-        placed = np.empty((*q.shape[:2], 6))
-        for index, placement in enumerate(placements):
-            own = pass_index == index
-            start = self._seams.start[placement.family]
-            unrolled = start + np.remainder(q[own][:, :, placement.family] - start, 2.0 * np.pi)
-            placed[own] = placement.of(unrolled)
-        return placed
+    def _placed(self, angles: Array, placement: Placement) -> Array:
+        """Return postures as placed, of principal angles of their family, shape (n, m, 6)."""
+        start = self._seams.start[placement.family]
+        return placement.of(start + np.remainder(angles - start, 2.0 * np.pi))

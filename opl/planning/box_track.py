@@ -25,6 +25,7 @@ from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulge, Row, levels, shut_edges
 from opl.planning.settings import CostWeights
 from opl.planning.symmetry import twins
+from opl.planning.turned import Kept
 from opl.search.box import JointBox
 from opl.search.in_box import missing as missing_of
 from opl.search.in_box import nearest
@@ -145,7 +146,7 @@ class _Sampled:
         self.problem = replace(
             problem,
             points=columns.points,
-            field=NodeField(columns.t[0], problem.field.q[:0], tuple(self._images(q))),
+            field=NodeField(columns.t[0], problem.field.reached[:0], {}, tuple(self._images(q))),
             wheel_distance=np.zeros(columns.t.shape),
             known_sides=problem.sides_at(columns.places, columns.t),
         )
@@ -284,6 +285,8 @@ class _Sampled:
                 at = np.where(within[..., None], turned, np.nan)
                 margin = np.minimum(turned - robot.lower, robot.upper - turned)
                 near = float((1.0 / np.maximum(np.nanmin(margin, axis=(0, 1)), 1e-3)).sum())
-                nodes = NodeMatrix(family + slot, np.ascontiguousarray(at), self._columns.t, index)
+                nodes = NodeMatrix(
+                    family + slot, Kept(np.ascontiguousarray(at)), self._columns.t, index
+                )
                 found.append((near, len(found), nodes))
         return [nodes for _, _, nodes in sorted(found, key=lambda entry: entry[:2])]

@@ -39,11 +39,11 @@ def _cheapest_first(
     max_contact_change: float,
 ) -> Iterator[Track]:
     costs = [track_cost(problem, one.nodes, weights, one.free.copy()) for one in matrices]
-    ladders = [one.ladder_within(max_contact_change) for one in matrices]
     while True:
         found = []
         for index, matrix in enumerate(matrices):
-            track = smoothest(ladders[index], matrix.blocked_edges, matrix.free, costs[index])
+            ladder = matrix.ladder_within(max_contact_change)
+            track = smoothest(ladder, matrix.blocked_edges, matrix.free, costs[index])
             if track is not None:
                 matrix.reached = len(track.rows)
                 found.append((track.cost, index, track.rows))

@@ -127,7 +127,7 @@ class Families:
 
     Args:
         images: The images of each posture.
-        q: Inverse solutions in [rad], shape (N, M, 8, 6).
+        q: Inverse solutions at `few_columns` in [rad], shape (n, M, 8, 6).
         cuts: Where the part would sink too deep into the wheel, shape (N, M).
         pass_index: Pass of each column, shape (N,).
 
@@ -138,7 +138,7 @@ class Families:
     def __init__(self, images: Images, q: Array, cuts: np.ndarray, pass_index: np.ndarray) -> None:
         self._images = images
         self._places = few = few_columns(pass_index)
-        q, cuts, pass_index = q[few], cuts[few], pass_index[few]
+        cuts, pass_index = cuts[few], pass_index[few]
         self._pass_index = pass_index
         self._unrolled = {}
         self._known: dict[tuple[int, tuple[int, int, bytes]], tuple[Array, np.ndarray]] = {}

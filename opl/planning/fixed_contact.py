@@ -9,7 +9,7 @@ import numpy as np
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
 from opl.planning.multi_start import tracks_from_best_start, try_recursive
-from opl.planning.open_matrix import OpenMatrix
+from opl.planning.open_matrix import Ladders, OpenMatrix
 from opl.planning.plan import Found
 from opl.planning.problem import GrindingProblem, build_problem
 from opl.planning.settings import Start
@@ -47,10 +47,8 @@ def keep_contact(problem: GrindingProblem) -> FixedContact:
     fixed = build_problem(
         problem.scene, problem.points, np.zeros(1), problem.interpolation, problem.process
     )
-    everywhere = [
-        OpenMatrix(nodes, fixed.ladder(nodes, nodes.exists), nodes.exists)
-        for nodes in fixed.field.matrices
-    ]
+    ladders = Ladders(fixed)
+    everywhere = [OpenMatrix(nodes, nodes.exists, ladders) for nodes in fixed.field.matrices]
     track = next(tracks_from_best_start(everywhere), None)
     if track is None:
         return FixedContact(None, False, "no continuous path within reach and limits at t = 0")

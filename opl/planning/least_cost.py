@@ -83,7 +83,8 @@ def least_cost(problem: GrindingProblem, travel: float, time: float) -> float:
         travel: Price of a radian of joint travel on the wheel.
         time: Price of a second on the wheel.
     """
-    images = Images(problem.cell.robot, seams_of(problem.field.q), 0.0)
+    seams = seams_of(problem.solutions(np.arange(len(problem.points))))
+    images = Images(problem.cell.robot, seams, 0.0)
     walls = ColumnWalls(problem.cell, problem.scene.part, problem.points, images)
     total = 0.0
     for index in range(problem.points.n_passes):

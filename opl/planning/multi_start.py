@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 
@@ -78,7 +79,7 @@ def tracks_from_best_start(matrices: list[OpenMatrix]) -> Iterator[Track]:
 def tracks_from_nearest_start(matrices: list[OpenMatrix], home: Array) -> Iterator[Track]:
     """Yield tracks from the start node nearest to home in [rad], then from the next nearest."""
     starts = [
-        (float(np.linalg.norm(matrix.nodes.q[0, row] - home)), index, row)
+        (float(np.linalg.norm(matrix.nodes.at(0, row) - home)), index, row)
         for index, matrix in enumerate(matrices)
         for row in np.flatnonzero(matrix.free[0]).tolist()
     ]
@@ -96,9 +97,13 @@ class _Search:
     def __init__(self, matrix: OpenMatrix) -> None:
         self.matrix = matrix
         self._dead = np.zeros_like(matrix.free)
-        # of the ladder as it was; a search that finds them itself also finds how far it can come
-        self._dead_ends = np.zeros_like(matrix.free)
-        add_dead_ends(matrix.ladder, matrix.blocked_edges, self._dead_ends)
+
+    @cached_property
+    def _dead_ends(self) -> np.ndarray:
+        """Of the ladder as it was; a search that finds them also finds how far it can come."""
+        found = np.zeros_like(self.matrix.free)
+        add_dead_ends(self.matrix.ladder, self.matrix.blocked_edges, found)
+        return found
 
     def descend(self, start: int, bound: float) -> Descent:
         matrix = self.matrix

@@ -11,8 +11,8 @@ the limits stands for all.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from opl.cell.inverse_kinematics import N_IK_BRANCHES, inverse_kinematics
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
+from opl.planning.turned import Configurations, Turned, blocks_of, unroll
 
 
 @dataclass(frozen=True)
@@ -29,25 +30,36 @@ class NodeMatrix:
 
     Attributes:
         ik_branch: Slot of the inverse kinematics, 0 to 7.
-        q: Joint positions in [rad], NaN where there is no configuration within the limits, shape
-            (n_columns, n_rows, 6).
+        configurations: Joint positions of the nodes.
         contact_position: t of each node, shape (n_columns, n_rows).
         position_index: Which contact position of its column each row stands for, shape (n_rows,).
     """
 
     ik_branch: int
-    q: Array
+    configurations: Configurations
     contact_position: Array
     position_index: np.ndarray
 
-    @cached_property
+    @property
     def exists(self) -> np.ndarray:
         """Which nodes there are, shape (n_columns, n_rows)."""
-        return np.ascontiguousarray(~np.isnan(self.q[..., 0]))
+        return self.configurations.exists
+
+    @property
+    def q(self) -> Array:
+        """All configurations in [rad], NaN where there is no node, shape (n_columns, n_rows, 6).
+
+        They may have to be made: for a few there is `at`.
+        """
+        return self.configurations.whole()
+
+    def at(self, columns: np.ndarray | int, rows: np.ndarray | int) -> Array:
+        """Return the configurations of some nodes in [rad], shape (..., 6)."""
+        return self.configurations.at(columns, rows)
 
     def along(self, rows: np.ndarray) -> Array:
         """Return the configurations of a track in [rad], its row in each column given."""
-        return np.asarray(self.q[np.arange(len(rows)), rows])
+        return self.at(np.arange(len(rows)), rows)
 
     def t_along(self, rows: np.ndarray) -> Array:
         """Return the contact positions of a track, its row in each column given."""
@@ -60,18 +72,20 @@ class NodeMatrix:
 
 @dataclass(frozen=True)
 class NodeField:
-    """All nodes: the contact positions, the inverse solutions and the matrices made of them.
+    """All nodes: the contact positions, what reaches them, and the matrices.
 
     Attributes:
         contact_positions: The values of t, shape (M,).
-        q: All inverse solutions as principal angles in [rad], NaN out of reach, shape
-            (n_columns, M, 8, 6). Kept to tell reach from limits when nothing is left; without
-            columns where nobody needs to know.
+        reached: At how many of them each IK branch reaches each cutter point, limits not regarded,
+            shape (n_columns, 8); without columns where nobody needs to know.
+        angles: The IK branches of which there are matrices, as principal angles in [rad], NaN out
+            of reach, shape (n_columns, M, 6).
         matrices: The matrices that have a node within the limits, in slot order.
     """
 
     contact_positions: Array
-    q: Array
+    reached: np.ndarray
+    angles: Mapping[int, Array]
     matrices: tuple[NodeMatrix, ...]
 
 
@@ -79,59 +93,56 @@ class NodeField:
 SEAM_GAP = np.deg2rad(45.0)
 # three turns each of two wrist axes
 MOST_SHEETS = 9
-AT_ONCE = 20_000  # nodes: what is worked on at a time stays small beside what is kept
 
 
 def build_nodes(cell: WorkCell, points: CutterPoints, contact_positions: Array) -> NodeField:
     """Solve the inverse kinematics of every cutter point at every contact position."""
-    robot = cell.robot
-    frames = points.Ts_workpiece_cutter[:, None]
-    q = inverse_solutions(cell, frames, contact_positions)  # (N, M, 8, 6)
-    matrices = []
-    for ik_branch in range(q.shape[2]):
-        if np.isnan(q[:, :, ik_branch, 0]).all():
-            continue
-        lifted, sheets, copies = _lift(q[:, :, ik_branch], robot.lower, robot.upper)
-        for turns in sheets[:, None] + copies:
-            nodes = _sheet(cell, lifted, turns, contact_positions, ik_branch)
-            if nodes is not None:
-                matrices.append(nodes)
-    return NodeField(contact_positions, q, tuple(matrices))
+    shape = len(points), 6, len(contact_positions)
+    by_joint = [np.empty(shape) for _ in range(N_IK_BRANCHES)]
+    for block in blocks_of(shape[0], shape[2]):
+        frames = points.Ts_workpiece_cutter[block, None]
+        q = inverse_solutions(cell, frames, contact_positions)
+        for ik_branch, angles in enumerate(by_joint):
+            angles[block] = np.moveaxis(q[:, :, ik_branch], 1, 2)
+    reached = np.stack([(~np.isnan(angles[:, 0])).sum(axis=1) for angles in by_joint], axis=1)
+    matrices: list[NodeMatrix] = []
+    kept = {}
+    for ik_branch in np.flatnonzero(reached.any(axis=0)).tolist():
+        found = _matrices(cell, by_joint[ik_branch], contact_positions, ik_branch)
+        if found:
+            matrices += found
+            kept[ik_branch] = np.moveaxis(by_joint[ik_branch], 1, 2)
+    return NodeField(contact_positions, reached, kept, tuple(matrices))
 
 
-def _sheet(
-    cell: WorkCell, lifted: Array, turns: Array, contact_positions: Array, ik_branch: int
-) -> NodeMatrix | None:
-    """Return the nodes of one sheet, None if there are none within the limits.
+def _matrices(
+    cell: WorkCell, by_joint: Array, contact_positions: Array, ik_branch: int
+) -> list[NodeMatrix]:
+    """Return the matrices of a branch that have a node within the limits.
 
     Args:
         cell: The cell.
-        lifted: Angles of the branch in [rad], shape (N, M, 6).
-        turns: Full turns of the copies of the nodes in [rad], shape (n_copies, 6).
+        by_joint: Principal angles of the branch in [rad], shape (N, 6, M).
         contact_positions: Shape (M,).
         ik_branch: The branch.
     """
-    blocks = blocks_of(lifted.shape[0], lifted.shape[1] * len(turns))
-    within = np.concatenate(
-        [cell.within_limits(lifted[block, None] + turns[:, None]) for block in blocks]
-    )  # (N, copies, M)
-    copy, position_index = np.nonzero(within.any(axis=0))
-    if not len(position_index):
-        return None
-    # as the searches read them, who need no copy then
-    by_joint = np.empty((len(lifted), 6, len(position_index)))
-    for block in blocks:
-        q = lifted[block][:, position_index] + turns[copy]
-        q[~within[block][:, copy, position_index]] = np.nan
-        by_joint[block] = np.moveaxis(q, 1, 2)
-    t = np.broadcast_to(contact_positions[position_index], (len(lifted), len(position_index)))
-    return NodeMatrix(ik_branch, np.moveaxis(by_joint, 1, 2), t, position_index)
-
-
-def blocks_of(n_columns: int, n_rows: int) -> list[slice]:
-    """Return slices of columns with about as many nodes as are worked on at once."""
-    size = max(AT_ONCE // max(n_rows, 1), 1)
-    return [slice(first, first + size) for first in range(0, n_columns, size)]
+    q = np.moveaxis(by_joint, 1, 2)
+    start, sheets, copies = _unrolled(q, cell.robot.lower, cell.robot.upper)
+    found = []
+    for turns in sheets[:, None] + copies:
+        within = np.empty((len(q), len(turns), q.shape[1]), dtype=bool)
+        for block in blocks_of(len(q), q.shape[1] * len(turns)):
+            lifted = q[block].copy()
+            unroll(lifted, start)
+            within[block] = cell.within_limits(lifted[:, None] + turns[:, None])
+        copy, position_index = np.nonzero(within.any(axis=0))
+        if not len(position_index):
+            continue
+        exists = np.ascontiguousarray(within[:, copy, position_index])
+        turned = Turned(by_joint, start, turns[copy], position_index, exists)
+        t = np.broadcast_to(contact_positions[position_index], exists.shape)
+        found.append(NodeMatrix(ik_branch, turned, t, position_index))
+    return found
 
 
 def inverse_solutions(
@@ -150,18 +161,19 @@ def inverse_solutions(
     return q
 
 
-def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
-    """Unroll the angles of one IK branch where they leave a gap.
+def _unrolled(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
+    """Find where the angles of one IK branch leave a gap, and the full turns that are added then.
 
     `q` are principal angles in [rad], NaN where there are none, shape (N, M, 6); limits are in
     [rad], shape (6,).
 
     Returns:
-        Angles that are continuous over the whole field wherever there is a gap, shape (N, M, 6);
-        the full turns that make sheets of them, shape (n_sheets, 6); the full turns by which the
-        nodes of one sheet are repeated, shape (n_copies, 6); both in [rad].
+        Where the angles of each joint begin after its gap, NaN without one, shape (6,): from there
+        they are continuous over the whole field; the full turns that make sheets of them, shape
+        (n_sheets, 6); the full turns by which the nodes of one sheet are repeated, shape
+        (n_copies, 6); all in [rad].
     """
-    lifted = q.copy()
+    starts = np.full(6, np.nan)
     sheet_turns, copy_turns, central = ([np.zeros(1)] * 6 for _ in range(3))
     all_turns = full_turns(lower, upper)
     for joint in range(6):
@@ -176,7 +188,7 @@ def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
             copy_turns[joint] = counts
             continue
         start = angles[(widest + 1) % len(angles)]
-        lifted[..., joint] = start + np.remainder(q[..., joint] - start, 2.0 * np.pi)
+        starts[joint] = start
         end = start + 2.0 * np.pi - gaps[widest]
         first = np.ceil((lower[joint] - end) / (2.0 * np.pi))
         last = np.floor((upper[joint] - start) / (2.0 * np.pi))
@@ -187,7 +199,7 @@ def _lift(q: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
         central[joint] = whole[[np.argmin(np.abs(whole - middle))]] if len(whole) else counts
     if np.prod([len(counts) for counts in sheet_turns]) > MOST_SHEETS:
         sheet_turns = central
-    return lifted, _products(sheet_turns), _products(copy_turns)
+    return starts, _products(sheet_turns), _products(copy_turns)
 
 
 def _products(values: list[Array]) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
 from opl.search.box import JointBox
 from opl.search.ladder import Ladder
+
+AT_HAND = 3_000_000  # nodes whose ladders are kept: 60 bytes each
 
 
 class FreeMove(str, Enum):
@@ -38,8 +41,8 @@ class OpenMatrix:
 
     Attributes:
         nodes: The nodes.
-        ladder: What a search sees; shares ``free``.
         free: Which nodes may be used; shrinks, shape (n_columns, n_rows).
+        ladders: Make what a search sees.
         blocked: Keys of the edges that may not be used; grows.
         causes: How often each cause blocked something, by cutter point.
         cut_off: How many tracks, otherwise free, were refused for a free move: by which one, and
@@ -50,8 +53,8 @@ class OpenMatrix:
     """
 
     nodes: NodeMatrix
-    ladder: Ladder
     free: np.ndarray
+    ladders: Ladders
     blocked: set[int] = field(default_factory=set)
     causes: Counter[tuple[int, str]] = field(default_factory=Counter)
     cut_off: Counter[tuple[FreeMove, Blocker]] = field(default_factory=Counter)
@@ -67,10 +70,16 @@ class OpenMatrix:
             self._sorted = np.array(sorted(self.blocked), dtype=np.int64)
         return self._sorted
 
+    @property
+    def ladder(self) -> Ladder:
+        """What a search sees; shares ``free``."""
+        return self.ladders.of(self.nodes, self.free)
+
     def ladder_within(self, max_contact_change: float) -> Ladder:
         """Return the ladder with a largest change of t over each edge on the wheel."""
-        changes = np.where(self.ladder.off_wheel, np.inf, max_contact_change)
-        return replace(self.ladder, max_contact_change=changes)
+        ladder = self.ladder
+        changes = np.where(ladder.off_wheel, np.inf, max_contact_change)
+        return replace(ladder, max_contact_change=changes)
 
     def free_inside(self, box: JointBox) -> np.ndarray:
         """Return which nodes are free and lie in a box, shape (n_columns, n_rows)."""
@@ -81,7 +90,7 @@ class OpenMatrix:
     ) -> None:
         """Block every edge from some rows of a column to some of the next."""
         self.blocked.update(
-            self.ladder.edge_key(column, row, after) for row in from_rows for after in to_rows
+            self._edge_key(column, row, after) for row in from_rows for after in to_rows
         )
         self.causes[column, cause] += len(from_rows) * len(to_rows)
 
@@ -101,7 +110,7 @@ class OpenMatrix:
         known = self._collides.setdefault((self.nodes.ik_branch, column), {})
         asked, first = np.unique(positions, return_index=True)
         new = np.array([position not in known for position in asked.tolist()], dtype=bool)
-        hits = scene.collides(self.nodes.q[column, rows[first[new]]])
+        hits = scene.collides(self.nodes.at(column, rows[first[new]]))
         known.update(zip(asked[new].tolist(), hits.tolist(), strict=True))
         hit = np.array([known[position] for position in positions.tolist()], dtype=bool)
         self.free[column, rows[hit]] = False
@@ -109,17 +118,44 @@ class OpenMatrix:
 
     def allows(self, rows: np.ndarray) -> bool:
         """Return whether nothing on a track is blocked."""
-        columns, n_rows = np.arange(len(rows)), self.free.shape[1]
-        keys = (columns[:-1] * n_rows + rows[:-1]) * n_rows + rows[1:]
+        columns = np.arange(len(rows))
+        keys = self._edge_key(columns[:-1], rows[:-1], rows[1:])
         return bool(self.free[columns, rows].all()) and self.blocked.isdisjoint(keys.tolist())
+
+    def _edge_key(self, column: Any, row: Any, next_row: Any) -> Any:
+        """Return the numbers under which ladders know edges."""
+        n_rows = self.free.shape[1]
+        return (column * n_rows + row) * n_rows + next_row
+
+
+class Ladders:
+    """Makes the ladders of a problem when they are asked for, and keeps those used last.
+
+    Args:
+        problem: The problem.
+    """
+
+    def __init__(self, problem: GrindingProblem) -> None:
+        self._problem = problem
+        self._made: dict[int, tuple[NodeMatrix, Ladder]] = {}
+
+    def of(self, nodes: NodeMatrix, free: np.ndarray) -> Ladder:
+        """Return the ladder of a matrix, with the nodes that may be used."""
+        kept = self._made.pop(id(nodes), None)
+        if kept is None or kept[1].free is not free:
+            kept = nodes, self._problem.ladder(nodes, free)
+            room = AT_HAND - free.size
+            while self._made and sum(one.free.size for _, one in self._made.values()) > room:
+                del self._made[next(iter(self._made))]
+        self._made[id(nodes)] = kept
+        return kept[1]
 
 
 def open_matrices(problem: GrindingProblem) -> list[OpenMatrix]:
     """Return every matrix of a problem, nothing blocked yet but nodes that cut into the wheel."""
-    matrices = []
+    matrices, ladders = [], Ladders(problem)
     collides: dict[tuple[int, int], dict[int, bool]] = {}
     for nodes in problem.field.matrices:
         free = problem.free_nodes(nodes)
-        ladder = problem.ladder(nodes, free)
-        matrices.append(OpenMatrix(nodes, ladder, free, _collides=collides))
+        matrices.append(OpenMatrix(nodes, free, ladders, _collides=collides))
     return matrices

@@ -57,7 +57,8 @@ class OptimalSearch:
     ) -> None:
         self._problem = problem
         self._settings = settings
-        seams = seams_of(problem.field.q[few_columns(problem.points.pass_index)])
+        q = problem.solutions(few_columns(problem.points.pass_index))
+        seams = seams_of(q)
         robot = problem.cell.robot
         largest, most = float((robot.upper - robot.lower).sum()), Travel(np.inf, np.inf)
         if fallback is not None:
@@ -66,7 +67,7 @@ class OptimalSearch:
         images = Images(robot, seams, largest)
         part, points = problem.scene.part, problem.points
         self._walls = ColumnWalls(problem.cell, part, points, images)
-        self._families = Families(images, problem.field.q, problem.cuts, points.pass_index)
+        self._families = Families(images, q, problem.cuts, points.pass_index)
         self._sampler = ColumnSampler(problem, seams)
         costs, most_change = settings.costs, settings.max_contact_change
         self._tracks = BoxTracks(problem, self._sampler, costs, most_change, most)

@@ -14,9 +14,10 @@ from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.process_settings import ProcessSettings
-from opl.planning.nodes import NodeField, NodeMatrix, blocks_of, build_nodes
+from opl.planning.nodes import NodeField, NodeMatrix, build_nodes, inverse_solutions
 from opl.planning.scene import PlanningScene
 from opl.planning.settings import Interpolation
+from opl.planning.turned import blocks_of
 from opl.search.ladder import Ladder
 
 
@@ -86,6 +87,24 @@ class GrindingProblem:
     def cuts(self) -> np.ndarray:
         """Where the part would sink too deep into the wheel, shape (N, M)."""
         return np.asarray(self.wheel_distance < -self.cell.planned_penetration)
+
+    def solutions(self, columns: np.ndarray) -> Array:
+        """Solve all IK branches at some cutter points, at the contact positions of the field.
+
+        Return principal angles in [rad], NaN where there are none, shape (n, M, 8, 6).
+        """
+        frames = self.points.Ts_workpiece_cutter[columns, None]
+        return inverse_solutions(self.cell, frames, self.field.contact_positions)
+
+    def angles(self, ik_branch: int, columns: np.ndarray) -> Array:
+        """Return one IK branch of `solutions`, shape (n, M, 6); those with matrices are known."""
+        known = self.field.angles.get(ik_branch)
+        if known is not None:
+            return np.asarray(known[columns])
+        found = np.empty((len(columns), len(self.field.contact_positions), 6))
+        for block in blocks_of(*found.shape[:2]):
+            found[block] = self.solutions(columns[block])[:, :, ik_branch]
+        return found
 
     def free_nodes(self, nodes: NodeMatrix) -> np.ndarray:
         """Return which nodes exist and do not cut into the wheel, shape (N, n_rows)."""

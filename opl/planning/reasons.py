@@ -25,7 +25,7 @@ MOST_ENDS = 3  # cutter points listed, where tracks came through but none was fr
 
 def unreachable_points(problem: GrindingProblem) -> np.ndarray:
     """Return the cutter points that the arm reaches at no contact position at all."""
-    return np.flatnonzero(np.isnan(problem.field.q[..., 0]).all(axis=(1, 2)))
+    return np.flatnonzero(~problem.field.reached.any(axis=1))
 
 
 def no_path(problem: GrindingProblem, matrices: list[OpenMatrix]) -> NoPathError:
@@ -84,7 +84,7 @@ def free_at(problem: GrindingProblem, column: int) -> bool:
     return any(
         not collides(q[None])[0]
         for nodes in problem.field.matrices
-        for q in nodes.q[column, problem.free_nodes(nodes)[column]]
+        for q in nodes.at(column, np.flatnonzero(problem.free_nodes(nodes)[column]))
     )
 
 
@@ -111,9 +111,9 @@ def _causes_at(problem: GrindingProblem, column: int) -> Counter[str]:
     cell, robot = problem.cell, problem.cell.robot
     counts: Counter[str] = Counter()
     cuts = problem.cuts[column]
-    n_positions = len(problem.field.contact_positions)
-    for position in np.unique(np.linspace(0, n_positions - 1, MOST_POSITIONS).astype(int)):
-        q = problem.field.q[column, position]
+    every = problem.solutions(np.array([column]))[0]
+    for position in np.unique(np.linspace(0, len(every) - 1, MOST_POSITIONS).astype(int)):
+        q = every[position]
         q = q[~np.isnan(q[:, 0])]
         turned = q[:, None] + full_turns(robot.lower, robot.upper)
         within = cell.within_limits(turned)

@@ -16,8 +16,8 @@ from opl.cell.nearest import Nearest, nearest_pairs
 from opl.cell.robot import Robot
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
-from opl.planning.nodes import blocks_of
 from opl.planning.problem import GrindingProblem
+from opl.planning.turned import blocks_of
 
 # clearances are measured at about so many cutter points and contact positions, evenly
 _COLUMNS, _POSITIONS = 40, 24
@@ -75,9 +75,8 @@ def survey_nodes(problem: GrindingProblem, ik_branch: int, near: Array) -> NodeS
     [rad], shape (N, 6) or (6,), joint by joint.
     """
     robot, collision = problem.cell.robot, problem.scene.collision
-    solutions = problem.field.q[:, :, ik_branch]
-    q = _turned(solutions, near, robot)
-    reached = ~np.isnan(solutions[..., 0])
+    q = _turned(problem.angles(ik_branch, np.arange(len(problem.points))), near, robot)
+    reached = ~np.isnan(q[..., 0])
     states: np.ndarray = np.full(problem.cuts.shape, CODES[NodeState.LIMITS], dtype=np.uint8)
     for nodes in problem.field.matrices:
         if nodes.ik_branch == ik_branch:
@@ -121,9 +120,9 @@ def widest_branch(problem: GrindingProblem) -> int:
     for nodes in problem.field.matrices:
         column, row = np.nonzero(problem.free_nodes(nodes))
         free[nodes.ik_branch, column, nodes.position_index[row]] = True
-    reached = ~np.isnan(problem.field.q[..., 0])
+    reached = problem.field.reached.sum(axis=0)
     ranks = [
-        (int(free[k].any(axis=1).sum()), int(free[k].sum()), int(reached[..., k].sum()))
+        (int(free[k].any(axis=1).sum()), int(free[k].sum()), int(reached[k]))
         for k in range(N_IK_BRANCHES)
     ]
     return ranks.index(max(ranks))

@@ -53,9 +53,8 @@ def _followers(nodes: NodeMatrix, positions: np.ndarray) -> Iterator[np.ndarray]
         rows = np.full(len(positions), start)
         for column in range(1, len(positions)):
             alike = np.flatnonzero(nodes.position_index == positions[column])
-            away = np.abs(nodes.q[column, alike] - nodes.q[column - 1, rows[column - 1]]).sum(
-                axis=1
-            )
+            before = nodes.at(column - 1, rows[column - 1])
+            away = np.abs(nodes.at(column, alike) - before).sum(axis=1)
             if np.isnan(away).all():
                 break
             rows[column] = alike[np.nanargmin(away)]

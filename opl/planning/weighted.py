@@ -25,7 +25,6 @@ from opl.planning.problem import GrindingProblem
 from opl.planning.settings import CostWeights, ObjectiveWeights, OptimalSettings
 from opl.planning.symmetry import twins
 from opl.search.box import JointBox
-from opl.search.ladder import Ladder
 from opl.search.smooth import TrackCost, smoothest
 
 # by which fraction of its size the least box is widened; at last not bounded at all
@@ -68,8 +67,8 @@ def plan_weighted(
     sweeps = {}
     for index, matrix in enumerate(matrices):
         cost = track_cost(problem, matrix.nodes, prices, np.zeros_like(matrix.free))
-        ladder = matrix.ladder_within(settings.max_contact_change)
-        sweeps[index] = sweep = _Sweep(index, matrix, ladder, box, cost, weights)
+        change = settings.max_contact_change
+        sweeps[index] = sweep = _Sweep(index, matrix, change, box, cost, weights)
         queue += sweep.entries(range(len(WIDENINGS)))
     heapq.heapify(queue)
     best, value = fallback, _value(problem, fallback, weights)
@@ -98,18 +97,19 @@ class _Sweep:
 
     index: int
     matrix: OpenMatrix
-    ladder: Ladder
+    max_contact_change: float
     box: JointBox
     cost: TrackCost
     weights: ObjectiveWeights
 
     def entries(self, widenings: Iterable[int]) -> Iterator[Entry]:
         """Yield the best track in each box."""
+        ladder = self.matrix.ladder_within(self.max_contact_change)
         for widening in widenings:
             amount, inside = WIDENINGS[widening], self.matrix.free
             if np.isfinite(amount):
                 inside = self.matrix.free_inside(self.box.widened(amount * self.box.size))
-            track = smoothest(self.ladder, self.matrix.blocked_edges, inside, self.cost)
+            track = smoothest(ladder, self.matrix.blocked_edges, inside, self.cost)
             if track is not None:
                 range_sum = self.matrix.nodes.range_sum(track.rows)
                 total = self.weights.joint_range * range_sum + track.cost

@@ -59,7 +59,8 @@ def test_the_nodes_are_all_configurations_within_the_limits_and_no_others(weight
     assert (sums >= lowest).all() and (sums <= lowest + width).all()
     # brute force over turns: nothing else was lost
     robot = problem.cell.robot
-    q = problem.field.q[~np.isnan(problem.field.q[..., 0])]
+    q = problem.solutions(np.arange(len(problem.points)))
+    q = q[~np.isnan(q[..., 0])]
     margin = 0.01 * np.abs(coefficients).sum()
     expected = 0
     for turns in product((-1, 0, 1), repeat=3):
@@ -138,6 +139,6 @@ def test_reasons_and_states_tell_the_limit():
     (line,) = explain(shut, [])
     assert "beyond the limits of R+T" in line
     states = survey_nodes(shut, 0, np.zeros(6)).states
-    reached = ~np.isnan(problem.field.q[:, :, 0, 0])
+    reached = ~np.isnan(problem.angles(0, np.arange(len(problem.points)))[..., 0])
     cuts = problem.wheel_distance < -problem.cell.planned_penetration
     assert (states[reached & ~cuts] == list(NodeState).index(NodeState.LIMITS)).all()

@@ -12,6 +12,7 @@ from opl.geometry.toolpath import CutterPoints
 from opl.motion.path import GrindingPath
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.nodes import NodeMatrix
+from opl.planning.turned import Kept
 from tests.support.fcl_scene import FclScene
 from tests.support.planned import small_plan, small_problem, v_plan, v_problem
 
@@ -169,7 +170,7 @@ def two_points(p_first=None, p_second=None, t=(0.0, 3.0)):
     points = CutterPoints(frames, np.zeros(2, dtype=int), np.array([0.0, 0.004]))
     nodes = NodeMatrix(
         small_plan().path.ik_branch,
-        np.repeat(q[:, None], 2, axis=1),
+        Kept(np.repeat(q[:, None], 2, axis=1)),
         np.tile(t, (2, 1)),
         np.arange(2),
     )
@@ -211,7 +212,9 @@ def test_a_joint_turned_by_more_than_half_a_turn_is_followed():
     turn = np.where(q[0, 0, 5] > 0.0, -2 * np.pi, 2 * np.pi)
     q[..., 5] += turn
     path = fill_in(cell, points, nodes, rows, small_problem().interpolation)
-    turned = fill_in(cell, points, replace(nodes, q=q), rows, small_problem().interpolation)
+    turned = fill_in(
+        cell, points, replace(nodes, configurations=Kept(q)), rows, small_problem().interpolation
+    )
     np.testing.assert_allclose(turned.q[:, 5], path.q[:, 5] + turn, atol=1e-12)
     np.testing.assert_allclose(turned.q[:, :5], path.q[:, :5], atol=1e-12)
 

@@ -25,6 +25,7 @@ from opl.planning.plan import Exhausted, Found, OutOfBudget
 from opl.planning.reasons import explain, unreachable_points
 from opl.planning.settings import Start
 from opl.planning.survey import NodeState, survey_nodes
+from opl.planning.turned import Kept
 from opl.run import searches
 from tests.support.bare_cells import Ghosts, with_obstacle
 from tests.support.brute_force import printed_recursion
@@ -159,7 +160,7 @@ def step_is_free(problem, nodes, column, here, there):
     points = type(problem.points)(
         problem.points.Ts_workpiece_cutter[pair], np.zeros(2, dtype=int), np.array([0.0, 1.0])
     )
-    cut = replace(nodes, q=nodes.q[pair])
+    cut = replace(nodes, configurations=Kept(nodes.q[pair]))
     rows = np.array([here, there])
     try:
         path = fill_in(problem.cell, points, cut, rows, problem.interpolation)
@@ -327,8 +328,9 @@ def test_points_beyond_the_limits_are_told_with_the_joint():
     upper[1] = np.radians(-30.0)  # L bends forward at the wheel
     narrow = replace(problem.cell, robot=replace(robot, upper=upper))
     matrices = tuple(
-        replace(nodes, q=np.where((nodes.q <= upper).all(axis=-1)[..., None], nodes.q, np.nan))
+        replace(nodes, configurations=Kept(np.where(within[..., None], nodes.q, np.nan)))
         for nodes in problem.field.matrices
+        for within in [(nodes.q <= upper).all(axis=-1)]
     )
     field = replace(problem.field, matrices=matrices)
     changed = replace(with_scene(problem, cell=narrow), field=field)
@@ -347,10 +349,10 @@ def test_many_shut_runs_are_not_all_listed():
 
 def test_points_out_of_reach_are_found():
     problem = one_row_problem()
-    q = problem.field.q.copy()
-    q[7] = np.nan
-    q[8, :5] = np.nan  # reached elsewhere
-    found = unreachable_points(replace(problem, field=replace(problem.field, q=q)))
+    reached = problem.field.reached.copy()
+    reached[7] = 0
+    reached[8, :5] = 0  # reached by others
+    found = unreachable_points(replace(problem, field=replace(problem.field, reached=reached)))
     assert found.tolist() == [7]
 
 
@@ -383,13 +385,14 @@ def test_states_say_what_rules_a_node_out():
     branch = small_plan().path.ik_branch
     layer = problem.wheel_distance.copy()
     layer[5, 3] = -0.1
-    q = problem.field.q.copy()
-    q[6, 4, branch] = np.nan
+    angles = problem.field.angles[branch].copy()
+    angles[6, 4] = np.nan
+    angles = {**problem.field.angles, branch: angles}
     nodes = next(n for n in problem.field.matrices if n.ik_branch == branch and n.exists.any())
     column, row = np.argwhere(nodes.exists)[len(np.argwhere(nodes.exists)) // 2]
     ghost = Ghosts(nodes.q[column, row], 1e-3, haunted=problem.scene.collision)
     haunted = with_scene(problem, collision=ghost)
-    changed = replace(haunted, wheel_distance=layer, field=replace(problem.field, q=q))
+    changed = replace(haunted, wheel_distance=layer, field=replace(problem.field, angles=angles))
     states = survey_nodes(changed, branch, np.zeros(6)).states
     assert states.shape == layer.shape
     assert states[5, 3] == codes[NodeState.WHEEL]

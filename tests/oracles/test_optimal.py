@@ -137,7 +137,7 @@ def test_the_bound_of_a_tiny_field_is_the_least_sum_of_all_its_tracks_as_t_becom
         problem_of(with_positions(small_job(), count), slice(first, first + 4)) for count in (7, 41)
     )
     plan = plan_optimal(coarse, SETTINGS, plan_recursive(coarse))
-    q, free = fine.field.q, ~fine.cuts
+    q, free = fine.solutions(np.arange(len(fine.points))), ~fine.cuts
     least = least_range_sum(fine, q, free)
     assert plan.lower_bound <= least + 1e-12
     assert plan.lower_bound <= plan.path.joint_range_sum <= least * (1.0 + SETTINGS.widen)
@@ -217,7 +217,7 @@ def test_a_motion_that_the_proof_does_not_find_keeps_its_bound():
 def test_what_is_left_out_of_a_wall_collides_all_over():
     problem = one_row()
     cell = problem.cell
-    images = Images(cell.robot, seams_of(problem.field.q), 10.0)
+    images = Images(cell.robot, seams_of(problem.solutions(np.arange(len(problem.points)))), 10.0)
     wall = ColumnWalls(cell, problem.scene.part, problem.points, images).columns([7.0])[0]
     scene = CollisionScene(cell.widened(0.036))
     obstructions = Obstructions(scene, images)
@@ -240,7 +240,7 @@ def test_what_is_left_out_of_a_wall_collides_all_over():
 def test_every_motion_crosses_a_chain_within_the_pads_of_its_pieces():
     problem = one_row()
     cell, points = problem.cell, problem.points
-    images = Images(cell.robot, seams_of(problem.field.q), 10.0)
+    images = Images(cell.robot, seams_of(problem.solutions(np.arange(len(problem.points)))), 10.0)
     last = cell.wheel.last_position
     chain = ((5.0, -last), (5.0, -20.3), (7.4, -20.3), (7.4, 12.0), (6.0, 12.0), (6.0, 3.0))
     chain = (*chain, (6.6, 3.0), (6.6, last))

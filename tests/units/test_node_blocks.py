@@ -5,14 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from opl.planning import nodes as nodes_module
+from opl.planning import open_matrix, turned
 from opl.planning.box_columns import ColumnSampler
-from opl.planning.families import Families
+from opl.planning.families import Families, few_columns
 from opl.planning.images import Images, seams_of
+from opl.planning.multi_start import tracks_from_best_start
 from opl.planning.nodes import build_nodes
-from opl.planning.open_matrix import Track, open_matrices
+from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
 from opl.planning.problem import wheel_distances
 from opl.planning.symmetry import twins
+from opl.planning.turned import Kept
 from tests.support.planned import small_problem
 
 
@@ -20,9 +22,10 @@ from tests.support.planned import small_problem
 def test_blocks_change_nothing(monkeypatch, at_once):
     problem = small_problem()
     cell, points, t = problem.cell, problem.points, problem.field.contact_positions
-    monkeypatch.setattr(nodes_module, "AT_ONCE", at_once)
+    monkeypatch.setattr(turned, "AT_ONCE", at_once)
     field = build_nodes(cell, points, t)
-    np.testing.assert_array_equal(field.q, problem.field.q)
+    np.testing.assert_array_equal(field.reached, problem.field.reached)
+    assert list(field.angles) == list(problem.field.angles)
     assert len(field.matrices) == len(problem.field.matrices)
     for one, other in zip(field.matrices, problem.field.matrices, strict=True):
         np.testing.assert_array_equal(one.q, other.q)
@@ -39,7 +42,43 @@ def test_searches_read_nodes_where_they_lie():
     problem = small_problem()
     for nodes in problem.field.matrices:
         ladder = problem.ladder(nodes, problem.free_nodes(nodes))
-        assert np.shares_memory(ladder.q_by_joint, nodes.q)
+        assert np.shares_memory(ladder.q_by_joint, ladder.q)
+
+
+def test_nodes_are_all_turns_of_their_branch_within_the_limits():
+    problem = small_problem()
+    cell, columns = problem.cell, np.arange(len(problem.points))
+    q = problem.solutions(columns)
+    for nodes in problem.field.matrices:
+        whole = nodes.q
+        principal = q[:, :, nodes.ik_branch][:, nodes.position_index]
+        turns = (whole - principal) / (2.0 * np.pi)
+        np.testing.assert_allclose(turns[nodes.exists], np.round(turns[nodes.exists]), atol=1e-12)
+        assert cell.within_limits(whole[nodes.exists]).all()
+        np.testing.assert_array_equal(np.isnan(whole), np.isnan(whole[..., [0] * 6]))
+        np.testing.assert_array_equal(~np.isnan(whole[..., 0]), nodes.exists)
+        # a few are made as all are
+        rows = np.arange(whole.shape[1])
+        np.testing.assert_array_equal(nodes.at(columns[:, None], rows), whole)
+        np.testing.assert_array_equal(nodes.at(3, 5), whole[3, 5])
+    for branch in range(8):
+        known = problem.angles(branch, columns[::3])
+        np.testing.assert_array_equal(known, q[::3, :, branch])
+
+
+def test_ladders_that_are_not_at_hand_are_made_again(monkeypatch):
+    problem = small_problem()
+    track = next(tracks_from_best_start(open_matrices(problem)))
+    monkeypatch.setattr(open_matrix, "AT_HAND", 1)
+    matrices = open_matrices(problem)
+    one = next(matrix for matrix in matrices if matrix.free.size)
+    assert one.ladder is one.ladder and one.ladder.free is one.free
+    before, _ = one.ladder, matrices[-1].ladder
+    assert one.ladder is not before
+    np.testing.assert_array_equal(one.ladder.q, before.q)
+    again = next(tracks_from_best_start(matrices))
+    assert again.matrix == track.matrix
+    np.testing.assert_array_equal(again.rows, track.rows)
 
 
 def test_tracks_of_one_row_a_position_are_followed_like_those_of_several():
@@ -54,12 +93,12 @@ def test_tracks_of_one_row_a_position_are_followed_like_those_of_several():
         rows = np.array([np.flatnonzero(free)[0] for free in matrix.free])
         twice = replace(
             nodes,
-            q=np.concatenate([nodes.q, nodes.q + 2.0 * np.pi], axis=1),
+            configurations=Kept(np.concatenate([nodes.q, nodes.q + 2.0 * np.pi], axis=1)),
             contact_position=np.concatenate([nodes.contact_position] * 2, axis=1),
             position_index=np.concatenate([nodes.position_index] * 2),
         )
         free = np.concatenate([matrix.free] * 2, axis=1)
-        both = replace(matrix, nodes=twice, free=free, ladder=problem.ladder(twice, free))
+        both = OpenMatrix(twice, free, matrix.ladders)
         single = twins([matrix], Track(0, rows), robot)
         double = twins([both], Track(0, rows), robot)
         assert any(np.array_equal(one.rows, rows) for one in single)
@@ -71,17 +110,16 @@ def test_tracks_of_one_row_a_position_are_followed_like_those_of_several():
 def test_places_near_a_box_are_sampled_alike_in_blocks(monkeypatch):
     problem = small_problem()
     points, robot = problem.points, problem.cell.robot
-    seams = seams_of(problem.field.q)
-    families = Families(
-        Images(robot, seams, 10.0), problem.field.q, problem.cuts, points.pass_index
-    )
+    q = problem.solutions(few_columns(points.pass_index))
+    seams = seams_of(q)
+    families = Families(Images(robot, seams, 10.0), q, problem.cuts, points.pass_index)
     box = families.smallest_grown()
     placements, _ = families.hold(box, {}, set(), 0.1)
     whole = np.arange(len(points), dtype=float)
     between = whole[:-1][np.diff(points.pass_index) == 0] + 0.3
     places = np.union1d(whole, between)
     at_once = ColumnSampler(problem, seams).columns(box, placements, places)
-    monkeypatch.setattr(nodes_module, "AT_ONCE", 1)
+    monkeypatch.setattr(turned, "AT_ONCE", 1)
     in_blocks = ColumnSampler(problem, seams).columns(box, placements, places)
     assert np.isfinite(at_once.q[..., 0]).any(axis=1).all()
     np.testing.assert_array_equal(in_blocks.t, at_once.t)
