@@ -323,23 +323,26 @@ class Machine:
         self, flange: Callable[[Array, Array], list[Vector]], low: Array, high: Array
     ) -> Cells:
         """Return the cells of a run; those whose pads are wide are cut further."""
+        found = []
         for halving in range(HALVINGS + 1):
             whole, starts, ends = (
                 list(self.arm.postures(*flange(a, b)))
                 for a, b in ((low, high), (low, low), (high, high))
             )
-            found, wide = [], np.zeros(len(low), dtype=bool)
+            families, wide = [], np.zeros(len(low), dtype=bool)
             for family, (over, first, last) in enumerate(zip(whole, starts, ends, strict=True)):
                 cells = chords(family, over, first, last, low, high)
                 here = ~over.out_of_reach & self._within_limits(cells)
                 spread = (cells.pad_high - cells.pad_low).sum(axis=1)
                 wide |= here & (spread > self._fine)
-                found.append(cells.pick(here))
-            wide &= high - low > self._smallest
-            if halving == HALVINGS or not wide.any():
+                families.append((cells, here))
+            wide &= (high - low > self._smallest) & (halving < HALVINGS)
+            found += [cells.pick(here & ~wide) for cells, here in families]
+            if not wide.any():
                 break
-            low, high = halves(low, high, wide)
-        return joined(found)
+            low, high = halves(low[wide], high[wide], wide[wide])
+        every = joined(found)
+        return every.pick(np.lexsort([every.place, every.family]))
 
     def _within_limits(self, cells: Cells) -> Flags:
         """Return which some full turns, with the wrist to either side, bring within the limits."""
@@ -376,8 +379,14 @@ class Machine:
         That it is, some points of one of its triangles show.
         """
         deep, middle = np.zeros(len(low), dtype=bool), np.zeros(len(low), dtype=bool)
+        points = np.empty((0, 3))
         cutter = self._triangles @ T_cutter_workpiece[:3, :3].T + T_cutter_workpiece[:3, 3]
         for k, t in enumerate((low + high) / 2.0):
+            # what shows it of the cell before may show it of this one
+            ends = np.full(len(points), low[k]), np.full(len(points), high[k])
+            if len(points) and self._least_depth(points, *ends) > self._allowed + SURE:
+                deep[k] = middle[k] = True
+                continue
             slide = np.clip(t, -self._flat, self._flat)
             roll = np.deg2rad(t - slide)
             c, s = np.cos(roll), np.sin(roll)
@@ -417,7 +426,10 @@ class Machine:
         shares: list[Array] = []
         tilt, end, depth = np.pi / 4.0, 0, -np.inf
         for _ in range(WITNESSES):
-            shares.append(self._deepest(triangle, tilt, end))
+            share, most = self._deepest(triangle, tilt, end)
+            if most <= self._allowed:
+                return np.array([share]), most  # that way it is out sooner
+            shares.append(share)
             points = np.array(shares) @ triangle
             ways = self._ways(*points.T[[0, 0]], np.hypot(points[:, 1], points[:, 2]))
             found, tilt, end = least_of_most(*ways)
@@ -426,8 +438,11 @@ class Machine:
             depth = found
         return np.array(shares), depth
 
-    def _deepest(self, triangle: Array, tilt: float, end: int) -> Array:
-        """Return about the point of a triangle that is deepest at a tilt to one end of the axle."""
+    def _deepest(self, triangle: Array, tilt: float, end: int) -> tuple[Array, float]:
+        """Return about the point of a triangle that is deepest at a tilt, and how deep it is.
+
+        It is tilted from square to the axle to one end of it.
+        """
         middle, size = np.full(3, 1.0 / 3.0), 1.0
         for _ in range(CLOSER):
             shares = middle + size * (GRID - 1.0 / 3.0)
@@ -435,9 +450,10 @@ class Machine:
             shares /= shares.sum(axis=1, keepdims=True)
             x, y, z = (shares @ triangle).T
             radial, ends = self._ways(x, x, np.hypot(y, z))
-            deepest = int(np.argmax(np.cos(tilt) * radial + np.sin(tilt) * ends[end]))
+            depth = np.cos(tilt) * radial + np.sin(tilt) * ends[end]
+            deepest = int(np.argmax(depth))
             middle, size = shares[deepest], size * 0.5
-        return np.asarray(middle)
+        return np.asarray(middle), float(depth[deepest])
 
     def _ways(self, x_low: Array, x_high: Array, away: Array) -> tuple[Array, Array]:
         """Return how deep points are square to the axle, and towards both its ends, at the least.

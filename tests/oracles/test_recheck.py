@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import benchmarks
-from benchmarks.certificate import certificate_of
+from benchmarks.certificate import certificate_of, certified
 from benchmarks.recheck import recheck
 from benchmarks.recheck_walls import COARSE, Machine
 from opl.cell.inverse_kinematics import inverse_kinematics
@@ -35,6 +35,15 @@ def searched():
 
 def test_the_bound_of_a_row_of_the_v_part_is_proven_anew():
     holds, subproblems = recheck(searched()[1])
+    assert holds
+    assert subproblems < 1000
+
+
+def test_the_printed_bound_of_the_v_part_as_shipped_is_proven_anew():
+    certificate, printed = certified("v_shape")
+    assert certificate["bound"] == printed
+    assert set(certificate["pass_index"]) == set(range(5))
+    holds, subproblems = recheck(json.loads(json.dumps(certificate)))
     assert holds
     assert subproblems < 1000
 
