@@ -19,7 +19,7 @@ def test_an_attack_comes_near_the_bound_and_not_below_it():
     size = adversary.hold(found)
     assert size == pytest.approx(found.size)
     assert size >= optimal(v_row).lower_bound
-    assert size <= 1.02 * optimal(v_row).path.joint_range_sum  # or it would be no attack
+    assert size <= 1.005 * optimal(v_row).path.joint_range_sum  # or it would be no attack
 
 
 def test_an_attack_that_begins_at_the_path_found_stays_between_it_and_the_bound():
@@ -27,7 +27,7 @@ def test_an_attack_that_begins_at_the_path_found_stays_between_it_and_the_bound(
     adversary = Adversary(v_row(), seed=5, knots=1)
     size = adversary.hold(adversary.attack(200, plan.path))
     # or a bound that is false by a thousandth would not be found out
-    assert plan.lower_bound <= size <= plan.path.joint_range_sum * 1.001
+    assert plan.lower_bound <= size <= plan.path.joint_range_sum
 
 
 def test_a_motion_that_collides_is_no_attack():
@@ -47,6 +47,6 @@ def test_passes_on_branches_and_turns_of_their_own_do_not_come_below_the_bound()
 def test_a_motion_that_cuts_into_the_wheel_or_does_not_exist_is_no_attack():
     problem = v_row()
     adversary = Adversary(problem, seed=3, knots=1)
-    n = len(problem.points)
-    beyond = 1e3 + problem.cell.wheel.last_position
-    assert adversary.hold(Attack(0.0, np.full(n, beyond), np.zeros(1, dtype=int), 1)) == np.inf
+    knots = np.arange(float(len(problem.points)))
+    t = np.full(len(knots), 1e3 + problem.cell.wheel.last_position)
+    assert adversary.hold(Attack(0.0, knots, t, np.zeros(1, dtype=int), 1)) == np.inf
