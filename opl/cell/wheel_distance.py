@@ -17,7 +17,7 @@ from opl.cell.wheel_triangle import (
     distance_of_point,
     nearest_on_triangle,
 )
-from opl.files.kernels import kernel, prange
+from opl.files.kernels import kernel, prange, threads_are_allowed
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.wheel import ContactWheel
@@ -102,7 +102,7 @@ def signed_wheel_distance(
     flat = np.ascontiguousarray(Ts_contact0_workpiece.reshape(-1, 4, 4))
     distances, looks = np.empty(len(flat)), np.empty(len(flat), dtype=np.int64)
     # to call threads costs as much as dozens of poses, and many times that on a busy machine
-    kernel = _few_distances if len(flat) <= FEW else _distances
+    kernel = _distances if len(flat) > FEW and threads_are_allowed() else _few_distances
     tree = part.triangles, part.spheres, part.first, part.child
     kernel(flat, *tree, wheel.width / 2.0, wheel.radius, needs, distances, looks)
     part.looks[0] += looks.sum()

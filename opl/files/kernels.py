@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache, cached_property
 from pathlib import Path
+from threading import Event
 from types import FunctionType
 from typing import Any
 
@@ -18,6 +19,7 @@ from opl.files.kernel_cache import settle_kernel_cache
 prange = range  # numba's own in a kernel with threads
 
 _made: list[Kernel] = []
+_one_thread = Event()
 
 
 class Kernel:
@@ -37,6 +39,7 @@ class Kernel:
         self._threads = threads
 
     def __call__(self, *arguments: Any) -> Any:  # noqa: D102
+        assert not self._threads or threads_are_allowed(), "a copy of a process has no threads"
         return self.compiled(*arguments)
 
     @cached_property
@@ -81,6 +84,16 @@ def load_kernels() -> None:
     """Load all kernels of the modules that are loaded, so that no job waits for them."""
     for made in _made:
         _ = made.compiled
+
+
+def use_one_thread() -> None:
+    """Call no kernel with threads in this process: those of the process that it copies are gone."""
+    _one_thread.set()
+
+
+def threads_are_allowed() -> bool:
+    """Return whether kernels with threads may be called."""
+    return not _one_thread.is_set()
 
 
 def use_threads(count: int) -> None:

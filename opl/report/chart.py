@@ -8,8 +8,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.colors import to_rgb
-from matplotlib.image import imsave
 
 from opl.cell.collision import BodyPair
 from opl.cell.nearest import Nearest
@@ -17,7 +15,6 @@ from opl.geometry.frames import Array
 from opl.motion.motion import Motion
 from opl.report.html import text
 from opl.report.packing import Packer
-from opl.report.pictures import STATE_COLOURS
 
 # of each state, free first: which pixels of an image are darker
 HATCHES: tuple[Callable[[Any, Any], Any], ...] = (
@@ -100,6 +97,8 @@ def chart_image(
             the darker, the less of it there is at the place measured nearest to them.
         grid: Cutter points and contact positions at which it was measured.
     """
+    from matplotlib.image import imsave
+
     columns, rows = (_nearest(places, n) for places, n in zip(grid, states.shape, strict=True))
     across, up = (-(-least // n) for least, n in zip(LEAST_PIXELS, states.shape, strict=True))
     image = np.empty((up * states.shape[1], across * states.shape[0], 3), dtype=np.uint8)
@@ -129,6 +128,10 @@ def _pixels(
         size: Pixels of a node across and up.
         left: Pixels to the left of these columns.
     """
+    from matplotlib.colors import to_rgb
+
+    from opl.report.pictures import STATE_COLOURS
+
     part = np.clip(np.log(np.maximum(room, 1e-4) / LEAST) / np.log(MOST / LEAST), 0.0, 1.0)
     colours = np.array([to_rgb(STATE_COLOURS[code]) for code in range(len(HATCHES))])[states]
     shaded = (states == 0) & ~np.isnan(room)

@@ -6,7 +6,6 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 
 from opl.cell.drawn_cell import DrawnChain, DrawnSolid
 from opl.cell.workcell import PART, WHEEL
@@ -114,6 +113,8 @@ def painted(values: Array, unit: str, packer: Packer) -> dict[str, Any]:
 
     From dark to light evenly, so that they can be distinguished without hue and in print.
     """
+    from matplotlib import colormaps
+
     known = values[~np.isnan(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
     parts = (values - low) / (high - low or 1.0)

@@ -26,6 +26,12 @@ class Packer:
     def __init__(self) -> None:
         self._block = bytearray()
 
+    def copy(self) -> Packer:
+        """Return one that has collected the same, to go on with."""
+        other = Packer()
+        other._block[:] = self._block
+        return other
+
     def floats(self, values: ArrayLike) -> Packed:
         """Pack numbers with seven digits."""
         return self._append(np.asarray(values, dtype="<f4"), "f32")

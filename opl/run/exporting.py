@@ -6,6 +6,8 @@ import os
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from datetime import datetime, timezone
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,10 +21,11 @@ from opl.planning.survey import NodeState, NodeSurvey
 from opl.program.export import StraightLimit, export_program
 from opl.program.moves import Program
 from opl.proof.digest import inputs_mark
-from opl.report.canvas import Picture, png, svg
-from opl.report.pictures import contact_chart, joint_chart
 from opl.report.trace import motion_trace
 from opl.run.values import Prepared, Proven, Refused, Run
+
+if TYPE_CHECKING:  # matplotlib takes long to load: whoever draws does
+    from opl.report.canvas import Picture
 
 
 def render_program(
@@ -57,14 +60,23 @@ def _home_moved(job: Job) -> list[str]:
     ]
 
 
+def load_pictures() -> None:
+    """Load what draws, so that no picture waits for it."""
+    import_module("opl.report.pictures")
+
+
 def draw_charts(prepared: Prepared, plan: Plan, survey: NodeSurvey) -> Mapping[str, str]:
     """Return the contact chart and the joint angles as SVG, by file name."""
+    from opl.report.canvas import svg
+
     charts = _charts(prepared, plan, survey)
     return {f"{name}.svg": svg(figure, title) for name, title, figure in charts}
 
 
 def with_png(run: Run) -> Run:
     """Return a run whose charts are delivered as PNG too; a refused one as it is."""
+    from opl.report.canvas import png
+
     if isinstance(run, Refused):
         return run
     planned = run.proven.planned
@@ -76,6 +88,8 @@ def _charts(
     prepared: Prepared, plan: Plan, survey: NodeSurvey
 ) -> Iterator[tuple[str, str, Picture]]:
     """Yield file name, title and figure of each chart."""
+    from opl.report.pictures import contact_chart, joint_chart
+
     surfaced, path = prepared.surfaced, plan.path
     job, pass_index = surfaced.job, surfaced.points.pass_index
     title = f"{job.name}: where the part touches the wheel"

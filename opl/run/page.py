@@ -11,7 +11,7 @@ from opl.cell.drawn_cell import drawn_solids
 from opl.cell.workcell import PART, WHEEL
 from opl.motion.motion import Motion
 from opl.planning.survey import NodeSurvey
-from opl.report.chart import NEAR_SINGULAR, chart_frame, chart_image, measured_clearance
+from opl.report.chart import chart_frame
 from opl.report.drawn import thinned_meshes
 from opl.report.html import bullets, page, section, text
 from opl.report.packing import Packer
@@ -20,10 +20,10 @@ from opl.run import page_tables, page_text
 from opl.run.page_data import (
     blocked_place,
     colliding,
+    drawn_run,
     extremes,
     move_to,
     moves_at,
-    run_data,
     slow_marks,
 )
 from opl.run.result import Report
@@ -52,8 +52,8 @@ def run_page(run: Written | Refused, report: Report) -> str:
     prepared = planned.prepared if isinstance(planned, Planned) else planned
     assert isinstance(prepared, Prepared)
     found = planned if isinstance(planned, Planned) else None
-    packer = Packer()
-    data = run_data(prepared, found, packer)
+    drawn = drawn_run(prepared, prepared.survey, None) if found is None else found.drawn.value()
+    data, packer = dict(drawn.data), drawn.packer.copy()
     data["marks"] = _marks(run, prepared, found, report)
     if {PART, WHEEL} & set(data["marks"].get("start", {}).get("hit", ())):  # seen from close by
         data["views"] = {"contact": data["views"]["contact"], **data["views"]}
@@ -76,7 +76,7 @@ def run_page(run: Written | Refused, report: Report) -> str:
                 "Contact chart",
                 '<p class="screen">Point to see what a cell is; click, or use the arrow keys, to '
                 "pose the robot there.</p>",
-                _chart(prepared, survey, motion),
+                _chart(prepared, drawn.chart, survey, motion),
                 hover(),
                 page_tables.causes(survey),
             ),
@@ -90,16 +90,9 @@ def run_page(run: Written | Refused, report: Report) -> str:
     return page(f"{job.name}: report", body, data, packer.block())
 
 
-def _chart(prepared: Prepared, survey: NodeSurvey, motion: Motion | None) -> str:
+def _chart(prepared: Prepared, image: str, survey: NodeSurvey, motion: Motion | None) -> str:
     job = prepared.surfaced.job
     title = f"{job.name}: what each cutter point is at each contact position"
-    clearance = measured_clearance(survey.measured, survey.clearance)
-    image = chart_image(
-        survey.states,
-        survey.singularity < NEAR_SINGULAR,
-        clearance,
-        (survey.columns, survey.positions),
-    )
     return chart_frame(
         title,
         image,

@@ -16,14 +16,15 @@ from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.scallop import ridge_height
 from opl.motion.motion import Motion, MoveKind, TimedMotion
+from opl.motion.timing import Timing
 from opl.planning.survey import CODES, NodeState, NodeSurvey
 from opl.report import curves
-from opl.report.chart import chart_cells
+from opl.report.chart import NEAR_SINGULAR, chart_cells, chart_image, measured_clearance
 from opl.report.drawn import drawn_cell, drawn_passes, drawn_wheel, painted, views
 from opl.report.packing import Packer
 from opl.run.proof_result import PlaceReport
 from opl.run.result import Report
-from opl.run.values import Planned, Prepared, Surfaced
+from opl.run.values import Drawn, Prepared, Surfaced
 
 MM, MICRONS = 1e3, 1e6
 # of a page: what a viewer without a run, an arm or a part goes without
@@ -85,17 +86,26 @@ def passes_data(surfaced: Surfaced, packer: Packer) -> tuple[Data, Data]:
     return drawn_passes(points, job.passes.pitch, missed, packer), paints
 
 
-def run_data(prepared: Prepared, planned: Planned | None, packer: Packer) -> Data:
-    """Return the data of a page of a run, as far as it came."""
-    surfaced = prepared.surfaced
+def drawn_run(
+    prepared: Prepared, survey: NodeSurvey, moved: tuple[TimedMotion, Timing] | None
+) -> Drawn:
+    """Return what the viewer draws of a run as far as it came.
+
+    Args:
+        prepared: What the search was given.
+        survey: Every node of the IK branch that is shown.
+        moved: The motion as it is passed, and what is written of it; None without one.
+    """
+    packer, surfaced = Packer(), prepared.surfaced
     job = surfaced.job
     data = {"name": job.name, **cell_data(job.cell, job.process.home, packer)}
     data["points"], data["paints"] = passes_data(surfaced, packer)
-    data["field"] = _field(prepared, prepared.survey if planned is None else planned.survey, packer)
-    if planned is not None:
+    data["field"] = _field(prepared, survey, packer)
+    if moved is not None:
+        timed, timing = moved
         scene = prepared.problem.scene
-        times, nearest = planned.pictured.value().times, planned.pictured.value().nearest
-        data["motion"] = _motion(planned.timed, packer)
+        times, nearest = _nearest_along(timed, scene.collision)
+        data["motion"] = _motion(timed, packer)
         data["clearance"] = {
             "time": packer.floats(times),
             "distance": packer.floats(nearest.distance),
@@ -103,16 +113,23 @@ def run_data(prepared: Prepared, planned: Planned | None, packer: Packer) -> Dat
             "points": packer.floats(nearest.points),
             "pairs": [list(pair) for pair in nearest.pairs],
         }
-        robot, timing, feed = scene.cell.robot, planned.timing, job.process.feed
+        robot, feed = scene.cell.robot, job.process.feed
         data["curves"] = {
-            "joints": curves.joint_panels(planned.timed, robot, prepared.fixed.q, packer),
+            "joints": curves.joint_panels(timed, robot, prepared.fixed.q, packer),
             "speeds": curves.speed_panels(timing, robot, packer),
             "accelerations": curves.acceleration_panels(timing, robot, packer),
-            "feed": curves.feed_panels(timing, planned.timed, feed, robot, packer),
+            "feed": curves.feed_panels(timing, timed, feed, robot, packer),
             "clearance": curves.clearance_panels(times, nearest, packer),
         }
-        data["paints"] = {**_paints(planned, times, nearest, packer), **data["paints"]}
-    return data
+        paints = _paints(len(surfaced.points), moved, times, nearest, packer)
+        data["paints"] = {**paints, **data["paints"]}
+    image = chart_image(
+        survey.states,
+        survey.singularity < NEAR_SINGULAR,
+        measured_clearance(survey.measured, survey.clearance),
+        (survey.columns, survey.positions),
+    )
+    return Drawn(data, packer, image)
 
 
 def blocked_place(reason: str, survey: NodeSurvey, distance: Array) -> tuple[int, int] | None:
@@ -208,7 +225,7 @@ def _motion(timed: TimedMotion, packer: Packer) -> Data:
     }
 
 
-def nearest_along(timed: TimedMotion, scene: CollisionScene) -> tuple[Array, Nearest]:
+def _nearest_along(timed: TimedMotion, scene: CollisionScene) -> tuple[Array, Nearest]:
     """Return moments in [s] and the nearest pair at each, for the whole motion."""
     moments = curves.moments(timed)
     ground = timed.motion.on_wheel & (timed.motion.cutter_point % 1.0 == 0.0)
@@ -219,17 +236,24 @@ def nearest_along(timed: TimedMotion, scene: CollisionScene) -> tuple[Array, Nea
     return times, nearest_pairs(scene, q)
 
 
-def _paints(planned: Planned, times: Array, nearest: Nearest, packer: Packer) -> Mapping[str, Data]:
+def _paints(
+    n_points: int,
+    moved: tuple[TimedMotion, Timing],
+    times: Array,
+    nearest: Nearest,
+    packer: Packer,
+) -> Mapping[str, Data]:
     """Return what the passes of a planned motion can be coloured by."""
-    motion, moments = planned.timed.motion, curves.moments(planned.timed)
+    timed, timing = moved
+    motion, moments = timed.motion, curves.moments(timed)
     rows = np.flatnonzero(motion.on_wheel & (motion.cutter_point % 1.0 == 0.0))
     point = motion.cutter_point[rows].astype(int)
     passed_by = np.searchsorted(motion.positions, rows)  # the written move that leads there
-    speed = MM * curves.surface_speed(planned.timing)[passed_by]
+    speed = MM * curves.surface_speed(timing)[passed_by]
     near = MM * np.interp(moments[rows], times, nearest.distance)
 
     def at_points(values: Array, unit: str) -> Data:
-        every = np.full(len(planned.surfaced.points), np.nan)
+        every = np.full(n_points, np.nan)
         every[point] = values
         return painted(every, unit, packer)
 

@@ -7,6 +7,7 @@ from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import PART, SECOND_OPINION_OF_A_LINK, WHEEL
 from opl.errors import InputError
+from opl.files.beside import Later
 from opl.geometry.toolpath import CutterPoints
 from opl.job import keys
 from opl.job.load import Job
@@ -14,12 +15,13 @@ from opl.planning.fixed_contact import keep_contact, runs_of
 from opl.planning.problem import GrindingProblem, build_problem
 from opl.planning.reasons import unreachable_points
 from opl.planning.scene import PlanningScene, planning_scene
+from opl.run.searches import from_paper_start
 from opl.run.values import Prepared, Surfaced
 from opl.run.watch import Stage, Watch
 
 
 def prepare(surfaced: Surfaced, watch: Watch | None = None) -> Prepared:
-    """Build the node matrix and the clearance layer, and keep the contact at t = 0 for comparison.
+    """Build the node matrix and the clearance layer.
 
     Raises:
         InputError: If the arm reaches some cutter point at no contact position, or collides at
@@ -38,8 +40,9 @@ def prepare(surfaced: Surfaced, watch: Watch | None = None) -> Prepared:
             f"{keys.FIXTURE_POSE}",
         )
     _check_home(problem, job)
-    with watch.stage(Stage.COMPARISON):
-        return Prepared(surfaced, problem, keep_contact(problem))
+    return Prepared(
+        surfaced, problem, Later(keep_contact, problem), Later(from_paper_start, problem)
+    )
 
 
 def problem_in(

@@ -128,24 +128,31 @@ def _search_best(
     return replace(plans[values.index(value)], objective=known)
 
 
+def from_paper_start(problem: GrindingProblem) -> Figures | None:
+    """Return the figures of what the paper's search finds from its own start node, if anything.
+
+    Nothing else needs what it finds.
+    """
+    found = try_recursive(problem, Start.NEAREST, MOST_CHECKS)
+    return _figures(problem, found.plan) if isinstance(found, Found) else None
+
+
 def compare(prepared: Prepared, found: FoundPaths) -> Mapping[str, Figures]:
     """Return the figures of the contact-fixed path and of all that were found, by what they are.
-
-    The paper's search from its own start node is made here: nothing else needs what it finds.
 
     Args:
         prepared: What was to be planned.
         found: What was found.
     """
     problem, q = prepared.problem, prepared.fixed.q
-    compared = {}
+    compared: dict[str, Figures] = {}
     if q is not None:
         compared["fixed"] = figures_of_points(
             q, problem.points, problem.process, problem.cell.robot
         )
-    from_paper_start = try_recursive(problem, Start.NEAREST, MOST_CHECKS)
-    if isinstance(from_paper_start, Found):
-        compared["paper_start"] = _figures(problem, from_paper_start.plan)
+    paper_start = prepared.paper_start.value()
+    if paper_start is not None:
+        compared["paper_start"] = paper_start
     compared["recursive"] = _figures(problem, found.recursive)
     if prepared.surfaced.job.search.method is Method.OPTIMAL:
         compared["optimal"] = _figures(problem, found.plan)

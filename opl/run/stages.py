@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from opl.errors import NoFreeMoveError, NoPathError
-from opl.files.beside import Beside
+from opl.files.beside import Beside, Later
 from opl.job.load import Job
 from opl.job.refusals import dwell_refusal, keys_named
 from opl.motion.feed import slow_stretches
 from opl.motion.motion import Motion, TimedMotion
+from opl.motion.timing import Timing
 from opl.planning.borders import Nameable
 from opl.planning.plan import Plan
 from opl.planning.positions import HALVINGS, with_fewest_positions, with_shorter_moves
@@ -17,13 +18,23 @@ from opl.program.posts import find_post
 from opl.program.settings import MotionForm
 from opl.proof.read_back import in_file_digits, position_rule, read_back
 from opl.proof.recognised_times import recognised_times
-from opl.run.exporting import draw_charts, job_date, render_program
-from opl.run.page_data import nearest_along
+from opl.run.exporting import draw_charts, job_date, load_pictures, render_program
+from opl.run.page_data import drawn_run
 from opl.run.preparing import prepare
 from opl.run.remedies import find_remedies
 from opl.run.searches import compare, search_path
 from opl.run.surfacing import cut_surface
-from opl.run.values import Pictured, Planned, Prepared, Proven, Refused, Run, Surfaced, Written
+from opl.run.values import (
+    Charted,
+    Drawn,
+    Planned,
+    Prepared,
+    Proven,
+    Refused,
+    Run,
+    Surfaced,
+    Written,
+)
 from opl.run.watch import Stage, Watch
 from opl.verification.replay import replay
 
@@ -35,7 +46,7 @@ def run_job(job: Job, watch: Watch | None = None, workers: int = 1) -> Run:
         job: The job.
         watch: Follows the run, and can cancel it; one for each run, here and in each stage.
         workers: How many processes may work at a time; the same bytes come of any number. With two
-            the pictures are drawn while the motion is verified, unless the process has threads.
+            a copy of the process works beside it from the search on, unless it has threads.
 
     Returns:
         `Written` with a proven program, or `Refused` with the reason why there is none.
@@ -48,16 +59,30 @@ def run_job(job: Job, watch: Watch | None = None, workers: int = 1) -> Run:
     """
     job_date()  # refused before the work, not after it
     watch = watch or Watch()
-    planned = plan_path(cut_surface(job, watch), watch)
+    with Beside(workers > 1) as beside:
+        run = _all_stages(cut_surface(job, watch), watch, beside)
+        if isinstance(run, Refused):
+            _work_out(run.reached)
+        return run
+
+
+def _all_stages(surfaced: Surfaced, watch: Watch, beside: Beside) -> Run:
+    planned = plan_path(surfaced, watch, beside)
     if isinstance(planned, Refused):
         return planned
-    with planned.pictured.begun(workers > 1):
-        proven = verify_motion(planned, watch)
-        return proven if isinstance(proven, Refused) else write_program(proven, watch)
+    proven = verify_motion(planned, watch, beside)
+    return proven if isinstance(proven, Refused) else write_program(proven, watch, beside)
 
 
-def plan_path(surfaced: Surfaced, watch: Watch | None = None) -> Planned | Refused:
+def plan_path(
+    surfaced: Surfaced, watch: Watch | None = None, beside: Beside | None = None
+) -> Planned | Refused:
     """Plan a path over the wheel and the motion around it, collision-free for the planner.
+
+    Args:
+        surfaced: The cutter points.
+        watch: Follows the run.
+        beside: What may work beside this process, if anything.
 
     Returns:
         The plan; `Refused` if there is no path, or if the belt would dwell on one spot too long.
@@ -68,26 +93,33 @@ def plan_path(surfaced: Surfaced, watch: Watch | None = None) -> Planned | Refus
     """
     watch = watch or Watch()
     with keys_named(surfaced.job.source):
-        return _plan(surfaced, watch)
+        return _plan(surfaced, watch, beside or Beside())
 
 
-def _plan(surfaced: Surfaced, watch: Watch) -> Planned | Refused:
+def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused:
     prepared, job = prepare(surfaced, watch), surfaced.job
+    problem, comparison = prepared.problem, (prepared.kept, prepared.paper_start)
+    cell, points = job.cell, surfaced.points
+    beside.start(job, cell, surfaced, points, problem, problem.scene, prepared, *comparison)
+    for later in (*comparison, Later(load_pictures)):
+        beside.begin(later)
     try:
         with watch.stage(Stage.SEARCH) as report:
-            found = search_path(job.search, prepared.problem, _nameable(job), report)
+            found = search_path(job.search, problem, _nameable(job), report)
     except NoPathError as error:
         return _without_path(prepared, error, watch)
-    with watch.stage(Stage.COMPARISON):
-        compared = compare(prepared, found)
+    charted = Later(_charted, prepared, found.plan)
+    compared = Later(compare, prepared, found)
+    beside.begin(charted)
+    beside.begin(compared)
     with watch.stage(Stage.MOTION):
         exact = with_speed_steps(found.plan.motion, surfaced.points, job.process, job.cell.robot)
         exact, motion = _positions(prepared, exact)
         timing = recognised_times(job, surfaced.points, motion)
         slow = slow_stretches(timing, job.process)
     timed = TimedMotion.passing(motion, timing.timed.duration)
-    pictured = Beside(lambda: _pictured(prepared, found.plan, timed))
-    planned = Planned(prepared, found.plan, compared, exact, timed, timing, slow, pictured)
+    drawn = Later(_drawn, prepared, charted, timed, timing)
+    planned = Planned(prepared, found.plan, compared, exact, timed, timing, slow, charted, drawn)
     refusal = dwell_refusal(slow, job.process)
     return planned if refusal is None else Refused(planned, refusal, (), watch.seconds)
 
@@ -111,11 +143,28 @@ def _positions(prepared: Prepared, exact: Motion) -> tuple[Motion, Motion]:
     return exact, motion
 
 
-def _pictured(prepared: Prepared, plan: Plan, timed: TimedMotion) -> Pictured:
-    path, problem = plan.path, prepared.problem
-    survey = survey_nodes(problem, path.ik_branch, path.q[path.cutter_point % 1.0 == 0.0])
-    times, nearest = nearest_along(timed, problem.scene.collision)
-    return Pictured(survey, times, nearest, draw_charts(prepared, plan, survey))
+def _charted(prepared: Prepared, plan: Plan) -> Charted:
+    path = plan.path
+    at_points = path.q[path.cutter_point % 1.0 == 0.0]
+    survey = survey_nodes(prepared.problem, path.ik_branch, at_points)
+    return Charted(survey, draw_charts(prepared, plan, survey))
+
+
+def _drawn(
+    prepared: Prepared, charted: Later[Charted], timed: TimedMotion, timing: Timing
+) -> Drawn:
+    return drawn_run(prepared, charted.value().survey, (timed, timing))
+
+
+def _work_out(reached: Prepared | Planned | Proven) -> None:
+    """Have all that a report needs worked out."""
+    planned = reached.planned if isinstance(reached, Proven) else reached
+    prepared = planned.prepared if isinstance(planned, Planned) else planned
+    prepared.kept.value()
+    if isinstance(planned, Planned):
+        planned.comparison.value()
+        planned.charted.value()
+        planned.drawn.value()
 
 
 def _nameable(job: Job) -> Nameable | None:
@@ -126,8 +175,15 @@ def _nameable(job: Job) -> Nameable | None:
     )
 
 
-def verify_motion(planned: Planned, watch: Watch | None = None) -> Proven | Refused:
+def verify_motion(
+    planned: Planned, watch: Watch | None = None, beside: Beside | None = None
+) -> Proven | Refused:
     """Replay a planned motion in PyBullet, which shares no code with the planner.
+
+    Args:
+        planned: The motion.
+        watch: Follows the run.
+        beside: What may work beside this process, if anything.
 
     Returns:
         The verified motion; `Refused` if the replay finds anything wrong.
@@ -135,7 +191,7 @@ def verify_motion(planned: Planned, watch: Watch | None = None) -> Proven | Refu
     Raises:
         Cancelled: If the run was cancelled.
     """
-    watch = watch or Watch()
+    watch, beside = watch or Watch(), beside or Beside()
     surfaced = planned.surfaced
     job = surfaced.job
     with watch.stage(Stage.VERIFICATION) as progress:
@@ -145,16 +201,23 @@ def verify_motion(planned: Planned, watch: Watch | None = None) -> Proven | Refu
             planned.timed,
             job.search.max_contact_error,
             progress,
+            beside,
         )
+    beside.begin(planned.drawn)
     if verification.verified is None:
         return Refused(planned, verification, (), watch.seconds)
     return Proven(planned, verification, verification.verified)
 
 
-def write_program(proven: Proven, watch: Watch | None = None) -> Run:
+def write_program(proven: Proven, watch: Watch | None = None, beside: Beside | None = None) -> Run:
     """Write the program of a verified motion, and prove what its files say.
 
     The files are texts yet; `deliver` puts them into a folder.
+
+    Args:
+        proven: The motion.
+        watch: Follows the run.
+        beside: What may work beside this process, if anything.
 
     Returns:
         The program and its files; `Refused` if they do not say what was proven.
@@ -178,8 +241,11 @@ def write_program(proven: Proven, watch: Watch | None = None) -> Run:
         stops |= near
     if found is not None and not found.proven:
         return Refused(proven, found, (), watch.seconds)
+    with watch.stage(Stage.COMPARISON):
+        proven.planned.comparison.value()
     with watch.stage(Stage.EXPORT):
-        files = {**files, **proven.planned.pictured.value().charts}
+        files = {**files, **proven.planned.charted.value().charts}
+        proven.planned.drawn.value()
     return Written(proven, program, files, found, watch.seconds)
 
 

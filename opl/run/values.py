@@ -2,7 +2,8 @@
 
     Surfaced -> Prepared -> Planned -> Proven -> Written
 
-A run ends as `Written` or, wherever it stops, as `Refused`.
+A run ends as `Written` or, wherever it stops, as `Refused`. What is `Later` is worked out when it
+is first asked for, or beside.
 """
 
 from __future__ import annotations
@@ -10,15 +11,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from opl.errors import NoPathError, OplError, UnsafeError
 
 if TYPE_CHECKING:  # what a stage makes of a value is loaded with the stage
-    from opl.cell.nearest import Nearest
-    from opl.files.beside import Beside
+    from opl.files.beside import Later
     from opl.findings import Finding
-    from opl.geometry.frames import Array
     from opl.geometry.inspection import Inspection
     from opl.geometry.passes import LaidPasses
     from opl.geometry.toolpath import CutterPoints
@@ -33,6 +32,7 @@ if TYPE_CHECKING:  # what a stage makes of a value is loaded with the stage
     from opl.planning.survey import NodeSurvey
     from opl.program.moves import Program
     from opl.proof.read_back import FileProof
+    from opl.report.packing import Packer
     from opl.run.watch import Stage
     from opl.verification.replay import Verification
 
@@ -69,12 +69,20 @@ class Prepared:
     Attributes:
         surfaced: The cutter points.
         problem: Nodes, clearances and scene.
-        fixed: The same work with the contact kept at t = 0, for comparison.
+        kept: The same work with the contact kept at t = 0, for comparison.
+        paper_start: The figures of what the paper's search finds from its own start node; None if
+            that is nothing.
     """
 
     surfaced: Surfaced
     problem: GrindingProblem
-    fixed: FixedContact
+    kept: Later[FixedContact]
+    paper_start: Later[Figures | None]
+
+    @property
+    def fixed(self) -> FixedContact:
+        """The same work with the contact kept at t = 0."""
+        return self.kept.value()
 
     @cached_property
     def survey(self) -> NodeSurvey:
@@ -86,20 +94,31 @@ class Prepared:
 
 
 @dataclass(frozen=True, eq=False)
-class Pictured:
-    """What pictures show of a planned motion, and those that are files of their own.
+class Charted:
+    """What charts show of a path, and those that are files of their own.
 
     Attributes:
         survey: Every node of the path's IK branch.
-        times: Moments of the motion in [s], ascending, shape (n,).
-        nearest: The nearest pair at each.
         charts: Pictures as SVG texts by file name.
     """
 
     survey: NodeSurvey
-    times: Array
-    nearest: Nearest
     charts: Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """What the viewer of a page draws of a run.
+
+    Attributes:
+        data: What it reads, by name.
+        packer: The arrays that this refers to.
+        chart: The cells of the contact chart as an image for HTML.
+    """
+
+    data: Mapping[str, Any]
+    packer: Packer
+    chart: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,29 +128,36 @@ class Planned:
     Attributes:
         prepared: What the search was given.
         plan: The path, and its motion as planned.
-        compared: The figures of this path and of those that it is compared with, by what they are:
-            ``fixed``, ``paper_start``, ``recursive``, ``optimal``; those that exist.
+        comparison: The figures of this path and of those that it is compared with, by what they
+            are: ``fixed``, ``paper_start``, ``recursive``, ``optimal``; those that exist.
         exact: The motion through all configurations that were looked at, in no digits.
         timed: The motion through the fewest positions that do, in the digits of the program, with
             its times.
         timing: What is written of it, move by move, and what sets the times.
         slow: Where the ground point is slower than the feed.
-        pictured: What pictures show of it, worked out when it is first asked for, or beside.
+        charted: What charts show of the path.
+        drawn: What the page of the run draws.
     """
 
     prepared: Prepared
     plan: Plan
-    compared: Mapping[str, Figures]
+    comparison: Later[Mapping[str, Figures]]
     exact: Motion
     timed: TimedMotion
     timing: Timing
     slow: tuple[SlowStretch, ...]
-    pictured: Beside[Pictured]
+    charted: Later[Charted]
+    drawn: Later[Drawn]
+
+    @property
+    def compared(self) -> Mapping[str, Figures]:
+        """The figures of this path and of those that it is compared with."""
+        return self.comparison.value()
 
     @property
     def survey(self) -> NodeSurvey:
         """Every node of the path's IK branch, for pictures."""
-        return self.pictured.value().survey
+        return self.charted.value().survey
 
     @property
     def surfaced(self) -> Surfaced:

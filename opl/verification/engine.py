@@ -44,4 +44,9 @@ def start() -> BulletClient:
     return client
 
 
-__all__ = ["BulletClient", "pybullet", "start"]
+def version() -> str:
+    """Return the version of the engine."""
+    return str(pybullet.getAPIVersion())
+
+
+__all__ = ["BulletClient", "pybullet", "start", "version"]

@@ -28,11 +28,14 @@ class Extreme:
 
 
 class Least:
-    """Keeps the least of what it is told."""
+    """Keeps the least of what it is told.
 
-    def __init__(self, motion: Motion, most: float = np.inf) -> None:
+    Args:
+        most: In [m]; what is not less is not kept.
+    """
+
+    def __init__(self, most: float = 0.0) -> None:
         self.amount = most
-        self._motion = motion
         self._found: tuple[str, int, Array] | None = None
 
     def note(self, amount: float, subject: str, move: int, q: Array) -> None:
@@ -40,9 +43,14 @@ class Least:
         if amount < self.amount:
             self.amount, self._found = amount, (subject, move, q)
 
-    def found(self, sign: float = 1.0) -> Extreme | None:
+    def add(self, other: Least) -> None:
+        """Take note of what was kept later."""
+        if other._found is not None:
+            self.note(other.amount, *other._found)
+
+    def found(self, motion: Motion, sign: float = 1.0) -> Extreme | None:
         """Return the least, times a sign; None if nothing was below the first value."""
         if self._found is None:
             return None
         subject, move, q = self._found
-        return Extreme(sign * self.amount, subject, self._motion.place(move), np.array(q))
+        return Extreme(sign * self.amount, subject, motion.place(move), np.array(q))

@@ -1,45 +1,25 @@
-"""Replay of a motion in PyBullet: a second opinion that shares no code with the planner.
-
-The controller moves all joints linearly between the configurations of the program, so that is what
-is replayed, densely: between two checked poses no corner of the held part's box moves more than
-`STEP` and no joint turns more than `TURN`.
-
-A pair of solids is measured only when it could have come too near: since it was last measured its
-distance cannot have shrunk by more than the joints between the two moved times their levers. That
-leaves out nothing; it covers the moves between the checked poses as well.
-"""
+"""Replay of a motion in PyBullet: a second opinion that shares no code with the planner."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.workcell import PART, WHEEL, WorkCell
-from opl.findings import Finding, Level
-from opl.geometry.frames import Array, transform
-from opl.geometry.mesh import box_corners
+from opl.cell.workcell import WorkCell
+from opl.files.beside import Beside
+from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
-from opl.motion.motion import Motion, MoveKind, TimedMotion, VerifiedMotion
-from opl.verification.extremes import Extreme, Least
+from opl.motion.motion import Motion, TimedMotion, VerifiedMotion
+from opl.verification.engine import version
+from opl.verification.extremes import Extreme
 from opl.verification.kinematic_checks import limit_findings, missing_points
+from opl.verification.stretch import HORIZON, Checked, Replaying
 from opl.verification.world import World
 
-STEP = 1e-3  # [m]
-TURN = np.deg2rad(0.5)
-HORIZON = 0.1  # [m] clearances beyond this are not measured, only known to be more
-AHEAD = 0.03  # [m] measured beyond what is needed: for that long a pair can be left alone after
-# Bullet's distance of a mesh from the rim of a cylinder is too large by up to 0.083 mm, too small
-# by 0.025 mm: 2000 random configurations each in the V and S cells, against the exact distance.
-# Whether the ground point lies on the wheel is checked without it
-GAP_ACCURACY = 1e-4  # [m]
-FARTHEST_GAP = 0.005  # [m] between part and wheel that is measured while grinding
-
-# What a kind of move means for the contact is written here anew: a mistake in `MoveKind` must not
-# go through the proof unseen.
-ON_WHEEL = (MoveKind.GRIND, MoveKind.BETWEEN)
-ALONG_LEAD = (MoveKind.APPROACH, MoveKind.RETRACT)
+AT_ONCE = 50  # moves of a stretch
 
 
 @dataclass(frozen=True)
@@ -84,6 +64,7 @@ def replay(
     timed: TimedMotion,
     max_contact_error: float,
     progress: Callable[[float], None] = lambda fraction: None,
+    beside: Beside | None = None,
 ) -> Verification:
     """Replay a motion and check collisions, contact, limits, speeds and completeness.
 
@@ -94,20 +75,21 @@ def replay(
         max_contact_error: Largest distance of the ground point from the wheel's surface allowed,
             in [m].
         progress: Called with the part of the motion that is done, 0 to 1.
+        beside: What may work beside this process, if anything.
     """
     motion = timed.motion
-    with World(cell) as world:
-        run = _Run(cell, world, points, motion, max_contact_error)
-        for move in range(len(motion)):
-            run.make_move(move)
-            if move % 50 == 0:
-                progress(move / len(motion))
-        version = world.version
+    given = cell, points, motion, max_contact_error
+    stretches = [
+        range(first, min(first + AT_ONCE, len(motion))) for first in range(0, len(motion), AT_ONCE)
+    ]
+    run, *others = (beside or Beside()).share(_replaying, given, stretches, progress)
+    for other in others:
+        run.add(other)
     limits = limit_findings(cell, timed)
     worst = (finding for _, finding in run.worst.values())
     findings = (*worst, *limits, *missing_points(points, motion))
     return Verification(
-        engine=f"PyBullet {version}",
+        engine=f"PyBullet {version()}",
         poses=run.poses,
         collisions=run.collisions,
         min_clearance=float(min(HORIZON, np.min(run.clearance))),
@@ -115,166 +97,17 @@ def replay(
         limit_violations=len(limits),
         findings=findings,
         verified=None if findings else VerifiedMotion(timed, run.clearance),
-        nearest=run.nearest.found(),
-        worst_contact=run.contact.found(-1.0),
-        deepest=run.gap.found(-1.0),
+        nearest=run.nearest.found(motion),
+        worst_contact=run.contact.found(motion, -1.0),
+        deepest=run.gap.found(motion, -1.0),
         allowed_penetration=cell.max_belt_penetration,
     )
 
 
-class _Run:
-    """One motion being replayed."""
-
-    def __init__(
-        self,
-        cell: WorkCell,
-        world: World,
-        points: CutterPoints,
-        motion: Motion,
-        max_contact_error: float,
-    ) -> None:
-        self.poses = 0
-        self.collisions = 0
-        self.nearest = Least(motion, HORIZON)
-        self.contact = Least(motion, 0.0)  # of the negative errors
-        self.gap = Least(motion, 0.0)  # between part and wheel where they may touch
-        # the worst finding of each kind, place and subject, and by how much it is wrong
-        self.worst: dict[tuple[str, str, int, str], tuple[float, Finding]] = {}
-        # of the move that ends at each configuration
-        self.clearance = np.full(len(motion), HORIZON)
-        self._cell = cell
-        self._points = points
-        self._world = world
-        self._motion = motion
-        self._allowed_error = max_contact_error
-        self._pairs = world.pairs()
-        self._needed = np.array([pair.clearance for pair in self._pairs])
-        self._counts = np.array([pair.counts for pair in self._pairs], dtype=bool)
-        self._levers = world.levers(self._pairs)
-        # what each pair is at least apart, as far as known, in [m]
-        self._apart = np.full(len(self._pairs), -np.inf)
-        self._corners = box_corners(cell.part.vertices)
-        self._q = motion.q[0]
-        self._at = transform(world.move_to(self._q), self._corners)
-        for name in world.surrounding():
-            self.collisions += 1
-            self._note("collision", 0, f"robot and {name}", np.inf, "one in the other")
-
-    def make_move(self, move: int) -> None:
-        """Go on to a configuration, checking the poses on the move."""
-        start, target = self._q, self._motion.q[move]
-        done = 0.0
-        stride = 1.0 / max(np.abs(target - start).max() / TURN, 1.0)
-        while done < 1.0:
-            # a stride that proves too long is shortened, one that proves short is lengthened
-            ahead = min(done + stride, 1.0)
-            if 1.0 - ahead < 1e-6:
-                ahead = 1.0
-            q = start + ahead * (target - start)
-            T_base_workpiece = self._world.move_to(q)
-            corners = transform(T_base_workpiece, self._corners)
-            moved = np.sqrt(np.square(corners - self._at).sum(axis=1).max()) / STEP
-            longest = max(moved, np.abs(q - self._q).max() / TURN)
-            stride = (ahead - done) * 0.95 / max(longest, 0.1)
-            if longest > 1.0:
-                continue
-            done = ahead
-            self._at = corners
-            self._check(move, q)
-            self._check_contact(move, done, T_base_workpiece)
-
-    def _check(self, move: int, q: Array) -> None:
-        """Check the pose that the world is in."""
-        self.poses += 1
-        self._apart -= self._levers @ np.abs(q - self._q)
-        self._q = q
-        hit = False
-        # near pairs are measured at every pose, so that the smallest clearance is found too; the
-        # nearest first: it leaves the least to measure of the others
-        most = np.maximum(self._needed, np.where(self._counts, self.clearance[move], 0.0))
-        near = np.flatnonzero(self._apart <= most)
-        for k in near[self._apart[near].argsort(kind="stable")].tolist():
-            pair = self._pairs[k]
-            wanted = max(pair.clearance, self.clearance[move] if self._counts[k] else 0.0)
-            if self._apart[k] > wanted:
-                continue
-            within = wanted + AHEAD
-            distance = self._world.distance(pair.first, pair.second, within + pair.rounding)
-            distance -= pair.rounding
-            self._apart[k] = min(distance, within)
-            names = f"{pair.first.name} and {pair.second.name}"
-            if self._counts[k]:
-                self.clearance[move] = min(self.clearance[move], distance)
-                self.nearest.note(distance, names, move, q)
-            if distance < pair.clearance or distance <= 0.0:
-                hit = True
-                self._too_near(move, names, distance, pair.clearance)
-        hit |= self._check_wheel(move)
-        self.collisions += hit
-
-    def _check_wheel(self, move: int) -> bool:
-        """Check part against wheel as bodies; return whether they collide."""
-        motion, cell = self._motion, self._cell
-        grinding = motion.kind[move] in ON_WHEEL
-        touching_down = grinding and motion.kind[move - 1] is MoveKind.APPROACH
-        free = not grinding and motion.kind[move] not in ALONG_LEAD
-        off_wheel = cell.pairs.required.get(frozenset((PART, WHEEL)), cell.required_clearance)
-        needed = off_wheel if free else -cell.max_belt_penetration
-        farthest = self._allowed_error + GAP_ACCURACY if grinding and not touching_down else np.inf
-        # where it may touch, what is not as deep as it ever was need not be known
-        counts = needed if free else max(needed, self.gap.amount)
-        gap = self._world.gap(farthest if farthest < np.inf else counts, counts)
-        if not free:
-            self.gap.note(gap, f"{PART} and {WHEEL}", move, self._q)
-        if gap < needed:
-            self._too_near(move, f"{PART} and {WHEEL}", gap, needed)
-            return True
-        if farthest < gap:
-            gap = min(self._world.gap(FARTHEST_GAP), FARTHEST_GAP)
-            self._contact_lost(move, gap, "part and wheel do not touch")
-        return False
-
-    def _check_contact(self, move: int, fraction: float, T_base_workpiece: Array) -> None:
-        """Check that the point to be ground lies on the wheel's surface.
-
-        `fraction` of the move is done; T_base_workpiece has shape (4, 4).
-        """
-        motion = self._motion
-        if motion.kind[move] not in ON_WHEEL:
-            return
-        place = motion.cutter_point[move]
-        if motion.kind[move - 1] in ON_WHEEL:
-            place -= (1.0 - fraction) * (place - motion.cutter_point[move - 1])
-        elif fraction < 1.0:
-            return  # touching down
-        points = self._points.Ts_workpiece_cutter[:, :3, 3]
-        before = int(place)
-        after = min(before + 1, len(points) - 1)
-        point = points[before] + (place - before) * (points[after] - points[before])
-        error = abs(self._world.distance_to_wheel(transform(T_base_workpiece, point)))
-        self.contact.note(-error, "ground point", move, self._q)
-        if error > self._allowed_error:
-            self._contact_lost(move, error, "ground point")
-
-    def _contact_lost(self, move: int, error: float, subject: str) -> None:
-        message = (
-            f"{1e3 * error:.3f} mm from the wheel's surface, "
-            f"{1e3 * self._allowed_error:g} mm allowed"
-        )
-        self._note("contact", move, subject, error, message)
-
-    def _too_near(self, move: int, subject: str, distance: float, needed: float) -> None:
-        message = (
-            f"{1e3 * distance:.2f} mm apart, {1e3 * needed:g} mm needed"
-            if distance > 0.0
-            else f"{-1e3 * distance:.2f} mm into each other"
-        )
-        self._note("collision", move, subject, needed - distance, message)
-
-    def _note(self, kind: str, move: int, subject: str, amount: float, message: str) -> None:
-        """Keep a finding if it is the worst of its kind, place and subject."""
-        motion = self._motion
-        key = kind, motion.kind[move].value, int(motion.pass_index[move]), subject
-        if key not in self.worst or amount > self.worst[key][0]:
-            finding = Finding(Level.ERROR, kind, motion.place(move), f"{subject}: {message}")
-            self.worst[key] = amount, finding
+@contextmanager
+def _replaying(
+    cell: WorkCell, points: CutterPoints, motion: Motion, max_contact_error: float
+) -> Iterator[Callable[[range], Checked]]:
+    """Open what replays stretches of a motion."""
+    with World(cell) as world:
+        yield Replaying(cell, world, points, motion, max_contact_error).checked

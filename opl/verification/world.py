@@ -204,11 +204,6 @@ class World(Arm):
         """Return how far a point is from the wheel's surface in [m], negative inside."""
         return float(self._drum.distances(p_base[None])[0][0])
 
-    @property
-    def version(self) -> str:
-        """Version of the engine."""
-        return str(pybullet.getAPIVersion())
-
     def levers(self, pairs: Sequence[SolidPair]) -> Array:
         """Return how far a turn of each joint by 1 rad can bring pairs together, in [m], (k, 6).
 

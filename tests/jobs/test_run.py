@@ -38,8 +38,8 @@ def test_every_stage_reports_from_its_begin_to_its_end(watched):
     run, seen = watched
     stages = [(stage, [f for _, f in part]) for stage, part in groupby(seen, lambda one: one[0])]
     assert [stage.value for stage, _ in stages] == [
-        "cutter_points", "nodes", "clearance", "comparison", "search", "comparison", "motion",
-        "verification", "export", "read_back", "export",
+        "cutter_points", "nodes", "clearance", "search", "motion", "verification", "export",
+        "read_back", "comparison", "export",
     ]  # fmt: skip
     for _, fractions in stages:
         assert fractions[0] == 0.0 and fractions[-1] == 1.0 and fractions == sorted(fractions)

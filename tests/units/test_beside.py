@@ -1,19 +1,33 @@
-"""Values worked out in a copy of the process: the same value whatever becomes of the copy."""
+"""Work done in a copy of the process: the same values whatever becomes of the copy."""
 
 import os
 import signal
 import threading
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 
-from opl.files.beside import Beside
+from opl.files import kernels
+from opl.files.beside import Beside, Later
 
 HERE = os.getpid()
+ENDS = {
+    "ends": lambda: os._exit(0),
+    "killed": lambda: os.kill(os.getpid(), signal.SIGKILL),
+    "terminated": lambda: os.kill(os.getpid(), signal.SIGTERM),
+    "raises": lambda: (_ for _ in ()).throw(MemoryError),
+}
 
 
-def where():
-    return os.getpid(), np.arange(3.0)
+def where(*given):
+    return os.getpid(), *given
+
+
+def ends(how):
+    if os.getpid() != HERE:
+        ENDS[how]()
+    return os.getpid()
 
 
 def gone(pid):
@@ -25,107 +39,206 @@ def gone(pid):
     return False
 
 
+def in_copy(later, *known):
+    """The value of what a copy was asked for."""
+    with Beside(True) as beside:
+        beside.start(*known)
+        beside.begin(later)
+        return later.value()
+
+
 def test_a_value_is_worked_out_in_another_process_once_and_the_process_is_gone():
-    beside = Beside(where)
-    with beside.begun():
-        pid, array = beside.value()
+    later = Later(where, np.arange(3.0))
+    pid, array = in_copy(later)
     assert pid != HERE and gone(pid)
-    assert beside.value()[1] is array
+    assert later.value()[1] is array
     np.testing.assert_array_equal(array, np.arange(3.0))
 
 
-def test_the_context_ends_with_the_value():
-    beside = Beside(where)
-    with beside.begun():
-        pass
-    assert beside.value()[0] != HERE
+def test_values_come_in_any_order_from_one_process():
+    laters = [Later(where, k) for k in range(3)]
+    with Beside(True) as beside:
+        beside.start()
+        for later in laters:
+            beside.begin(later)
+        (last, two), (first, zero) = laters[2].value(), laters[0].value()
+    assert first == last != HERE and (zero, two) == (0, 2)
 
 
-def test_without_a_context_or_leave_it_is_worked_out_here():
-    assert Beside(where).value()[0] == HERE
-    beside = Beside(where)
-    with beside.begun(allowed=False):
-        assert beside.value()[0] == HERE
+def test_without_a_copy_or_leave_it_is_worked_out_here():
+    assert Later(where).value() == (HERE,)
+    for beside in (Beside(True), Beside()):
+        later = Later(where)
+        with beside:
+            if not beside._allowed:
+                beside.start()
+            beside.begin(later)
+            assert later.value() == (HERE,)
 
 
 def test_beside_threads_it_is_worked_out_here():
     ended = threading.Event()
     thread = threading.Thread(target=ended.wait)
     thread.start()
-    beside = Beside(where)
     try:
-        with beside.begun():
-            assert beside.value()[0] == HERE
+        assert in_copy(Later(where)) == (HERE,)
     finally:
         ended.set()
         thread.join()
 
 
-@pytest.mark.parametrize(
-    "end",
-    [
-        lambda: os._exit(0),
-        lambda: os.kill(os.getpid(), signal.SIGKILL),
-        lambda: os.kill(os.getpid(), signal.SIGTERM),
-        lambda: (_ for _ in ()).throw(MemoryError),
-    ],
-    ids=["ends", "killed", "terminated", "raises"],
-)
-def test_what_a_process_does_not_answer_is_worked_out_here(end):
-    def work():
-        if os.getpid() != HERE:
-            end()
-        return os.getpid()
-
-    beside = Beside(work)
-    with beside.begun():
-        assert beside.value() == HERE
+@pytest.mark.parametrize("how", list(ENDS))
+def test_what_a_process_does_not_answer_is_worked_out_here(how):
+    first, second = Later(ends, how), Later(where)
+    with Beside(True) as beside:
+        beside.start()
+        beside.begin(first)
+        beside.begin(second)
+        assert first.value() == HERE
+        assert second.value() == (HERE,)
+        after = Later(where)
+        beside.begin(after)
+        assert after.value() == (HERE,)
 
 
-def test_what_cannot_leave_the_process_is_worked_out_here():
-    beside = Beside(lambda: lambda: 7)
-    with beside.begun():
-        assert beside.value()() == 7
+def test_what_cannot_be_passed_on_is_worked_out_here():
+    assert in_copy(Later(lambda: 7)) == 7  # the question
+    assert in_copy(Later(make_function))() == 7  # the answer
+
+
+def make_function():
+    return lambda: 7
+
+
+def stumble():
+    raise ValueError("seven")
 
 
 def test_an_error_is_raised_where_the_value_is_asked_for():
-    def work():
-        raise ValueError("seven")
+    with pytest.raises(ValueError, match="seven"):
+        in_copy(Later(stumble))
 
-    beside = Beside(work)
-    with pytest.raises(ValueError, match="seven"), beside.begun():
-        beside.value()
+
+def tell(writer):
+    os.write(writer, str(os.getpid()).encode())
+    signal.pause()
 
 
 def test_an_exception_in_the_context_ends_the_process():
     reader, writer = os.pipe()
-
-    def work():
-        os.write(writer, str(os.getpid()).encode())
-        signal.pause()
-
-    with pytest.raises(KeyError), Beside(work).begun():
+    with pytest.raises(KeyError), Beside(True) as beside:
+        beside.start()
+        beside.begin(Later(tell, writer))
         pid = int(os.read(reader, 20))
         assert not gone(pid)
         raise KeyError
     assert gone(pid)
 
 
-def test_answers_larger_than_a_pipe_come_whole():
-    beside = Beside(lambda: (os.getpid(), b"x" * 5_000_000))
-    with beside.begun():
-        pid, content = beside.value()
+def test_questions_and_answers_larger_than_a_pipe_come_whole():
+    pid, content = in_copy(Later(where, b"x" * 5_000_000))
     assert pid != HERE and len(content) == 5_000_000
+
+
+class Untouchable:
+    def __reduce__(self):
+        raise AssertionError("it is known and need not be passed on")
+
+
+def test_what_is_known_is_not_passed_on():
+    known = Untouchable()
+    pid, same, asked = in_copy(Later(where, known, [known]), known)
+    assert pid != HERE and same is known and asked == [known]
+
+
+def test_what_is_worked_out_from_another_value_in_the_copy_finds_it_there():
+    first = Later(where)
+    second = Later(from_another, first)
+    with Beside(True) as beside:
+        beside.start()
+        beside.begin(first)
+        beside.begin(second)
+        assert second.value() == first.value()[0] != HERE
+
+
+def from_another(first):
+    return first.value()[0]
 
 
 def test_handlers_of_this_process_do_not_run_in_the_copy():
     reader, writer = os.pipe()
     before = signal.signal(signal.SIGTERM, lambda *_: os.write(writer, b"handled"))
     try:
-        beside = Beside(lambda: os.kill(os.getpid(), signal.SIGTERM) if os.getpid() != HERE else 7)
-        with beside.begun():
-            assert beside.value() == 7
+        assert in_copy(Later(ends, "terminated")) == HERE
         os.write(writer, b"nothing")
         assert os.read(reader, 20) == b"nothing"
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def test_a_copy_calls_no_kernel_with_threads():
+    assert kernels.threads_are_allowed()
+    assert in_copy(Later(kernels.threads_are_allowed)) is False
+
+
+# shared work
+
+
+@contextmanager
+def squaring(first, stop=None):
+    """Take a moment for each item, so that there is time for both; end the copy at an item."""
+
+    def square(item):
+        threading.Event().wait(0.02)
+        if item == stop and os.getpid() != HERE:
+            os._exit(1)
+        return item * item, os.getpid(), first
+
+    yield square
+
+
+def shared(count, *given, wait=False):
+    seen = []
+    with Beside(True) as beside:
+        beside.start()
+        if wait:
+            ready = Later(where)
+            beside.begin(ready)
+            ready.value()
+        made = beside.share(squaring, given, list(range(count)), seen.append)
+    assert [square for square, _, _ in made] == [k * k for k in range(count)]
+    assert seen == sorted(seen) and all(0.0 <= part < 1.0 for part in seen)
+    return {pid for _, pid, _ in made}
+
+
+def test_items_are_worked_on_in_both_processes_and_come_in_order():
+    assert len(shared(20, "given", wait=True)) == 2
+
+
+def test_items_are_worked_on_here_where_there_is_no_copy():
+    made = Beside().share(squaring, (0,), [3, 4])
+    assert made == [(9, HERE, 0), (16, HERE, 0)]
+    assert Beside().share(squaring, (0,), []) == []
+
+
+def test_items_that_a_copy_took_with_it_are_worked_on_here():
+    assert shared(20, "given", 5, wait=True) <= {HERE}
+
+
+def test_a_copy_that_is_busy_is_not_waited_for():
+    reader, writer = os.pipe()
+    with Beside(True) as beside:
+        beside.start()
+        beside.begin(Later(tell, writer))
+        os.read(reader, 20)
+        assert {pid for _, pid, _ in beside.share(squaring, (0,), [1, 2, 3])} == {HERE}
+
+
+def test_lists_that_are_shared_one_after_the_other_do_not_mix():
+    with Beside(True) as beside:
+        beside.start()
+        for count in (1, 5, 0, 7):
+            made = beside.share(squaring, (count,), list(range(count)))
+            assert [(square, given) for square, _, given in made] == [
+                (k * k, count) for k in range(count)
+            ]
