@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from opl.cell.collision import CollisionScene
+from opl.cell.collision import BodyPair, CollisionScene
 from opl.cell.wheel_distance import PartTree
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
@@ -75,6 +75,10 @@ class FreeMoveSearch:
     def joined(self, first: Array, second: Array) -> bool:
         """Return whether the straight move between two configurations is free."""
         return self._moves.free(first, second)
+
+    def blocked_at(self, q: Array) -> BodyPair | None:
+        """Return a pair that keeps a free move from beginning at ``q``, shape (6,), or None."""
+        return self._moves.pair_at(q)
 
     def _find(self, start: Array, goal: Array) -> Array:
         if self.joined(start, goal):

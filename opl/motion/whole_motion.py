@@ -7,6 +7,8 @@ Where a job wants it, the robot comes home between passes too.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from opl.cell.full_turns import principal
@@ -53,7 +55,7 @@ def whole_motion(
     points: CutterPoints,
     path: GrindingPath,
     process: ProcessSettings,
-    runs: Array | None = None,
+    leads: Sequence[tuple[Array, Array]] | None = None,
 ) -> Motion:
     """Join the passes of a path into one motion from home to home, its free moves straight.
 
@@ -62,23 +64,26 @@ def whole_motion(
         points: The cutter points.
         path: The path.
         process: How the part comes to the wheel and leaves it.
-        runs: How far it moves on along each pass in its approach and retract in [m], shape
-            (n_passes, 2); as the process says by default.
+        leads: The configurations of approach and retract of each pass, off the wheel first, each
+            of shape (k, 6); whole ones as the process says by default.
 
     Raises:
         UnreachableApproachError: If an approach or retract leaves reach or limits.
     """
-    if runs is None:
-        runs = np.full((points.n_passes, 2), process.approach_run)
-
     home = Motion.off_wheel(process.home[None], MoveKind.HOME, -1)
     parts = [home]
     for index in range(points.n_passes):
         on_pass = np.flatnonzero(path.pass_index == index)
-        lead_in, lead_out = (
-            lead_at(cell, points, path, process, kind, index, run)
-            for kind, run in zip((MoveKind.APPROACH, MoveKind.RETRACT), runs[index], strict=True)
-        )
+        if leads is None:
+            lead_in, lead_out = (
+                lead(
+                    cell, points, process, kind, path.ik_branch, int(path.cutter_point[k]),
+                    float(path.contact_position[k]), path.q[k],
+                )
+                for kind, k in ((MoveKind.APPROACH, on_pass[0]), (MoveKind.RETRACT, on_pass[-1]))
+            )  # fmt: skip
+        else:
+            lead_in, lead_out = leads[index]
         free = MoveKind.HOME if index == 0 else MoveKind.LINK
         place = path.cutter_point[on_pass]
         if process.home_between and index > 0:
@@ -116,26 +121,6 @@ def linked(motion: Motion, search: FreeMoveSearch) -> Motion:
     return motion.with_inserted(before, np.concatenate(inserted)) if len(before) else motion
 
 
-def lead_at(
-    cell: WorkCell,
-    points: CutterPoints,
-    path: GrindingPath,
-    process: ProcessSettings,
-    kind: MoveKind,
-    pass_index: int,
-    run: float,
-) -> Array:
-    """Return an approach or retract of a path, as `lead` does; its run is in [m].
-
-    Raises:
-        UnreachableApproachError: If it leaves reach or limits.
-    """
-    on_pass = np.flatnonzero(path.pass_index == pass_index)
-    k = int(on_pass[0] if kind is MoveKind.APPROACH else on_pass[-1])
-    column, t = int(path.cutter_point[k]), float(path.contact_position[k])
-    return lead(cell, points, process, kind, path.ik_branch, column, t, path.q[k], run)
-
-
 def lead(
     cell: WorkCell,
     points: CutterPoints,
@@ -155,6 +140,29 @@ def lead(
     Raises:
         UnreachableApproachError: If it leaves reach or limits.
     """
+    q, cause = reachable_lead(
+        cell, points, process, kind, ik_branch, column, contact_position, q_contact, run
+    )
+    if cause is not None:
+        raise UnreachableApproachError(column, cause)
+    return q
+
+
+def reachable_lead(
+    cell: WorkCell,
+    points: CutterPoints,
+    process: ProcessSettings,
+    kind: MoveKind,
+    ik_branch: int,
+    column: int,
+    contact_position: float,
+    q_contact: Array,
+    run: float | None = None,
+) -> tuple[Array, str | None]:
+    """Return a lead as `lead` does, as far as it is within reach and limits, and what ends it.
+
+    That is None where it is there as a whole, else ``reach`` or ``limits`` with those by name.
+    """
     offsets = process.lead_shape(run).offsets(kind, points.direction_at(column))
     T_contact_away = np.tile(np.eye(4), (len(offsets), 1, 1))
     T_contact_away[:, :3, 3] = offsets
@@ -163,11 +171,13 @@ def lead(
     T_contact_flange = np.linalg.solve(T_base_contact, T_base_flange)
     Ts_base_flange = T_base_contact @ T_contact_away @ T_contact_flange
     solutions = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_contact)[:, ik_branch]
-    if np.isnan(solutions).any():
-        raise UnreachableApproachError(column, "reach")
+    out_of_reach = np.isnan(solutions).any(axis=1)
+    cause = "reach" if out_of_reach.any() else None
+    solutions = solutions[: int(np.argmax(out_of_reach)) if cause else None]
     steps = principal(np.diff(solutions, axis=0, prepend=q_contact[None]))
     q = q_contact + np.cumsum(steps, axis=0)
-    if not cell.within_limits(q).all():
-        names = " ".join(cell.broken_limits(q))
-        raise UnreachableApproachError(column, f"limits of {names}")
-    return q
+    within = cell.within_limits(q)
+    if not within.all():
+        cause = f"limits of {' '.join(cell.broken_limits(q))}"
+        q = q[: int(np.argmin(within))]
+    return q, cause

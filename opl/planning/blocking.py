@@ -14,7 +14,7 @@ from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
 from opl.motion.collision_check import CollidingMove
 from opl.motion.motion import Motion, MoveKind
-from opl.motion.whole_motion import UnreachableApproachError, lead
+from opl.motion.whole_motion import UnreachableApproachError
 from opl.planning.filling import BrokenEdgeError
 from opl.planning.open_matrix import FreeMove, OpenMatrix
 from opl.planning.problem import GrindingProblem
@@ -130,10 +130,10 @@ def _away(
     problem: GrindingProblem, matrix: OpenMatrix, kind: MoveKind, column: int, row: int
 ) -> Array | None:
     """Return where approach or retract of a node is farthest off, None if it cannot be made."""
-    cell, points, process, nodes = problem.cell, problem.points, problem.process, matrix.nodes
-    t, q = nodes.contact_position[column, row], nodes.at(column, row)
+    nodes, leads = matrix.nodes, problem.scene.free_leads
+    t, q = float(nodes.contact_position[column, row]), nodes.at(column, row)
     try:
-        away = lead(cell, points, process, kind, nodes.ik_branch, column, t, q)
+        away = leads.find(problem.points, problem.process, kind, nodes.ik_branch, column, t, q)
     except UnreachableApproachError:
         return None
     return np.asarray(away[-1])

@@ -9,6 +9,7 @@ from opl.cell.collision import CollisionScene
 from opl.cell.wheel_distance import PartTree, part_tree
 from opl.cell.workcell import WorkCell
 from opl.motion.collision_check import MoveCheck
+from opl.motion.free_leads import FreeLeads
 from opl.motion.free_move_search import FreeMoveSearch
 
 # what makes a unit of work, which is counted so that it is the same on any machine
@@ -39,6 +40,11 @@ class PlanningScene:
     def free_moves(self) -> FreeMoveSearch:
         """Free moves of this scene, and what has been learnt of them."""
         return FreeMoveSearch(self.cell, self.collision, self.part)
+
+    @cached_property
+    def free_leads(self) -> FreeLeads:
+        """Leads of this scene that are as long as they are free."""
+        return FreeLeads(self.cell, self.collision, self.part, self.free_moves)
 
     @cached_property
     def moves(self) -> MoveCheck:

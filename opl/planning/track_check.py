@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.motion.collision_check import CollidingMove
-from opl.motion.lead_runs import free_runs
 from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
 from opl.motion.whole_motion import (
@@ -72,9 +71,9 @@ def check_path(problem: GrindingProblem, path: GrindingPath) -> Free | Blocked:
     """Return the motion of a path if it is free, else what blocks it."""
     scene = problem.scene
     cell, points, process = scene.cell, problem.points, problem.process
-    runs = free_runs(cell, scene.collision, scene.part, points, path, process)
     try:
-        motion = whole_motion(cell, points, path, process, runs)
+        leads = scene.free_leads.of_path(points, path, process)
+        motion = whole_motion(cell, points, path, process, leads)
     except UnreachableApproachError as error:
         return NoMotion(error)
     faults = scene.moves.colliding(motion)

@@ -1,0 +1,124 @@
+"""Leads as long as they are free: as far as the job says, or less.
+
+Beyond the end of a pass the surface may rise, or the part may end in a corner. There the run along
+the pass is halved, twice at the most; the least leaves the wheel as steeply as a lead ever does.
+Where no run makes the whole lead free, because the robot folds up or comes to a limit on its way
+off the wheel, the lead ends before: at the last configuration from which a free move may begin.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from opl.cell.collision import CollisionScene
+from opl.cell.wheel_distance import PartTree
+from opl.cell.workcell import WorkCell
+from opl.geometry.frames import Array
+from opl.geometry.toolpath import CutterPoints
+from opl.motion.collision_check import colliding_moves
+from opl.motion.free_move_search import FreeMoveSearch
+from opl.motion.motion import Motion, MoveKind
+from opl.motion.path import GrindingPath
+from opl.motion.process_settings import ProcessSettings
+from opl.motion.whole_motion import lead, reachable_lead
+
+SHARES = (1.0, 0.5, 0.25)  # of the run that the process sets
+
+
+class FreeLeads:
+    """The leads of one cell, and those that were found.
+
+    Args:
+        cell: The cell.
+        scene: Its collision geometry.
+        part: The triangles of the part.
+        free_moves: Tells where a free move may begin.
+    """
+
+    def __init__(
+        self, cell: WorkCell, scene: CollisionScene, part: PartTree, free_moves: FreeMoveSearch
+    ) -> None:
+        self._cell, self._scene, self._part = cell, scene, part
+        self._free_moves = free_moves
+        self._known: dict[tuple[object, ...], Array] = {}
+
+    def of_path(
+        self, points: CutterPoints, path: GrindingPath, process: ProcessSettings
+    ) -> list[tuple[Array, Array]]:
+        """Return approach and retract of each pass of a path, as `find` does.
+
+        Raises:
+            UnreachableApproachError: As `find` does.
+        """
+        leads = []
+        for index in range(points.n_passes):
+            on_pass = np.flatnonzero(path.pass_index == index)
+            lead_in, lead_out = (
+                self.find(
+                    points, process, kind, path.ik_branch, int(path.cutter_point[k]),
+                    float(path.contact_position[k]), path.q[k],
+                )
+                for kind, k in ((MoveKind.APPROACH, on_pass[0]), (MoveKind.RETRACT, on_pass[-1]))
+            )  # fmt: skip
+            leads.append((lead_in, lead_out))
+        return leads
+
+    def find(
+        self,
+        points: CutterPoints,
+        process: ProcessSettings,
+        kind: MoveKind,
+        ik_branch: int,
+        column: int,
+        contact_position: float,
+        q_contact: Array,
+    ) -> Array:
+        """Return configurations from just off the wheel to the far end of a lead, shape (k, 6).
+
+        The lead with the longest run that is free as a whole; where none is, what is free of the
+        one that comes farthest; where none comes anywhere, that of the shortest run.
+
+        Args:
+            points: The cutter points.
+            process: How far leads should lead.
+            kind: Whether it is the approach or the retract.
+            ik_branch: The inverse solution.
+            column: The cutter point.
+            contact_position: Where it is ground in belt units.
+            q_contact: There, in [rad], shape (6,).
+
+        Raises:
+            UnreachableApproachError: If nothing of it is free and it leaves reach or limits.
+        """
+        key = (
+            process.lead_shape(), kind, ik_branch, points.Ts_workpiece_cutter[column].tobytes(),
+            points.direction_at(column), column, contact_position, q_contact.tobytes(),
+        )  # fmt: skip
+        if key not in self._known:
+            at = kind, ik_branch, column, contact_position, q_contact
+            best, farthest = None, 0.0
+            for run in np.array(SHARES) * process.approach_run:
+                q, cause = reachable_lead(self._cell, points, process, *at, run)
+                free = self._free_moves_of(q_contact, q, kind)
+                if cause is None and free == len(q):
+                    best = q
+                    break
+                while free and self._free_moves.blocked_at(q[free - 1]) is not None:
+                    free -= 1
+                away = process.lead_shape(run).places()[free - 1] if free else 0.0
+                if away > farthest:
+                    best, farthest = q[:free], float(away)
+            if best is None:
+                shortest = SHARES[-1] * process.approach_run
+                best = lead(self._cell, points, process, *at, shortest)
+            self._known[key] = best
+        return self._known[key]
+
+    def _free_moves_of(self, q_contact: Array, q: Array, kind: MoveKind) -> int:
+        """Return how many moves of a lead are free before one is not."""
+        if not len(q):
+            return 0
+        # the same configurations either way round
+        motion = Motion.off_wheel(np.vstack([q_contact, q]), kind, 0)
+        faults = colliding_moves(self._cell, self._scene, self._part, motion)
+        return max(faults[0].move - 1, 0) if faults else len(q)

@@ -1,0 +1,65 @@
+"""Approaches and retracts that are as long as they are free."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from opl.motion.motion import MoveKind
+from opl.motion.whole_motion import UnreachableApproachError, lead, whole_motion
+from opl.planning.track_check import Free, check_path
+from tests.support.planned import small_plan, small_problem, with_problem_cell
+
+
+def asked_for(problem, path, kind):
+    k = -1 if kind is MoveKind.RETRACT else 0
+    at = int(path.cutter_point[k]), float(path.contact_position[k]), path.q[k]
+    return problem.points, problem.process, kind, path.ik_branch, *at
+
+
+def found_of(problem, path, kind=MoveKind.RETRACT):
+    return problem.scene.free_leads.find(*asked_for(problem, path, kind))
+
+
+def whole_of(problem, path, kind=MoveKind.RETRACT):
+    return lead(problem.cell, *asked_for(problem, path, kind))
+
+
+def with_lower_limit(problem, joint, least):
+    lower = problem.cell.robot.lower.copy()
+    lower[joint] = least
+    robot = replace(problem.cell.robot, lower=lower)
+    return with_problem_cell(problem, replace(problem.cell, robot=robot))
+
+
+def test_a_lead_that_is_free_is_as_long_as_the_job_says():
+    problem = small_problem()
+    for kind in (MoveKind.APPROACH, MoveKind.RETRACT):
+        path = small_plan().path
+        np.testing.assert_array_equal(found_of(problem, path, kind), whole_of(problem, path, kind))
+
+
+def test_a_lead_ends_before_a_limit_where_a_free_move_may_begin():
+    problem, path = small_problem(), small_plan().path
+    whole = whole_of(problem, path)
+    least = whole[-1, 2] + 0.3 * (whole[0, 2] - whole[-1, 2])
+    shut = with_lower_limit(problem, 2, least)
+    with pytest.raises(UnreachableApproachError):
+        whole_motion(shut.cell, shut.points, path, shut.process)
+    found = found_of(shut, path)
+    assert 0 < len(found) < len(whole)
+    assert found[:, 2].min() >= least
+    assert shut.scene.free_moves.blocked_at(found[-1]) is None
+    checked = check_path(shut, path)
+    assert isinstance(checked, Free)
+    retract = [q for q, kind in zip(checked.motion.q, checked.motion.kind, strict=True)
+               if kind is MoveKind.RETRACT]  # fmt: skip
+    np.testing.assert_array_equal(np.array(retract[-len(found) :]), found)
+
+
+def test_a_lead_of_which_nothing_is_free_is_refused():
+    problem, path = small_problem(), small_plan().path
+    whole = whole_of(problem, path)
+    shut = with_lower_limit(problem, 2, whole[0, 2] + 1e-6)
+    checked = check_path(shut, path)
+    assert str(checked.error).endswith("limits of U")
