@@ -10,7 +10,7 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.families import GROWN, Placement
-from opl.planning.images import Seams
+from opl.planning.images import Seams, wrist_flips
 from opl.planning.nodes import inverse_solutions
 from opl.planning.problem import GrindingProblem, wheel_distances
 from opl.planning.turned import blocks_of
@@ -19,6 +19,7 @@ from opl.search.in_box import missing_chords, nearest_points, sampled
 
 FINE = 33  # contact positions of a place at which a box is held against it
 POSTURES_OF_WORK = 400  # that cost a unit of work
+CLOSER = 2  # times that places are sampled closer where collisions begin
 BORDER = 1e-2  # belt units to look beyond what lies in the box
 
 
@@ -66,6 +67,8 @@ class ColumnSampler:
         self._problem = problem
         self._seams = seams
         self.collisions = False  # whether postures that collide are left out
+        self.mirrored = False  # whether they are those with the wrist flipped that may not collide
+        self.flips = wrist_flips(problem.cell.robot.arm)
         self.work = 0.0  # what was sampled so far, in units of work
 
     def columns(self, box: JointBox, placements: Sequence[Placement], places: Array) -> Columns:
@@ -92,6 +95,10 @@ class ColumnSampler:
         columns = self._closer(self.at(places, there, placements, t), box)
         if self.collisions:
             self._leave_out_collisions(columns, box)
+            # where collisions begin is seen at the samples only
+            for _ in range(CLOSER):
+                columns = self._closer(columns, box)
+                self._leave_out_collisions(columns, box)
         return columns
 
     def _closer(self, columns: Columns, box: JointBox) -> Columns:
@@ -173,8 +180,9 @@ class ColumnSampler:
         )
 
     def collides(self, q: Array) -> np.ndarray:
-        """Return which postures collide, q in [rad], shape (n, 6)."""
-        return self._problem.scene.collision.collides(q)
+        """Return which postures collide, or mirrored do, q in [rad], shape (n, 6)."""
+        sign, shift = self.flips[self.mirrored]
+        return self._problem.scene.collision.collides(q * sign + shift)
 
     def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m).

@@ -17,7 +17,6 @@ from opl.geometry.frames import Array
 from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.costs import track_cost
 from opl.planning.filling import BrokenEdgeError, fill_in
-from opl.planning.images import wrist_flips
 from opl.planning.nodes import NodeField, NodeMatrix
 from opl.planning.open_matrix import Track, open_matrices
 from opl.planning.plan import Found, Plan, propose_and_check
@@ -267,7 +266,10 @@ class _Sampled:
         """Return the matrices that make these postures elsewhere in joint space, best first."""
         problem = self._search._problem
         robot = problem.cell.robot
-        flips = [(4 * k, *flip) for k, flip in enumerate(wrist_flips(robot.arm))]
+        sampler = self._search.sampler
+        flips = [(4 * k, *flip) for k, flip in enumerate(sampler.flips)]
+        if sampler.collisions:
+            flips = [flips[sampler.mirrored]]
         found: list[tuple[float, int, NodeMatrix]] = []
         family = self._columns.placements[0].family
         index = np.arange(q.shape[1])

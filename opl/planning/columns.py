@@ -117,6 +117,25 @@ class ColumnWalls:
             pieces = list(self._pieces(self._cells(T_workpiece_cutter[None], [grid], [none]), 0))
         return tuple(found for found in pieces if found.family == piece.family)
 
+    def postures(self, piece: Piece, at: Array) -> Array:
+        """Return the joint positions along a piece in [rad], NaN where there are none.
+
+        Args:
+            piece: The piece.
+            at: Places along it, shape (n,).
+
+        Returns:
+            Shape (n, 6), the full turns as those of the chords.
+        """
+        cell, line = self._cell, piece.line
+        if line.T_workpiece_cutter is None:
+            Ts = cell.Ts_base_flange(line.contact_position, self._points.frames_at(at))
+        else:
+            Ts = cell.Ts_base_flange(at, line.T_workpiece_cutter)
+        q = inverse_kinematics(cell.robot.arm, Ts)[:, piece.family]
+        chords = np.stack([np.interp(at, piece.at, joint) for joint in piece.corners.T], axis=1)
+        return np.asarray(q + 2.0 * np.pi * np.round((chords - q) / (2.0 * np.pi)))
+
     def _rows(self, grids: list[Array], contact_positions: list[float]) -> list[list[Piece]]:
         """Return the pieces along places, each at one contact position."""
         none = [np.zeros(len(grid) - 1, dtype=bool) for grid in grids]
@@ -172,7 +191,8 @@ class ColumnWalls:
                 off_low, off_high = enclosing(corners, middle, radius)
                 pad_low = np.where(sure, np.maximum(pad_low, off_low), off_low)
                 pad_high = np.where(sure, np.minimum(pad_high, off_high), off_high)
-                piece = Piece(family, line, t[low : high + 1], corners, pad_low, pad_high)
+                bends = sure.all(axis=1)
+                piece = Piece(family, line, t[low : high + 1], corners, pad_low, pad_high, bends)
                 yield from self._within_limits(piece)
 
     def _within_limits(self, piece: Piece) -> Iterator[Piece]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.search.cells import Clear
+from opl.search.cells import Forbidden
 from opl.search.least_box import BoxProof
 from opl.search.walls import Image, Piece, Wall
 
@@ -48,7 +48,7 @@ def holders(
     images: Callable[[int], Sequence[Image]],
     cut: Callable[[Piece, int], Sequence[Piece]],
     value: float,
-    clear: Clear | None = None,
+    forbidden: Forbidden | None = None,
 ) -> tuple[Holder, ...]:
     """Return what holds the least box over some walls up, what could gain most first.
 
@@ -57,9 +57,9 @@ def holders(
         images: The images of each family.
         cut: Cuts a cell of a wall into smaller ones.
         value: Size of a box that is large enough, in [rad].
-        clear: Leaves cells out that are forbidden.
+        forbidden: Tells which parts of cells are forbidden.
     """
-    _, prices = _least(walls, images, cut, value, clear)
+    _, prices = _least(walls, images, cut, value, forbidden)
     pressing = np.argsort(-prices.sum(axis=1), kind="stable")[:MOST_HOLDERS].tolist()
     found = []
     for k in pressing:
@@ -68,7 +68,7 @@ def holders(
         if not held:
             continue
         others = [wall for index, wall in enumerate(walls) if index != k]
-        without, _ = _least(others, images, cut, value, clear)
+        without, _ = _least(others, images, cut, value, forbidden)
         found.append(Holder(walls[k].place, walls[k].pass_index, held, without))
     return tuple(sorted(found, key=lambda one: one.bound_without))
 
@@ -78,13 +78,13 @@ def _least(
     images: Callable[[int], Sequence[Image]],
     cut: Callable[[Piece, int], Sequence[Piece]],
     value: float,
-    clear: Clear | None = None,
+    forbidden: Forbidden | None = None,
 ) -> tuple[float, Array]:
     """Return what no box over walls is smaller than, and how hard each presses on the least one.
 
     On the two faces of each joint, shape (n_walls, 6); 0 where the least box was not found.
     """
-    proof = BoxProof(images, cut, value * (1.0 + GAP), GAP / 2.0, clear)
+    proof = BoxProof(images, cut, value * (1.0 + GAP), GAP / 2.0, forbidden)
     for wall in walls:
         proof.add(wall)
     while not proof.closed:

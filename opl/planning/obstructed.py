@@ -6,15 +6,34 @@ can come apart within the cell.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from opl.cell.collision import CollisionScene
 from opl.geometry.frames import Array
+from opl.planning.columns import ColumnWalls
 from opl.planning.cut_cells import halved
-from opl.planning.images import Images
 from opl.search.walls import Piece
 
-MOST_WITHIN = 2  # halvings of a cell all in collision, but not deep enough to be sure
+WITHIN = (
+    2,
+    6,
+)  # halvings of a cell all in collision, but not deep enough to be sure: at first, later
+AROUND = 16  # cells on either side of those asked about that are looked at as well, at first
+
+
+@dataclass
+class _Known:
+    """What is known of a piece: how often each cell was looked at, and which part of it is left.
+
+    That is in fractions of the cell. And the piece: while it is kept, no other has its place.
+    """
+
+    piece: Piece
+    low: Array
+    high: Array
+    looks: np.ndarray
 
 
 class Obstructions:
@@ -22,58 +41,77 @@ class Obstructions:
 
     Args:
         collision: The scene; motions that come nearer than its clearances do not count.
-        images: The images of each posture: those with the wrist flipped are looked at as well.
+        walls: Where the pieces are from. Those with the wrist flipped collide elsewhere.
     """
 
-    def __init__(self, collision: CollisionScene, images: Images) -> None:
+    def __init__(self, collision: CollisionScene, walls: ColumnWalls) -> None:
         self._collision = collision
-        self._flips = images.flips
-        self._known: dict[int, tuple[Piece, dict[tuple[float, float], list[bool]]]] = {}
+        self._walls = walls
+        self._flips = walls.images.flips
+        self._known: dict[tuple[int, int], _Known] = {}
 
-    def clear(self, piece: Piece, first: int, end: int) -> list[Piece] | None:
-        """Return what is left of the cells from ``first`` to before ``end``, None if all is."""
+    @property
+    def n_flips(self) -> int:
+        """How many flips of the wrist a posture has."""
+        return len(self._flips)
+
+    def clear(
+        self, piece: Piece, flip: int, first: int, end: int, looks: int
+    ) -> tuple[Array, Array]:
+        """Return which part of each cell of a piece is not known to be forbidden.
+
+        Args:
+            piece: The piece.
+            flip: Which flip of its postures.
+            first: Cells from this one on are looked at,
+            end: to before this one.
+            looks: 1 to look at them, and those around them; 2 to look closer.
+
+        Returns:
+            Where it begins and ends in fractions of the cell, each of shape (n,); it ends before it
+            begins where nothing is left.
+        """
+        n = len(piece.pad_low)
+        known = self._known.get((id(piece), flip))
+        if known is None:
+            known = _Known(piece, np.zeros(n), np.ones(n), np.zeros(n, dtype=int))
+            self._known[id(piece), flip] = known
+        if (known.looks[first:end] < looks).any():
+            around = AROUND if looks == 1 else 0
+            self._look(known, max(first - around, 0), min(end + around, n), looks, flip)
+        return known.low, known.high
+
+    def _look(self, known: _Known, first: int, end: int, looks: int, flip: int) -> None:
+        """Look at the cells from ``first`` to before ``end``, but for those looked at before."""
+        piece, (sign, shift) = known.piece, self._flips[flip]
         pads = np.maximum(piece.pad_high, -piece.pad_low)
         step = np.diff(piece.corners, axis=0)
-        # by the piece itself: while it is kept here, no other one has its place in memory
-        _, known = self._known.setdefault(id(piece), (piece, {}))
 
         def surely(_: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
-            asked = list(zip(low.tolist(), high.tolist(), strict=True))
-            new = np.array([k for k, cell in enumerate(asked) if cell not in known], dtype=int)
-            if len(new):
-                middle = (low + high)[new] / 2.0
-                cell = middle.astype(int)
-                q = piece.corners[cell] + step[cell] * (middle - cell)[:, None]
-                turned = np.abs(step[cell]) * (high - low)[new, None] / 2.0 + pads[cell]
-                hit, near = self._collide(q, turned)
-                for k, *found in zip(new.tolist(), hit.tolist(), near.tolist(), strict=True):
-                    known[asked[k]] = found
-            both = np.array([known[cell] for cell in asked], dtype=bool)
-            return both[:, 0], both[:, 1]
+            middle, half = (low + high) / 2.0, (high - low)[:, None] / 2.0
+            cell = middle.astype(int)
+            q = piece.corners[cell] + step[cell] * (middle - cell)[:, None]
+            turned = np.abs(step[cell]) * half + pads[cell]
+            if looks > 1 and piece.bends is not None:
+                # from the curve itself, whose slope is that of the chord but for four pads a cell
+                at = piece.at[cell] + np.diff(piece.at)[cell] * (middle - cell)
+                on_curve = self._walls.postures(piece, at)
+                there = piece.bends[cell] & ~np.isnan(on_curve[:, 0])
+                q[there] = on_curve[there]
+                turned[there] = ((np.abs(step[cell]) + 4.0 * pads[cell]) * half)[there]
+            return self._collide(q * sign + shift, turned)
 
         # the cells beside tell where collisions begin
         cells = np.arange(max(first - 1, 0), min(end + 1, len(pads)), dtype=float)
         run = np.zeros(len(cells), dtype=int)
-        _, low, high, hit = halved(run, cells, cells + 1.0, surely, MOST_WITHIN)
-        own = (low >= first) & (high <= end)
-        low, high, hit = low[own], high[own], hit[own]
-        if not hit.any():
-            return None
+        _, low, high, hit = halved(run, cells, cells + 1.0, surely, WITHIN[looks - 1])
         cell = ((low + high) / 2.0).astype(int)
-        ends = np.append(low, high[-1])
-        places = np.arange(len(pads) + 1)
-        corners = np.stack([np.interp(ends, places, joint) for joint in piece.corners.T], axis=1)
-        at = np.interp(ends, places, piece.at)
-        finer = Piece(
-            piece.family, piece.line, at, corners, piece.pad_low[cell], piece.pad_high[cell]
-        )
-        breaks = np.flatnonzero(np.diff(hit)) + 1
-        starts = [0, *breaks.tolist()]
-        return [
-            finer.part(start, end)
-            for start, end in zip(starts, [*starts[1:], len(hit)], strict=True)
-            if not hit[start]
-        ]
+        new = np.zeros(len(pads), dtype=bool)
+        new[first:end] = known.looks[first:end] < looks
+        left = ~hit & new[cell]
+        known.looks[new], known.low[new], known.high[new] = looks, 1.0, 0.0
+        np.minimum.at(known.low, cell[left], (low - cell)[left])
+        np.maximum.at(known.high, cell[left], (high - cell)[left])
 
     def _collide(self, q: Array, turned: Array) -> tuple[np.ndarray, np.ndarray]:
         """Return where postures collide however they turn, and where they do as they are.
@@ -82,12 +120,7 @@ class Obstructions:
             q: In [rad], shape (n, 6).
             turned: How far each joint can turn from there in [rad], shape (n, 6).
         """
-        surely, near = np.ones(len(q), dtype=bool), np.ones(len(q), dtype=bool)
-        for sign, shift in self._flips:
-            flipped = q * sign + shift
-            now = np.flatnonzero(near)
-            near[now] = self._collision.collides(flipped[now])
-            surely &= near
-            now = np.flatnonzero(surely)
-            surely[now] = self._collision.collides_throughout(flipped[now], turned[now])
+        near = self._collision.collides(q)
+        surely = near.copy()
+        surely[near] = self._collision.collides_throughout(q[near], turned[near])
         return surely, near

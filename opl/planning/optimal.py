@@ -26,7 +26,7 @@ from opl.planning.rows import Bulge
 from opl.planning.settings import OptimalSettings
 from opl.planning.work import Work
 from opl.search.box import JointBox
-from opl.search.cells import Clear
+from opl.search.cells import Forbidden
 from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
 from opl.search.walls import Chain
@@ -75,7 +75,7 @@ class OptimalSearch:
         self._largest = largest
         self._proven = self._least_hope = 0.0
         self._given_up = 0
-        self._clear: Clear | None = None  # of collisions, once they are known to matter
+        self._forbidden: Forbidden | None = None  # of collisions, once they are known to matter
         self._early = 0.0  # work on early motions
         self.proof = BoxProof(images.of, self._walls.finer, largest, PROOF_SHARE * settings.widen)
         self._places: set[float] = set()
@@ -101,7 +101,7 @@ class OptimalSearch:
     @property
     def minds_collisions(self) -> bool:
         """Whether the proof rests on where the robot collides as well."""
-        return self._clear is not None
+        return self._forbidden is not None
 
     @property
     def open_because(self) -> str | None:
@@ -124,7 +124,7 @@ class OptimalSearch:
     def holders(self) -> tuple[Holder, ...]:
         """Return what holds the least box over the walls up."""
         walls, images = self.proof.walls, self._walls.images.of
-        return holders(walls, images, self._walls.finer, self._value, self._clear)
+        return holders(walls, images, self._walls.finer, self._value, self._forbidden)
 
     def step(self) -> None:
         """Work on one subproblem."""
@@ -135,6 +135,7 @@ class OptimalSearch:
         if candidate is None:
             return
         box = JointBox(candidate.low, candidate.high)
+        self._sampler.mirrored = candidate.mirrored
         share = MISSED * self._settings.widen if candidate.settled else CLEARLY_MISSED
         allowed = share * self.proof.threshold
         placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
@@ -163,10 +164,13 @@ class OptimalSearch:
             self._add(missed)
             self.proof.put_back()
             return
-        if looked_at is not None and self._try(*looked_at):
+        learnt = looked_at is not None and self._try(*looked_at)
+        if learnt or self.proof.outdated:
             self.proof.put_back()
         elif candidate.bound < self.proof.closing and not self._sampler.collisions:
             self._mind_collisions()
+        elif candidate.bound < self.proof.closing and self.proof.look_closer():
+            self.proof.put_back()
         elif candidate.bound < self.proof.closing:
             self._given_up += 1
             self.proof.give_up()
@@ -206,7 +210,7 @@ class OptimalSearch:
 
     def _mind_collisions(self) -> None:
         """Leave out where the robot collides: it does wherever a motion might have been."""
-        self._clear = Obstructions(self._problem.scene.collision, self._walls.images).clear
+        self._forbidden = Obstructions(self._problem.scene.collision, self._walls)
         self._sampler.collisions = True
         self._places.clear()
         self.proof.put_back()  # before what is proven is noted
@@ -223,7 +227,7 @@ class OptimalSearch:
         self._least_hope = least_hope
         made, walls = self._walls, self.proof.walls
         gap = PROOF_SHARE * self._settings.widen
-        self.proof = BoxProof(made.images.of, made.finer, threshold, gap, self._clear)
+        self.proof = BoxProof(made.images.of, made.finer, threshold, gap, self._forbidden)
         self._work.begin_again(self.proof)
         for wall in walls:
             self.proof.add(wall)

@@ -160,7 +160,7 @@ class Rectangles:
     def _sampled(self, places: Array, box: JointBox, placements: Sequence[Placement]) -> _Nodes:
         """Return the postures of a rectangle; near a box only those that do not collide count."""
         index = self._points.pass_index[int(places[0])]
-        key = places[0], places[-1], len(places), float(self._sampler.collisions), index
+        key = places[0], places[-1], len(places), self._state(), index
         image = placements[index]
         key = *key, image.family, image.number, *image.shift, *(image.center * image.loose)
         nodes = self._nodes.get(key)
@@ -176,6 +176,10 @@ class Rectangles:
             nodes.looked_at |= near
             nodes.free[near] = ~self._sampler.collides(nodes.q[near])
         return nodes
+
+    def _state(self) -> float:
+        """Return a number for which postures the sampler leaves out."""
+        return float(self._sampler.collisions) * (1.0 + float(self._sampler.mirrored))
 
     def _rows(self, nodes: _Nodes, box: JointBox, room: float) -> list[Row]:
         """Return the contact positions that motions in a box pass between finer places."""

@@ -153,5 +153,7 @@ def distance(cells, first, end, low, high):  # type: ignore[no-untyped-def]
     """Return by how much a box misses the chords of a span, in [rad]."""
     best = np.inf
     for cell in range(first, end):
+        if cells[cell, 12] > 0.0:
+            continue  # forbidden
         best, _ = nearest_on_chord(cells[cell, :6], cells[cell, 6:12], low, high, best)
     return best

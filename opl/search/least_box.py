@@ -15,7 +15,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.bounding import distance, tighten, trim
-from opl.search.cells import END, FIRST, WALL, Cells, Clear
+from opl.search.cells import END, FIRST, WALL, Cells, Forbidden
 from opl.search.relaxation import least_box
 from opl.search.subproblems import Candidate, Relaxation, Subproblem
 from opl.search.walls import Image, Piece, Wall
@@ -24,6 +24,7 @@ SETTLED = 0.04  # of the gap wanted: what the bend of the spans may lose where n
 MOST_TRIMS = 3  # of spans, before one is split
 NUMBERS_OF_A_CELL = 200  # worked on to cut off what no box can hold
 MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
+SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 SMALLEST = 1e-6  # along a wall: a cell that is not cut further
 TRIMMED = 0.9  # of the cells: more left, and trimming goes on no longer
 FEWEST_UNSEEN = 8  # subproblems split before a box is shown that is not settled
@@ -38,8 +39,8 @@ class BoxProof:
         cut: Cuts a cell of a wall into smaller ones.
         threshold: Boxes of this size or more in [rad] are of no interest.
         gap: Fraction by which the bound may stay below the threshold.
-        clear: Leaves out cells that are forbidden: asked only of what is left of a subproblem
-            when nothing is gained by splitting it further.
+        forbidden: Tells which parts of cells are forbidden: asked only of what is left of a
+            subproblem when nothing is gained by splitting it further.
     """
 
     def __init__(
@@ -48,11 +49,10 @@ class BoxProof:
         cut: Callable[[Piece, int], Sequence[Piece]],
         threshold: float,
         gap: float,
-        clear: Clear | None = None,
+        forbidden: Forbidden | None = None,
     ) -> None:
-        self._cells = Cells(images, cut)
+        self._cells = Cells(images, cut, forbidden)
         self._gap = gap
-        self._clear = clear
         self.threshold = threshold
         self.stuck = np.inf  # least bound of what could not be split
         self.subproblems = 0
@@ -98,7 +98,7 @@ class BoxProof:
         """
         node = heapq.heappop(self._open)
         self.subproblems += 1
-        if node.found is None or node.n_walls < len(self.walls):
+        if node.found is None or node.n_walls < len(self.walls) or self._sharper(node.found):
             if not self._bound(node):
                 return None
             if self._open and node.bound > self._open[0].bound + 1e-9:
@@ -109,7 +109,8 @@ class BoxProof:
         if node.n_walls < len(self.walls):
             self.put_back() if settled else self.split()
             return None
-        if settled and self._clear is not None and self._leave_out(self._clear):
+        if settled and self._cells.cleared(node.spans, 1):
+            self.put_back()
             return None
         self._unseen += 1
         if not settled and self._unseen < self._show_after:
@@ -118,9 +119,14 @@ class BoxProof:
         self._unseen, self._show_after = 0, min(2 * self._show_after, MOST_UNSEEN)
         found = node.found
         assert found is not None
-        return Candidate(
-            node.bound, found.low, found.high, settled, self._cells.keys_of(node.spans)
-        )
+        keys, mirrored = self._cells.keys_of(node.spans), self._cells.mirrored(node.spans)
+        return Candidate(node.bound, found.low, found.high, settled, keys, mirrored)
+
+    @property
+    def outdated(self) -> bool:
+        """Whether the last candidate may be bounded better now."""
+        found = self._kept.found
+        return found is not None and self._sharper(found)
 
     def pressing(self) -> Array:
         """Return how hard each wall presses on the faces of the last candidate's box.
@@ -140,6 +146,10 @@ class BoxProof:
         """Show boxes that are not settled more often again: the last one told something new."""
         self._show_after = FEWEST_UNSEEN
 
+    def look_closer(self) -> bool:
+        """Look closer at what is forbidden of the last candidate's spans; return whether any is."""
+        return self._cells.cleared(self._kept.spans, 2)
+
     def split(self) -> None:
         """Split the subproblem of the last candidate."""
         if self._branch is not None:
@@ -153,6 +163,10 @@ class BoxProof:
         """Let the subproblem of the last candidate stay as it is; its bound counts."""
         self.stuck = min(self.stuck, self._kept.bound)
 
+    def _sharper(self, found: Relaxation) -> bool:
+        lower = self.closing < found.closing * (1.0 - SHARPER)
+        return lower or self._cells.changes > found.changes
+
     def _push(self, bound: float, spans: np.ndarray, n_walls: int, low: Array, high: Array) -> None:
         heapq.heappush(self._open, Subproblem(bound, self._count, spans, n_walls, low, high))
         self._count += 1
@@ -162,8 +176,9 @@ class BoxProof:
         cells, closing, n_walls = self._cells, self.closing, len(self.walls)
         if len(node.spans) != 1 and node.n_walls <= 1:
             n_walls = 1  # one span of the first wall tells which images of the others matter
+        mirrored = len(node.spans) > 0 and cells.mirrored(node.spans)
         new = [
-            cells.spans_of(wall, node.low, node.high, closing)
+            cells.spans_of(wall, node.low, node.high, closing, mirrored)
             for wall in range(node.n_walls, n_walls)
         ]
         spans = np.concatenate([node.spans, *new])
@@ -191,17 +206,7 @@ class BoxProof:
             if (spans[:, END] - spans[:, FIRST]).sum() > TRIMMED * before:
                 break
         node.spans, node.n_walls, node.low, node.high = spans, n_walls, low, high
-        node.found = Relaxation(box[0], box[1], place, lost)
-        return True
-
-    def _leave_out(self, clear: Clear) -> bool:
-        """Leave forbidden cells out of the last subproblem; return whether there were any."""
-        node = self._kept
-        spans = self._cells.cleared(node.spans, clear)
-        if spans is None:
-            return False
-        if len(np.unique(spans[:, WALL])) == node.n_walls:
-            self._push(node.bound, spans, node.n_walls, node.low, node.high)
+        node.found = Relaxation(box[0], box[1], place, lost, closing, cells.changes)
         return True
 
     def _few_cells(self, spans: np.ndarray) -> np.ndarray:

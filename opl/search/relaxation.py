@@ -128,6 +128,8 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
         nearest = np.inf
         for k in range(begin[w], end[w]):
             for cell in range(spans[k, 3], spans[k, 4]):
+                if cells[cell, 12] > 0.0:
+                    continue  # forbidden
                 for side in range(2):
                     away = 0.0
                     for f in range(12):

@@ -19,12 +19,16 @@ class Relaxation:
         high: Upper faces.
         place: Where along each wall it meets the hull, shape (k,).
         lost: How much more a wall would press had its cells no pads, in [rad], shape (k,).
+        closing: Bounds beyond this were of no interest when it was found, in [rad].
+        changes: How often cells had become shorter by then.
     """
 
     low: Array
     high: Array
     place: Array
     lost: Array
+    closing: float
+    changes: int
 
 
 @dataclass(order=True)
@@ -59,6 +63,7 @@ class Candidate:
         high: Upper faces.
         settled: Whether nothing is gained by splitting its subproblem further.
         keys: The families and images that each pass with walls has left, by pass.
+        mirrored: Whether the whole motion has the wrist flipped; the box is that of the other.
     """
 
     bound: float
@@ -66,3 +71,4 @@ class Candidate:
     high: Array
     settled: bool
     keys: dict[int, list[Key]]
+    mirrored: bool

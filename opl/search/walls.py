@@ -47,6 +47,8 @@ class Piece:
         corners: Joint positions at the ends of the cells in [rad], shape (n + 1, 6).
         pad_low: How far below the chord of each cell the curve can be, not positive, shape (n, 6).
         pad_high: How far above, not negative, shape (n, 6).
+        bends: Whether the pads hold because the curve bends little over a cell: they are h^2 / 8
+            times its second derivative, shape (n,); None where they hold for other reasons.
     """
 
     family: int
@@ -55,6 +57,7 @@ class Piece:
     corners: Array
     pad_low: Array
     pad_high: Array
+    bends: np.ndarray | None = None
 
     @property
     def low(self) -> Array:
@@ -77,6 +80,7 @@ class Piece:
             self.corners[corners],
             self.pad_low[cells],
             self.pad_high[cells],
+            None if self.bends is None else self.bends[cells],
         )
 
 
@@ -87,12 +91,18 @@ class Image:
     Attributes:
         sign: 1 or -1 for each joint, shape (6,).
         shift: In [rad], shape (6,).
-        key: The same for images between which a pass can not change.
+        key: The same for images between which a pass can not change; the first number is that of
+            the flip of the wrist.
     """
 
     sign: Array
     shift: Array
     key: tuple[int, ...]
+
+    @property
+    def flip(self) -> int:
+        """Which flip of the wrist it is."""
+        return self.key[0]
 
     def of(self, piece: Piece) -> Piece:
         """Return a piece moved there."""
@@ -104,6 +114,7 @@ class Image:
             piece.corners * self.sign + self.shift,
             np.where(mirrored, -piece.pad_high, piece.pad_low),
             np.where(mirrored, -piece.pad_low, piece.pad_high),
+            piece.bends,
         )
 
 

@@ -218,20 +218,25 @@ def test_what_is_left_out_of_a_wall_collides_all_over():
     problem = one_row()
     cell = problem.cell
     images = Images(cell.robot, seams_of(problem.solutions(np.arange(len(problem.points)))), 10.0)
-    wall = ColumnWalls(cell, problem.scene.part, problem.points, images).columns([7.0])[0]
+    walls = ColumnWalls(cell, problem.scene.part, problem.points, images)
+    wall = walls.columns([7.0])[0]
     scene = CollisionScene(cell.widened(0.036))
-    obstructions = Obstructions(scene, images)
+    obstructions = Obstructions(scene, walls)
     T_workpiece_cutter = problem.points.Ts_workpiece_cutter[7]
     left_out, kept = [], 0
     for piece in wall.pieces:
         t = np.linspace(piece.at[0], piece.at[-1], 400)
         q = inverse_kinematics(cell.robot.arm, cell.Ts_base_flange(t, T_workpiece_cutter))
-        inside = np.zeros(len(t), dtype=bool)
-        for left in obstructions.clear(piece, 0, len(piece.pad_low)) or [piece]:
-            inside |= (t >= left.at[0]) & (t <= left.at[-1])
-        for branch in (piece.family, piece.family + 4):
+        for flip, branch in enumerate((piece.family, piece.family + 4)):
+            for looks in (1, 2):
+                low, high = obstructions.clear(piece, flip, 0, len(piece.pad_low), looks)
+            step = np.diff(piece.at)
+            ends = piece.at[:-1] + low * step, piece.at[:-1] + high * step
+            inside = np.zeros(len(t), dtype=bool)
+            for begin, end in zip(*ends, strict=True):
+                inside |= (t >= begin) & (t <= end)
             left_out.append(q[~inside, branch])
-        kept += int(inside.sum())
+            kept += int(inside.sum())
     left_out = np.concatenate(left_out)
     assert kept > 50 and len(left_out) > 100
     assert scene.collides(left_out).all()

@@ -56,18 +56,18 @@ def test_what_is_forbidden_is_left_out_of_the_least_box_and_asked_for_where_it_m
     ramp = Piece(0, Line(np.eye(4)), np.linspace(0.0, 1.0, 11), corners, nothing, nothing)
     asked = []
 
-    def without_the_lowest(piece, first, end):
-        asked.append((first, end))
-        allowed = [
-            cell
-            for cell in range(first, end)
-            if piece.corners[cell, 0] > 0.25 or len(piece.pad_low) == 1
-        ]
-        if len(allowed) == end - first:
-            return None
-        return [piece.part(allowed[0], end)] if allowed else []
+    class WithoutTheLowest:
+        n_flips = 1
 
-    proof = BoxProof(lambda _: SAME, lambda *_: (), 0.5, 1e-3, without_the_lowest)
+        def clear(self, piece, flip, first, end, looks):
+            low, high = np.zeros(len(piece.pad_low)), np.ones(len(piece.pad_low))
+            if end > first:
+                asked.append((first, end))
+            if len(low) == 10 and asked:
+                low[:3], high[:3] = 1.0, 0.0
+            return low, high
+
+    proof = BoxProof(lambda _: SAME, lambda *_: (), 0.5, 1e-3, WithoutTheLowest())
     proof.add(point_wall(0, np.zeros(6)))
     proof.add(Wall(0, 1.0, (ramp,)))
     candidate = None

@@ -1,0 +1,72 @@
+"""What is forbidden of walls, each flip of the wrist for itself."""
+
+import numpy as np
+import pytest
+
+from opl.search.least_box import BoxProof
+from opl.search.walls import Image, Line, Piece, Wall
+
+# the wrist flipped makes the fifth joint negative
+FLIPPED = np.array([1.0, 1.0, 1.0, 1.0, -1.0, 1.0])
+IMAGES = Image(np.ones(6), np.zeros(6), (0,)), Image(FLIPPED, np.zeros(6), (1,))
+
+
+def ramp(place, joint):
+    """Return a wall over which one joint turns from 0 to 1 rad, the fifth at half a radian."""
+    corners = np.outer(np.linspace(0.0, 1.0, 11), np.eye(6)[joint]) + 0.5 * np.eye(6)[4]
+    nothing = np.zeros((10, 6))
+    piece = Piece(0, Line(np.eye(4)), np.linspace(0.0, 1.0, 11), corners, nothing, nothing)
+    return Wall(0, place, (piece,))
+
+
+class LowCells:
+    """Forbids what a wall has below some share of it, for each flip another."""
+
+    def __init__(self, walls, shares):
+        self._shares = {
+            id(wall.pieces[0]): share for wall, share in zip(walls, shares, strict=True)
+        }
+
+    @property
+    def n_flips(self):
+        return 2
+
+    def clear(self, piece, flip, first, end, looks):
+        share = self._shares.get(id(piece), (0.0, 0.0))[flip]
+        low = np.clip(10.0 * share - np.arange(len(piece.pad_low)), 0.0, 1.0)
+        high = np.ones(len(low))
+        low[low == 1.0], high[low == 1.0] = 1.0, 0.0
+        return low, high
+
+
+def least(shares):
+    """Return the least box over two walls and whether the motion has the wrist flipped."""
+    walls = ramp(0.0, 0), ramp(1.0, 1)
+    proof = BoxProof(lambda _: IMAGES, lambda *_: (), 3.0, 1e-4, LowCells(walls, shares))
+    for wall in walls:
+        proof.add(wall)
+    while not proof.closed:
+        candidate = proof.take_next()
+        if candidate is not None and candidate.settled:
+            return candidate.bound, candidate.mirrored
+        if candidate is not None:
+            proof.split()
+    return np.inf, None
+
+
+def test_a_motion_keeps_its_range_where_the_same_is_allowed_with_the_wrist_flipped():
+    bound, mirrored = least([(0.7, 0.0), (0.7, 0.0)])
+    assert bound == pytest.approx(0.0, abs=1e-3)
+    assert mirrored
+
+
+def test_cells_are_cut_where_the_forbidden_part_ends():
+    # the walls turn different joints: where both begin, nothing turns
+    for flips in ([(0.25, 0.4), (0.35, 0.55)], [(0.4, 0.25), (0.55, 0.35)]):
+        bound, mirrored = least(flips)
+        assert bound == pytest.approx(0.25 + 0.35, abs=1e-3)
+        assert mirrored == (flips[0][0] > flips[0][1])
+
+
+def test_nothing_is_left_where_all_flips_of_a_wall_are_forbidden():
+    assert least([(1.0, 1.0), (0.0, 0.0)])[0] == np.inf
