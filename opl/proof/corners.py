@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
 from opl.cell.robot import forward_kinematics
+from opl.files.beside import Beside
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
@@ -20,6 +22,7 @@ from opl.verification.triangles import Triangles
 from opl.verification.world import World
 
 AT_ONCE = 128  # corners whose frames are held in memory
+IN_TURN = 24  # corners that whoever is free takes together
 MOST_NAMED = 3  # corners of each kind of fault
 _NUDGE = 1e-3  # of a cutter point, for the way along a pass
 _NEWTON = 2  # steps to the place of a pass that an edge of the wheel grinds
@@ -53,7 +56,13 @@ class CornerProof:
     stops: tuple[str, ...] = ()
 
 
-def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playback) -> CornerProof:
+def corner_proof(
+    job: Job,
+    points: CutterPoints,
+    motion: Motion,
+    playback: Playback,
+    beside: Beside | None = None,
+) -> CornerProof:
     """Prove every rounding of a program inside its zones, see `opl.proof.roundings`.
 
     Contact and depth in the belt are looked at on chords across each triangle, clearances all over
@@ -64,11 +73,14 @@ def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playb
         points: Its cutter points.
         motion: What the program does, with its meaning, a written configuration for each move.
         playback: The moves.
+        beside: What may work beside this process, if anything.
     """
     allowed, tool_points = job.search.max_contact_error, tool_points_of(job)
     zones = zones_of(playback.moves, playback.q[playback.stations], tool_points)
     corners = list(roundings(motion, zones, tool_points))
-    errors = contact_errors(job, points, motion, corners)
+    some = [corners[first : first + IN_TURN] for first in range(0, len(corners), IN_TURN)]
+    looks = (beside or Beside()).share(_looking, (job, points, motion), some)
+    errors = np.concatenate([np.zeros((0, len(DEPTHS))), *(look.errors for look in looks)])
     inner = np.array([all(corner.grinds) for corner in corners], dtype=bool)
     worst = np.where(inner, errors[:, -1], 0.0)
     faults: list[tuple[Rounding, str]] = []
@@ -88,10 +100,9 @@ def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playb
                     f"{np.floor(100.0 * fits) / 100.0:g} mm would do",
                 )
             )
-    with World(job.cell) as world:
-        near = list(_too_near(world, corners))
-        faults += near[:MOST_NAMED]
-        faults += _too_deep(world, corners, job.cell.max_belt_penetration)
+    near = [(corners[IN_TURN * n + k], why) for n, look in enumerate(looks) for k, why in look.near]
+    deep = [(corners[IN_TURN * n + k], why) for n, look in enumerate(looks) for k, why in look.deep]
+    faults += [*near[:MOST_NAMED], *deep[:MOST_NAMED]]
     most = int(worst.argmax()) if worst.max(initial=0.0) > 0.0 else None
     return CornerProof(
         len(corners),
@@ -117,6 +128,39 @@ def corner_proof(job: Job, points: CutterPoints, motion: Motion, playback: Playb
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What was found at some corners.
+
+    Attributes:
+        errors: Largest distances of their ground points, see `contact_errors`.
+        near: Which of them bring bodies too near to each other, and how.
+        deep: Which of them take the part too deep into the belt, and how.
+    """
+
+    errors: Array
+    near: list[tuple[int, str]]
+    deep: list[tuple[int, str]]
+
+
+@contextmanager
+def _looking(
+    job: Job, points: CutterPoints, motion: Motion
+) -> Iterator[Callable[[Sequence[Rounding]], _Look]]:
+    """Open what looks at corners."""
+    with World(job.cell) as world:
+        triangles, allowed = Triangles(world), job.cell.max_belt_penetration
+
+        def look(corners: Sequence[Rounding]) -> _Look:
+            return _Look(
+                contact_errors(job, points, motion, corners),
+                list(_too_near(triangles, corners)),
+                list(_too_deep(world, corners, allowed)),
+            )
+
+        yield look
+
+
 def tool_points_of(job: Job) -> Callable[[Array], Array]:
     """Return what gives the tool point, of which zones count, see `roundings`."""
     robot, led = job.cell.robot, job.program.led
@@ -128,7 +172,7 @@ def _place(motion: Motion, corner: Rounding) -> str:
 
 
 def contact_errors(
-    job: Job, points: CutterPoints, motion: Motion, corners: list[Rounding]
+    job: Job, points: CutterPoints, motion: Motion, corners: Sequence[Rounding]
 ) -> Array:
     """Return the largest distances of ground points from the wheel's surface in [m], (n, DEPTHS).
 
@@ -142,7 +186,7 @@ def contact_errors(
     return np.concatenate(parts)
 
 
-def _errors(job: Job, points: CutterPoints, motion: Motion, corners: list[Rounding]) -> Array:
+def _errors(job: Job, points: CutterPoints, motion: Motion, corners: Sequence[Rounding]) -> Array:
     """Do `contact_errors` for one corner or more."""
     wheel = job.cell.wheel
     place = np.stack([corner.places(_points_per_lead(job, points, corner)) for corner in corners])
@@ -208,30 +252,27 @@ def _with_bows(values: Array) -> Array:
     return np.asarray(np.abs(np.concatenate([values, vertex], axis=-1)))
 
 
-def _too_near(world: World, corners: list[Rounding]) -> Iterator[tuple[Rounding, str]]:
+def _too_near(triangles: Triangles, corners: Sequence[Rounding]) -> Iterator[tuple[int, str]]:
     """Yield corners that bring bodies too near to each other, and which."""
-    triangles = Triangles(world)
-    for corner in corners:
+    for k, corner in enumerate(corners):
         found = triangles.too_near(*corner.triangle(), corner.free)
         if found is not None:
             yield (
-                corner,
+                k,
                 f"brings {found.names} to {1e3 * found.distance:.2f} mm, "
                 f"{1e3 * found.needed:g} mm needed",
             )
 
 
 def _too_deep(
-    world: World, corners: list[Rounding], allowed: float
-) -> Iterator[tuple[Rounding, str]]:
-    """Yield the first corners that take the part too deep into the belt, and how deep."""
-    named = 0
-    for corner in corners:
+    world: World, corners: Sequence[Rounding], allowed: float
+) -> Iterator[tuple[int, str]]:
+    """Yield corners that take the part too deep into the belt, and how deep."""
+    for k, corner in enumerate(corners):
         deepest = _deepest(world, corner, allowed)
-        if deepest > allowed and named < MOST_NAMED:
-            named += 1
+        if deepest > allowed:
             yield (
-                corner,
+                k,
                 f"takes the part {1e3 * deepest:.3f} mm into the belt, "
                 f"{1e3 * allowed:g} mm allowed",
             )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from opl.errors import InputError
+from opl.files.beside import Beside
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job import keys
@@ -59,6 +60,7 @@ def prove(
     points: CutterPoints,
     files: Mapping[str, bytes],
     progress: Callable[[float], None] = lambda fraction: None,
+    beside: Beside | None = None,
 ) -> Proof:
     """Prove the files of a program against the cell of a job, knowing nothing of its planning.
 
@@ -67,6 +69,7 @@ def prove(
         points: The cutter points of the job.
         files: Content of all files of the program by what messages call them.
         progress: Gets the part of the motion that is replayed, 0 to 1.
+        beside: What may work beside this process, if anything.
 
     Raises:
         InputError: If the files are not those of one program of the job's controller and robot.
@@ -80,7 +83,8 @@ def prove(
     rule = rule_of(job)
     motion = playback.q, playback.duration, playback.stations
     found = recognise(job.cell, points, *motion, rule)
-    replayed = replay(job.cell, points, found.timed, job.search.max_contact_error, progress)
+    allowed = job.search.max_contact_error
+    replayed = replay(job.cell, points, found.timed, allowed, progress, beside)
     astray = {"order", "contact"} & {one.kind for one in (*replayed.findings, *found.findings)}
     shift = common_shift(job.cell, points, *motion, rule) if astray else None
     findings = (
@@ -94,7 +98,7 @@ def prove(
     moves = len(playback.moves)
     if replayed.findings or found.findings:
         return Proof(tuple(files), reading.foreign, moves, found.timed, replayed, findings)
-    corners = corner_proof(job, points, found.timed.motion, playback)
+    corners = corner_proof(job, points, found.timed.motion, playback, beside)
     findings = (*findings, *corners.findings)
     return Proof(tuple(files), reading.foreign, moves, found.timed, replayed, findings, corners)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import PartTree
+from opl.files.beside import Beside
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
@@ -115,6 +116,7 @@ def read_back(
     verified: VerifiedMotion,
     program: Program,
     texts: Mapping[str, str],
+    beside: Beside | None = None,
 ) -> FileProof | None:
     """Compare the texts of a program with what was proven; None if they cannot be read.
 
@@ -125,6 +127,7 @@ def read_back(
         verified: What was proven.
         program: The moves that were to be written.
         texts: All files of the run.
+        beside: What may work beside this process, if anything.
     """
     reader = find_post(job.program.controller).reader
     if reader is None:
@@ -151,7 +154,7 @@ def read_back(
     other_paths = difference > EXACT or len(kept.stations) < len(kept.q)
     findings = (*findings, *_differences(kept, program))
     if other_paths:
-        proof = prove(job, points, files)
+        proof = prove(job, points, files, beside=beside)
         findings, corners = (*findings, *proof.findings), proof.corners
     else:
         # what the moves mean is recognised anew, as `opl verify` does it: the same findings
@@ -159,7 +162,7 @@ def read_back(
             job.cell, points, playback.q, playback.duration, playback.stations, rule_of(job)
         )
         motion = found.timed.motion
-        corners = corner_proof(job, points, motion, playback)
+        corners = corner_proof(job, points, motion, playback, beside)
         findings = (
             *findings,
             *found.findings,

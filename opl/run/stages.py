@@ -226,14 +226,14 @@ def write_program(proven: Proven, watch: Watch | None = None, beside: Beside | N
         OplError: If the program cannot be written for the controller.
         Cancelled: If the run was cancelled.
     """
-    watch = watch or Watch()
+    watch, motion = watch or Watch(), proven.motion
     surfaced, exact = proven.surfaced, proven.planned.exact
     stops: frozenset[int] = frozenset()
     while True:
         with watch.stage(Stage.EXPORT), keys_named(surfaced.job.source):
             program, files = render_program(proven, stops)
         with watch.stage(Stage.READ_BACK):
-            found = read_back(surfaced.job, surfaced.points, exact, proven.motion, program, files)
+            found = read_back(surfaced.job, surfaced.points, exact, motion, program, files, beside)
         # in the air a corner that would come too near to something becomes a stop
         near = frozenset() if found is None else found.stops(program) - stops
         if not near:
