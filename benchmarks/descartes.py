@@ -3,7 +3,8 @@
 Descartes is given the configurations of every node that exists and does not cut into the wheel;
 which of them collide, the edges between neighbouring cutter points and the path of least joint
 travel are its own work, as they are opl's here. It runs in a virtual environment of its own
-(`python -m benchmarks --descartes PYTHON`), on one thread, as opl does.
+(`python -m benchmarks --descartes PYTHON`), on one thread, as its planner does;
+opl looks for collisions on all cores.
 """
 
 from __future__ import annotations
@@ -80,13 +81,14 @@ def _least_travel(
 ) -> tuple[np.ndarray, Array]:
     """Return which nodes touch nothing, and the free track whose joints turn least, (N, 6)."""
     clear = free.copy()
-    clear[free] = ~problem.scene.collision.collides(matrix.q[free])
+    ladder = problem.ladder(matrix, clear)
+    clear[free] = ~problem.scene.collision.collides(ladder.q[free])
     cost = TrackCost(
         joint_weights=np.ones(6), contact_weight=0.0, time_weight=0.0,
         edge_seconds=np.zeros(len(free) - 1), max_speed=np.ones(6), contact_speed=1.0,
         node_cost=np.zeros(free.shape),
     )  # fmt: skip
-    track = smoothest(problem.ladder(matrix, clear), np.empty(0, np.int64), clear, cost)
+    track = smoothest(ladder, np.empty(0, np.int64), clear, cost)
     if track is None:
         raise ValueError("no track of this field is free")
     return clear, matrix.along(track.rows)

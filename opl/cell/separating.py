@@ -1,91 +1,104 @@
 """Directions along which two bodies are apart: the compiled part of `opl.cell.separation`.
 
-A body is its pose, shape (4, 4), and half the edges of a box, or radius, half length and -1 of a
-cylinder about z, shape (3,); in [m].
+Bodies are poses, shape (b, 4, 4), and sizes, shape (b, 3): half the edges of a box, or radius, half
+length and -1 of a cylinder about z; in [m]. They are given by their numbers.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from opl.files.kernels import kernel
+from opl.files.kernels import kernel, prange
 
 DIRECTIONS = 18  # that are tried for a pair
 SHORTEST = 1e-4  # of a vector that gives a direction
+SLACK = 1e-12  # [m] rounding of how far a group has moved
 
 
 @kernel()
-def _reach(T, size, x, y, z):  # type: ignore[no-untyped-def]
+def _reach(bodies, sizes, b, x, y, z):  # type: ignore[no-untyped-def]
     """How far a body reaches from its middle along a unit vector."""
-    c = abs(x * T[0, 2] + y * T[1, 2] + z * T[2, 2])
-    if size[2] < 0.0:
-        return size[0] * np.sqrt(max(0.0, 1.0 - c * c)) + size[1] * c
-    a = abs(x * T[0, 0] + y * T[1, 0] + z * T[2, 0])
-    b = abs(x * T[0, 1] + y * T[1, 1] + z * T[2, 1])
-    return a * size[0] + b * size[1] + c * size[2]
+    c = abs(x * bodies[b, 0, 2] + y * bodies[b, 1, 2] + z * bodies[b, 2, 2])
+    if sizes[b, 2] < 0.0:
+        return sizes[b, 0] * np.sqrt(max(0.0, 1.0 - c * c)) + sizes[b, 1] * c
+    a = abs(x * bodies[b, 0, 0] + y * bodies[b, 1, 0] + z * bodies[b, 2, 0])
+    d = abs(x * bodies[b, 0, 1] + y * bodies[b, 1, 1] + z * bodies[b, 2, 1])
+    return a * sizes[b, 0] + d * sizes[b, 1] + c * sizes[b, 2]
 
 
 @kernel()
-def _between(T, size, other, other_size, way):  # type: ignore[no-untyped-def]
+def _between(bodies, sizes, a, b, way):  # type: ignore[no-untyped-def]
     """What is between two bodies along a vector of any length, -inf if that is none."""
-    length = np.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+    x, y, z = way
+    length = np.sqrt(x * x + y * y + z * z)
     if length < SHORTEST:
         return -np.inf
-    x, y, z = way[0] / length, way[1] / length, way[2] / length
-    away = x * (other[0, 3] - T[0, 3]) + y * (other[1, 3] - T[1, 3]) + z * (other[2, 3] - T[2, 3])
-    return abs(away) - _reach(T, size, x, y, z) - _reach(other, other_size, x, y, z)
+    x, y, z = x / length, y / length, z / length
+    away = (
+        x * (bodies[b, 0, 3] - bodies[a, 0, 3])
+        + y * (bodies[b, 1, 3] - bodies[a, 1, 3])
+        + z * (bodies[b, 2, 3] - bodies[a, 2, 3])
+    )
+    return abs(away) - _reach(bodies, sizes, a, x, y, z) - _reach(bodies, sizes, b, x, y, z)
 
 
 @kernel()
-def _towards(T, size, other, way):  # type: ignore[no-untyped-def]
-    """Set a vector from the nearest point of a body to the middle of another one."""
-    dx, dy, dz = other[0, 3] - T[0, 3], other[1, 3] - T[1, 3], other[2, 3] - T[2, 3]
-    a = dx * T[0, 0] + dy * T[1, 0] + dz * T[2, 0]
-    b = dx * T[0, 1] + dy * T[1, 1] + dz * T[2, 1]
-    c = dx * T[0, 2] + dy * T[1, 2] + dz * T[2, 2]
-    if size[2] < 0.0:
-        away = np.sqrt(a * a + b * b)
-        part = max(0.0, away - size[0]) / away if away > 0.0 else 0.0
-        a, b = part * a, part * b
-        c -= min(max(c, -size[1]), size[1])
+def _towards(bodies, sizes, a, b):  # type: ignore[no-untyped-def]
+    """Return the vector from the nearest point of a body to the middle of another one."""
+    dx = bodies[b, 0, 3] - bodies[a, 0, 3]
+    dy = bodies[b, 1, 3] - bodies[a, 1, 3]
+    dz = bodies[b, 2, 3] - bodies[a, 2, 3]
+    x = dx * bodies[a, 0, 0] + dy * bodies[a, 1, 0] + dz * bodies[a, 2, 0]
+    y = dx * bodies[a, 0, 1] + dy * bodies[a, 1, 1] + dz * bodies[a, 2, 1]
+    z = dx * bodies[a, 0, 2] + dy * bodies[a, 1, 2] + dz * bodies[a, 2, 2]
+    if sizes[a, 2] < 0.0:
+        away = np.sqrt(x * x + y * y)
+        part = max(0.0, away - sizes[a, 0]) / away if away > 0.0 else 0.0
+        x, y = part * x, part * y
+        z -= min(max(z, -sizes[a, 1]), sizes[a, 1])
     else:
-        a -= min(max(a, -size[0]), size[0])
-        b -= min(max(b, -size[1]), size[1])
-        c -= min(max(c, -size[2]), size[2])
-    for k in range(3):
-        way[k] = a * T[k, 0] + b * T[k, 1] + c * T[k, 2]
+        x -= min(max(x, -sizes[a, 0]), sizes[a, 0])
+        y -= min(max(y, -sizes[a, 1]), sizes[a, 1])
+        z -= min(max(z, -sizes[a, 2]), sizes[a, 2])
+    return (
+        x * bodies[a, 0, 0] + y * bodies[a, 0, 1] + z * bodies[a, 0, 2],
+        x * bodies[a, 1, 0] + y * bodies[a, 1, 1] + z * bodies[a, 1, 2],
+        x * bodies[a, 2, 0] + y * bodies[a, 2, 1] + z * bodies[a, 2, 2],
+    )
 
 
 @kernel()
-def _direction(T, size, other, other_size, number, way):  # type: ignore[no-untyped-def]
-    """Set one of the `DIRECTIONS` likely ones, as a vector of any length; 0 where it is none."""
-    way[:] = 0.0
-    if number == 0:  # from middle to middle
-        for k in range(3):
-            way[k] = other[k, 3] - T[k, 3]
-    elif number == 1:
-        _towards(T, size, other, way)
-    elif number == 2:
-        _towards(other, other_size, T, way)
-    elif number < 9:  # across the faces of either, and away from the axis of a cylinder
-        first = number < 6
-        axes, extent = (T, size) if first else (other, other_size)
-        column = number - 3 if first else number - 6
-        if extent[2] >= 0.0 or column == 2:
-            for k in range(3):
-                way[k] = axes[k, column]
-        elif column == 0:
-            along = 0.0
-            for k in range(3):
-                along += axes[k, 2] * (other[k, 3] - T[k, 3])
-            for k in range(3):
-                way[k] = other[k, 3] - T[k, 3] - along * axes[k, 2]
-    else:  # across an edge of each; a cylinder has its axis
-        i, j = (number - 9) // 3, (number - 9) % 3
-        if (size[2] >= 0.0 or i == 2) and (other_size[2] >= 0.0 or j == 2):
-            way[0] = T[1, i] * other[2, j] - T[2, i] * other[1, j]
-            way[1] = T[2, i] * other[0, j] - T[0, i] * other[2, j]
-            way[2] = T[0, i] * other[1, j] - T[1, i] * other[0, j]
+def _direction(bodies, sizes, a, b, number):  # type: ignore[no-untyped-def]
+    """Return one of the `DIRECTIONS` likely ones, as a vector of any length; 0 where it is none."""
+    if number == 1:
+        return _towards(bodies, sizes, a, b)
+    if number == 2:
+        return _towards(bodies, sizes, b, a)
+    if number == 0 or 3 <= number < 9:
+        x = bodies[b, 0, 3] - bodies[a, 0, 3]
+        y = bodies[b, 1, 3] - bodies[a, 1, 3]
+        z = bodies[b, 2, 3] - bodies[a, 2, 3]
+        if number == 0:  # from middle to middle
+            return x, y, z
+        # across the faces of either, and away from the axis of a cylinder
+        body = a if number < 6 else b
+        column = number - 3 if number < 6 else number - 6
+        if sizes[body, 2] >= 0.0 or column == 2:
+            return bodies[body, 0, column], bodies[body, 1, column], bodies[body, 2, column]
+        if column == 0:
+            ex, ey, ez = bodies[body, 0, 2], bodies[body, 1, 2], bodies[body, 2, 2]
+            along = ex * x + ey * y + ez * z
+            return x - along * ex, y - along * ey, z - along * ez
+        return 0.0, 0.0, 0.0
+    # across an edge of each; a cylinder has its axis
+    i, j = (number - 9) // 3, (number - 9) % 3
+    if (sizes[a, 2] >= 0.0 or i == 2) and (sizes[b, 2] >= 0.0 or j == 2):
+        return (
+            bodies[a, 1, i] * bodies[b, 2, j] - bodies[a, 2, i] * bodies[b, 1, j],
+            bodies[a, 2, i] * bodies[b, 0, j] - bodies[a, 0, i] * bodies[b, 2, j],
+            bodies[a, 0, i] * bodies[b, 1, j] - bodies[a, 1, i] * bodies[b, 0, j],
+        )
+    return 0.0, 0.0, 0.0
 
 
 @kernel()
@@ -110,8 +123,8 @@ def _turn_about(axis, angle, T):  # type: ignore[no-untyped-def]
 
 @kernel(
     "void(float64[:,::1],float64[:,:,::1],float64[:,::1],int64[::1],float64[:,:,::1],"
-    "float64[:,::1],float64[:,::1],int64[:,::1],float64[::1],float64,float64[::1],float64[::1],"
-    "int64[::1],boolean[:,::1])"
+    "float64[:,::1],float64[:,::1],int64[:,::1],int64[::1],int64[:,::1],float64[:,::1],float64[::1],"
+    "float64,float64[::1],float64[::1],int64[::1],boolean[:,::1])"
 )
 def separate(  # type: ignore[no-untyped-def]
     q,
@@ -122,6 +135,9 @@ def separate(  # type: ignore[no-untyped-def]
     sizes,
     levers,
     pairs,
+    order,
+    groups,
+    group_levers,
     enough,
     more,
     last,
@@ -131,60 +147,123 @@ def separate(  # type: ignore[no-untyped-def]
 ):
     """Go through configurations one after the other; see `Separation.near`.
 
-    Kept up to date from one to the next: joints ``last``, bounds ``apart``, directions ``best``.
+    Kept up to date from one call to the next: joints ``last``, bounds ``apart``, directions
+    ``best``. What may be near is set in ``near``, the rest of which is left as it is.
+
+    A group of pairs is looked at when something of it could have become near: by the joints that
+    move one body of each and not the other, with the largest levers of the group.
     """
     n_joints, n_bodies = len(before_joint), len(joint)
     placed = np.zeros((n_joints + 1, 4, 4))  # of the joints in the world
     for k in range(4):
         placed[0, k, k] = 1.0
-    at_zero, turn, way = np.zeros((4, 4)), np.zeros((4, 4)), np.empty(3)
+    at_zero, turn = np.zeros((4, 4)), np.zeros((4, 4))
     bodies = np.zeros((n_bodies, 4, 4))
     at: np.ndarray = np.full(n_bodies, -1)  # number of the configuration a body was placed at
-    # how far each body can have moved by the joints up to one
-    moved = np.zeros((n_bodies, n_joints + 1))
     radii = np.empty(n_bodies)
     for b in range(n_bodies):
         last_edge = max(sizes[b, 2], 0.0)
         radii[b] = np.sqrt(sizes[b, 0] ** 2 + sizes[b, 1] ** 2 + last_edge**2)
+    turned = np.zeros(n_joints)  # by each joint since the call began
+    seen = np.zeros((len(pairs), n_joints))  # of that, when the bound of a pair was found
+    # how far its group has to move until a pair is looked at again, and any pair of the group
+    wakes, first_wakes = np.empty(len(pairs)), np.full(len(groups), -np.inf)
+    for p in range(len(pairs)):
+        wakes[p] = apart[p] - enough[p] - SLACK if apart[p] > enough[p] else -np.inf
     for n in range(len(q)):
-        for b in range(n_bodies):
-            for k in range(joint[b]):
-                moved[b, k + 1] = moved[b, k] + abs(q[n, k] - last[k]) * levers[b, k]
-        last[:] = q[n]
+        for k in range(n_joints):
+            turned[k] += abs(q[n, k] - last[k])
+            last[k] = q[n, k]
         chain = False
-        for p in range(len(pairs)):
-            a, b = pairs[p, 0], pairs[p, 1]
-            apart[p] -= moved[b, joint[b]] - moved[b, joint[a]]  # the second is moved by more
-            if apart[p] > enough[p]:
-                near[n, p] = False
+        for g in range(len(groups)):
+            low, high = groups[g, 2], groups[g, 3]
+            moved = 0.0
+            for k in range(low, high):
+                moved += group_levers[g, k] * turned[k]
+            if moved < first_wakes[g]:
                 continue
-            if not chain:
-                chain = True
-                for k in range(n_joints):
-                    _product(placed[k], before_joint[k], at_zero)
-                    _turn_about(axes[k], q[n, k], turn)
-                    _product(at_zero, turn, placed[k + 1])
-            for body in (a, b):
-                if at[body] < n and (at[body] < 0 or joint[body] > 0):
-                    _product(placed[joint[body]], joint_body[body], bodies[body])
-                    at[body] = n
-            x = bodies[b, 0, 3] - bodies[a, 0, 3]
-            y = bodies[b, 1, 3] - bodies[a, 1, 3]
-            z = bodies[b, 2, 3] - bodies[a, 2, 3]
-            apart[p] = np.sqrt(x * x + y * y + z * z) - radii[a] - radii[b]
-            if apart[p] > enough[p]:
-                near[n, p] = False
-                continue
-            T, size, other, other_size = bodies[a], sizes[a], bodies[b], sizes[b]
-            # what was the best direction the last time mostly still is
-            _direction(T, size, other, other_size, best[p], way)
-            apart[p] = max(apart[p], _between(T, size, other, other_size, way))
-            if apart[p] <= enough[p]:
-                for number in range(DIRECTIONS):
-                    _direction(T, size, other, other_size, number, way)
-                    bound = _between(T, size, other, other_size, way)
-                    if bound > apart[p]:
-                        apart[p], best[p] = bound, number
-                    if bound > enough[p] + more:
-                        break
-            near[n, p] = apart[p] <= enough[p]
+            soonest = np.inf
+            for place in range(groups[g, 0], groups[g, 1]):
+                p = order[place]
+                if wakes[p] > moved:
+                    soonest = min(soonest, wakes[p])
+                    continue
+                a, b = pairs[p, 0], pairs[p, 1]
+                bound = apart[p]
+                for k in range(low, high):
+                    bound -= levers[b, k] * (turned[k] - seen[p, k])
+                    seen[p, k] = turned[k]
+                if bound <= enough[p]:
+                    if not chain:
+                        chain = True
+                        for k in range(n_joints):
+                            _product(placed[k], before_joint[k], at_zero)
+                            _turn_about(axes[k], q[n, k], turn)
+                            _product(at_zero, turn, placed[k + 1])
+                    for body in (a, b):
+                        if at[body] < n and (at[body] < 0 or joint[body] > 0):
+                            _product(placed[joint[body]], joint_body[body], bodies[body])
+                            at[body] = n
+                    x = bodies[b, 0, 3] - bodies[a, 0, 3]
+                    y = bodies[b, 1, 3] - bodies[a, 1, 3]
+                    z = bodies[b, 2, 3] - bodies[a, 2, 3]
+                    bound = np.sqrt(x * x + y * y + z * z) - radii[a] - radii[b]
+                    if bound <= enough[p]:
+                        # what was the best direction the last time mostly still is
+                        way = _direction(bodies, sizes, a, b, best[p])
+                        bound = max(bound, _between(bodies, sizes, a, b, way))
+                        if bound <= enough[p]:
+                            for number in range(DIRECTIONS):
+                                way = _direction(bodies, sizes, a, b, number)
+                                along = _between(bodies, sizes, a, b, way)
+                                if along > bound:
+                                    bound, best[p] = along, number
+                                if along > enough[p] + more:
+                                    break
+                apart[p] = bound
+                if bound > enough[p]:
+                    wakes[p] = moved + (bound - enough[p]) - SLACK
+                else:
+                    wakes[p] = -np.inf
+                    near[n, p] = True
+                soonest = min(soonest, wakes[p])
+            first_wakes[g] = soonest
+    for p in range(len(pairs)):
+        b = pairs[p, 1]
+        for k in range(joint[pairs[p, 0]], joint[b]):
+            apart[p] -= levers[b, k] * (turned[k] - seen[p, k])
+
+
+@kernel(
+    "void(float64[:,::1],float64[:,:,::1],float64[:,::1],int64[::1],float64[:,:,::1],"
+    "float64[:,::1],float64[:,::1],int64[:,::1],int64[::1],int64[:,::1],float64[:,::1],float64[::1],"
+    "float64,float64[:,::1],float64[:,::1],int64[:,::1],boolean[:,::1],int64)",
+    threads=True,
+)
+def separate_parts(  # type: ignore[no-untyped-def]
+    q,
+    before_joint,
+    axes,
+    joint,
+    joint_body,
+    sizes,
+    levers,
+    pairs,
+    order,
+    groups,
+    group_levers,
+    enough,
+    more,
+    last,
+    apart,
+    best,
+    near,
+    length,
+):
+    """Go through parts of this length as `separate` does, each with a state of its own."""
+    for part in prange(len(last)):
+        own = slice(part * length, min((part + 1) * length, len(q)))
+        separate(
+            q[own], before_joint, axes, joint, joint_body, sizes, levers, pairs, order,
+            groups, group_levers, enough, more, last[part], apart[part], best[part], near[own],
+        )  # fmt: skip

@@ -13,10 +13,12 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.separating import separate
+from opl.cell.separating import separate, separate_parts
+from opl.files.kernels import threads_are_allowed
 from opl.geometry.frames import Array
 
 MORE = 0.05  # [m] that a bound is improved beyond what is asked: for that long it is left alone
+PART = 1024  # configurations that a thread goes through at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +91,16 @@ class Separation:
         between = (number >= bodies.joint[first, None]) & (number < bodies.joint[second, None])
         # by how much a pair can come apart while a joint turns by 1 rad, in [m], shape (p, j)
         self.levers = np.where(between, bodies.levers[second], 0.0)
+        # one after the other those of which the same joints move one body and not the other
+        ends = bodies.joint[self._pairs]
+        self._order = np.lexsort(ends.T)
+        ends = ends[self._order]
+        starts = np.flatnonzero(np.diff(ends, axis=0, prepend=-1).any(axis=1))
+        beyond = np.append(starts[1:], len(pairs)).astype(np.int64)
+        self._groups = np.column_stack([starts, beyond, ends[starts]])
+        self._group_levers = np.array(
+            [self.levers[self._order[a:b]].max(axis=0) for a, b in self._groups[:, :2]]
+        ).reshape(-1, len(bodies.axes))
         self._last = np.zeros(len(bodies.axes))
         self._best = np.zeros(len(pairs), dtype=np.int64)  # direction of each pair
         self.apart = np.full(len(pairs), -np.inf)  # at the last configuration, at the least, in [m]
@@ -103,9 +115,9 @@ class Separation:
         Returns:
             Shape (n, p) of bool.
         """
-        near: np.ndarray = np.empty((len(q), len(self._pairs)), dtype=bool)
+        near: np.ndarray = np.zeros((len(q), len(self._pairs)), dtype=bool)
         bodies = self._bodies
-        separate(
+        given = (
             np.array(q, dtype=float, order="C"),  # compiled for arrays that can be written to
             bodies.Ts_before_joint,
             bodies.axes,
@@ -114,13 +126,22 @@ class Separation:
             bodies.sizes,
             bodies.levers,
             self._pairs,
+            self._order,
+            self._groups,
+            self._group_levers,
             enough,
             MORE,
-            self._last,
-            self.apart,
-            self._best,
-            near,
         )
+        if len(q) < 2 * PART or not threads_are_allowed():
+            separate(*given, self._last, self.apart, self._best, near)
+            return near
+        # each part begins with nothing known, whatever the number of threads
+        n_parts = -(-len(q) // PART)
+        last = np.zeros((n_parts, len(self._last)))
+        apart = np.full((n_parts, len(self._pairs)), -np.inf)
+        best = np.tile(self._best, (n_parts, 1))
+        separate_parts(*given, last, apart, best, near, PART)
+        self._last[:], self.apart[:], self._best[:] = last[-1], apart[-1], best[-1]
         return near
 
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from opl.cell import separation as separation_module
 from opl.cell.collision import CollisionScene
 from opl.cell.nearest import nearest_pairs
 from opl.cell.robot import load_robot
@@ -84,6 +85,21 @@ def test_collisions_are_those_of_every_pair_asked_one_by_one(robot):
         for configuration, pairs in zip(q[:20], wanted, strict=False):
             names = {one.pair(k) for k in np.flatnonzero(pairs)}
             assert set(one.colliding_pairs(configuration)) == names
+
+
+def test_collisions_in_parts_are_the_same_in_threads_and_without_any(monkeypatch):
+    cell = crowded("mh24", seed=5)
+    scene = CollisionScene(cell)
+    q = configurations(cell.robot, seed=6, n=80)
+    hit = scene.collides(q)
+    monkeypatch.setattr(separation_module, "PART", 7)
+    np.testing.assert_array_equal(scene.collides(q), hit)
+    in_parts = scene.separation(np.arange(len(scene._pairs)))
+    in_parts.near(q, scene._enough)
+    distances = all_distances(scene, q[-1:])[0]
+    assert (in_parts.apart <= np.maximum(distances, 0.0) + 1e-6).all()
+    monkeypatch.setattr(separation_module, "threads_are_allowed", lambda: False)
+    np.testing.assert_array_equal(scene.collides(q), hit)
 
 
 def test_configurations_may_be_read_only():
