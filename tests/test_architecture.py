@@ -314,6 +314,14 @@ def test_what_is_cheap_imports_nothing_heavy(module):
     assert not loaded & {"numpy", "pydantic", "yaml", *HOMES.keys() - {"click"}}
 
 
+@pytest.mark.parametrize("module", ["opl.motion.engine", "opl.run.stages", "opl.run.delivery"])
+def test_what_plans_and_delivers_does_not_load_what_draws(module):
+    script = f"import sys, {module}; print(*sys.modules)"
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    loaded = {name.split(".")[0] for name in ended.stdout.split()}
+    assert "numpy" in loaded and not loaded & {"matplotlib", "trimesh"}
+
+
 # what nothing needs that only reads: libraries with one home, and all of scipy
 HEAVY = {"scipy", *HOMES.keys() - {"click", "yaml"}}
 SHOWN = Path(__file__).parent / "golden" / "SAMPLE.JBI"

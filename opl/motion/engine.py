@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -13,29 +13,27 @@ import numpy as np
 
 from opl.geometry.frames import Array
 
-_PACKAGE, _NAME = "matplotlib", "pyplot"
+_PACKAGE, _PLOTS = "matplotlib", "matplotlib.pyplot"
 
 
 @contextmanager
 def _plots_on_demand() -> Iterator[None]:
-    """Let ``matplotlib.pyplot`` be loaded when something of it is first used."""
-    full = f"{_PACKAGE}.{_NAME}"
-    spec = None if full in sys.modules else find_spec(full)
-    if spec is None or spec.loader is None:
+    """Hand out a stand-in for ``matplotlib.pyplot``, which loads that when it is first used."""
+    package, plots = ModuleType(_PACKAGE), ModuleType(_PLOTS)
+    package.__dict__["pyplot"] = plots
+    plots.__dict__["__getattr__"] = _plot
+    stand_ins = {_PACKAGE: package, _PLOTS: plots}
+    new = {name: one for name, one in stand_ins.items() if name not in sys.modules}
+    sys.modules.update(new)
+    try:
         yield
-        return
-    module, loader = ModuleType(full), spec.loader
-    module.__spec__, module.__file__ = spec, spec.origin
+    finally:
+        for name in new:
+            del sys.modules[name]
 
-    def load(attribute: str) -> Any:
-        del module.__dict__["__getattr__"]
-        loader.exec_module(module)
-        return getattr(module, attribute)
 
-    module.__dict__["__getattr__"] = load
-    sys.modules[full] = module
-    setattr(sys.modules[_PACKAGE], _NAME, module)
-    yield
+def _plot(name: str) -> Any:
+    return getattr(import_module(_PLOTS), name)
 
 
 with _plots_on_demand():
