@@ -1,7 +1,8 @@
 """Certificates of printed bounds, and whether they hold. By hand: python -m benchmarks.certificate.
 
 A proof is searched with the code of opl, what it rests on is written down, and `recheck` proves the
-bound anew from that alone.
+bound anew from that alone: walls, arm, part and wheel, and the bodies that must not collide where
+the bound rests on that.
 """
 
 from __future__ import annotations
@@ -13,9 +14,12 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from benchmarks.recheck import recheck
-from opl.cell.spherical_wrist import SphericalWristArm
-from opl.job.load import load_job
+from opl.cell.collision import CollisionScene
+from opl.cell.robot import load_robot
+from opl.job.load import Job, load_job
 from opl.planning.multi_start import plan_recursive
 from opl.planning.optimal import OptimalSearch
 from opl.planning.problem import GrindingProblem
@@ -25,21 +29,29 @@ from opl.run.surfacing import cut_surface
 from opl.search.walls import Wall
 
 WORKPIECES = Path(__file__).resolve().parent.parent / "workpieces"
-CASES = ("v_shape:1", "v_shape", "s_shape:1", "s_shape", "faucet", "turbine_blade")
+CASES = (
+    "v_shape:1", "v_shape", "s_shape:1", "s_shape", "faucet", "turbine_blade",
+    "bent_tube", "v_in_cell", "v_shape:1@ur10e", "v_shape@ur10e",
+)  # fmt: skip
+HOMES = {"ur10e": (0.0, -110.0, 110.0, -90.0, -90.0, 0.0)}  # [deg]
 
 
-def certificate_of(problem: GrindingProblem, walls: list[Wall], bound: float) -> dict[str, Any]:
+def certificate_of(
+    problem: GrindingProblem, walls: list[Wall], bound: float, minds_collisions: bool = False
+) -> dict[str, Any]:
     """Return a bound in [rad] and what it rests on, as numbers, lists and names of JSON.
 
     Args:
-        problem: What was planned, on an arm with a spherical wrist.
-        walls: Of the proof; robot collisions did not matter to it.
+        problem: What was planned.
+        walls: Of the proof.
         bound: What was proven.
+        minds_collisions: Whether it rests on collisions of the robot as well.
     """
     cell, part = problem.cell, problem.cell.part
     robot, wheel = cell.robot, cell.wheel
-    assert isinstance(robot.arm, SphericalWristArm)
+    bodies = {"bodies": bodies_of(problem.scene.collision)} if minds_collisions else {}
     return {
+        **bodies,
         "bound": bound,
         "robot": {
             "arm": asdict(robot.arm),
@@ -61,46 +73,64 @@ def certificate_of(problem: GrindingProblem, walls: list[Wall], bound: float) ->
     }
 
 
-def certified(part: str, rows: int | None = None) -> tuple[dict[str, Any], float]:
-    """Return the certificate of a shipped part, and the bound that is printed.
+def bodies_of(scene: CollisionScene) -> dict[str, Any]:
+    """Return the bodies of a scene, and its pairs without those of meshes."""
+    bodies = scene._bodies
+    pairs = zip(scene._geometry.collisionPairs, scene._margins, scene._has_mesh, strict=True)
+    return {
+        "Ts_before_joint": bodies.Ts_before_joint.tolist(),
+        "axes": bodies.axes.tolist(),
+        "joint": bodies.joint.tolist(),
+        "Ts_joint_body": bodies.Ts_joint_body.tolist(),
+        "sizes": bodies.sizes.tolist(),
+        "pairs": [(pair.first, pair.second, float(far)) for pair, far, mesh in pairs if not mesh],
+    }
 
-    It is of the part as shipped, or with so many rows.
 
-    Where the proof went on to leave out what makes the robot collide, the certificate is of what
-    was proven before: `recheck` knows no robot's shape.
+def job_of(case: str) -> Job:
+    """Return the job of a case: a shipped part, or a job file, as it is or with so many rows.
+
+    ``v_shape:1@ur10e`` is one row of the V part, on another arm that has a home here.
     """
-    job = load_job(WORKPIECES / part / "job.yaml")
-    if rows is not None:
-        job = replace(job, passes=replace(job.passes, rows=rows))
+    rest, _, arm = case.partition("@")
+    part, _, rows = rest.partition(":")
+    job = load_job(Path(part) if part.endswith(".yaml") else WORKPIECES / part / "job.yaml")
+    if rows:
+        job = replace(job, passes=replace(job.passes, rows=int(rows)))
+    if arm:
+        cell = replace(job.cell, robot=load_robot(arm))
+        job = replace(job, cell=cell, process=replace(job.process, home=np.deg2rad(HOMES[arm])))
+    return job
+
+
+def certified(case: str) -> dict[str, Any]:
+    """Return the certificate of the bound that is printed for a case."""
+    job = job_of(case)
     problem = problem_in(planning_scene(job.cell), job, cut_surface(job).points)
     search = OptimalSearch(problem, job.search.optimal, plan_recursive(problem))
-    bound = 0.0
     while not search.finished:
         search.step()
-        if not search.minds_collisions:
-            bound = search.lower_bound
-    return certificate_of(problem, search.proof.walls, bound), search.lower_bound
+    walls, minds_collisions = search.proof.walls, search.minds_collisions
+    return certificate_of(problem, walls, search.lower_bound, minds_collisions)
 
 
 def check(case: str) -> bool:
-    """Print what was proven by the search, and whether that is proven anew; return the latter."""
-    part, _, rows = case.partition(":")
-    certificate, printed = certified(part, int(rows) if rows else None)
+    """Print the bound of a case, and whether it is proven anew; return the latter."""
+    certificate = certified(case)
     start = time.process_time()
     holds, subproblems = recheck(json.loads(json.dumps(certificate)))
     print(
-        f"{part}, {rows or 'all'} rows: at least {printed:.5f} rad, {certificate['bound']:.5f} of "
-        "them with no regard to collisions of the robot: these are "
-        f"{'' if holds else 'NOT '}proven anew, "
-        f"over {len(certificate['walls'])} walls in {subproblems} subproblems, "
-        f"{time.process_time() - start:.1f} s of processor",
+        f"{case}: at least {certificate['bound']:.5f} rad"
+        f"{', where the robot collides left out' if 'bodies' in certificate else ''}: "
+        f"{'' if holds else 'NOT '}proven anew, over {len(certificate['walls'])} walls in "
+        f"{subproblems} subproblems, {time.process_time() - start:.1f} s of processor",
         flush=True,
     )
     return holds
 
 
 def main() -> None:
-    """Check the cases; parts may be named as arguments, with rows like ``v_shape:1``."""
+    """Check the cases, or those that arguments name."""
     agreed = [check(case) for case in sys.argv[1:] or CASES]
     raise SystemExit(0 if all(agreed) else 1)
 

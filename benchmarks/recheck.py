@@ -3,7 +3,8 @@
 No code of opl is used, and no number that its search computed but the claim itself: a certificate
 says where the walls are that every motion must cross, and which bound they are said to prove. Each
 wall is enclosed anew, cell by cell, in interval arithmetic rounded outwards; cells go where a point
-of the part is surely too deep in the wheel, or no count of full turns keeps the limits. Branch and
+of the part is surely too deep in the wheel, or no count of full turns keeps the limits, or where
+bodies are named that must not collide and near a box that is not refuted surely do. Branch and
 bound then shows that no box below the bound holds a posture of every wall. Its linear programs are
 solved by HiGHS, and only their prices are used: any prices bound the box from below.
 """
@@ -12,6 +13,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -21,9 +23,13 @@ from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
 from benchmarks.intervals import Array
-from benchmarks.recheck_walls import COARSE, SURE, TURN, Cells, Machine, joined
+from benchmarks.recheck_arms import SURE, TURN, Flip
+from benchmarks.recheck_bodies import Bodies
+from benchmarks.recheck_walls import COARSE, Cells, Machine, joined
 
 WORTH_TRYING = 1e-3  # of the bound: what a proof may lack for smaller cells to make a difference
+NEAR = 0.02  # of the bound: how far from a box cells are held against what must not collide
+MARK = 1000  # more than there are families
 TRIMMED = 0.9  # of the cells: more left, and it is time to split
 
 
@@ -32,12 +38,20 @@ class Proof:
 
     Args:
         walls: The cells of each, as the machine encloses them.
-        flip: What brings the wrist to the other side.
+        flips: What brings the wrist to either side.
         bound: Boxes below this size in [rad] should not exist.
+        bodies: What must not collide, if that is to be minded.
     """
 
-    def __init__(self, walls: Sequence[Cells], flip: tuple[Array, Array], bound: float) -> None:
-        self._walls, self._flip, self._bound = walls, flip, bound
+    def __init__(
+        self,
+        walls: Sequence[Cells],
+        flips: Sequence[Flip],
+        bound: float,
+        bodies: Bodies | None = None,
+    ) -> None:
+        self._walls, self._flips, self._bound = walls, flips, bound
+        self._bodies = bodies
         self.subproblems = 0
         self.missed = 0.0  # [rad] by how much a box stayed below the bound that was not refuted
 
@@ -52,9 +66,30 @@ class Proof:
     def _family_holds(self, first: Cells) -> bool:
         """Return whether no such box holds one of these cells of the first wall."""
         table = [first, *(self._near(first, wall) for wall in self._walls[1:])]
+        looked_at = [np.zeros(len(cells.place), dtype=bool) for cells in table]
+        while True:
+            box = self._missing(table)
+            if box is None:
+                return True
+            if self._bodies is None:
+                return False
+            found = False
+            for k, cells in enumerate(table):
+                fresh = (outside(cells, box) < NEAR * self._bound) & ~looked_at[k]
+                # marked by their families, which no image of a wall has
+                marked = replace(cells, family=cells.family + MARK * (looked_at[k] | fresh))
+                marked = self._bodies.cleared(marked, fresh)
+                looked_at[k] = marked.family >= MARK
+                table[k] = replace(marked, family=marked.family % MARK)
+                found |= bool(fresh.any())
+            if not found:
+                return False
+
+    def _missing(self, table: Sequence[Cells]) -> Array | None:
+        """Return a box below the bound that was not refuted, None if there is none."""
         counts = [len(cells.place) for cells in table]
         if 0 in counts:
-            return True
+            return None
         self._cells = joined(table)
         self._of = np.repeat(np.arange(len(table)), counts)
         self._low, self._high = self._cells.low, self._cells.high
@@ -63,22 +98,22 @@ class Proof:
         while waiting:
             _, _, left = heapq.heappop(waiting)
             self.subproblems += 1
-            size, parts = self._worked(left)
+            size, parts, box = self._worked(left)
             if size >= self._bound:
                 continue
             if not parts:
                 self.missed = self._bound - size
-                return False
+                return box
             for part in parts:
                 number += 1
                 heapq.heappush(waiting, (size, number, part))
-        return True
+        return None
 
     def _near(self, first: Cells, wall: Cells) -> Cells:
         """Return the images of a wall's cells that lie within the bound of a cell of the first."""
         low, high = first.low.min(axis=0), first.high.max(axis=0)
         found = []
-        for family, (sign, shift) in ((0, (np.ones(6), np.zeros(6))), (4, self._flip)):
+        for family, sign, shift in self._flips:
             moved = wall.moved(sign, shift, family)
             counts = [
                 [
@@ -99,23 +134,24 @@ class Proof:
         """Return how far cells, moved, are from a box along each joint."""
         return np.maximum(np.maximum(low - cells.high - shift, cells.low + shift - high), 0.0)
 
-    def _worked(self, left: NDArray[np.int64]) -> tuple[float, list[NDArray[np.int64]]]:
+    def _worked(self, left: NDArray[np.int64]) -> tuple[float, list[NDArray[np.int64]], Array]:
         """Return a bound on boxes that hold one of some cells for each wall, and these cut in two.
 
-        The bound is infinite where there is no such box below the one asked for.
+        The bound is infinite where there is no such box below the one asked for. The least box of
+        all is returned as well.
         """
         while True:
             left = self._within_reach(left)
             if not len(left):
-                return np.inf, []
+                return np.inf, [], np.zeros((2, 6))
             size, pressing, box, place = self._relaxed(left)
             if size >= self._bound:
-                return size, []
+                return size, [], box
             of, starts = self._of[left], self._starts(left)
             least = np.minimum.reduceat(pressing, starts)
             kept = left[size + pressing - least[of] < self._bound + SURE]
             if len(kept) > TRIMMED * len(left):
-                return size, self._cut(kept, box, place)
+                return size, self._cut(kept, box, place), box
             left = kept
 
     def _starts(self, left: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -215,16 +251,23 @@ def misses(start: Array, end: Array, box: Array) -> Array:
     return np.asarray(out.min(axis=0))
 
 
+def outside(cells: Cells, box: Array) -> Array:
+    """Return how far cells are from a box, all joints added up."""
+    away = np.maximum(np.maximum(box[0] - cells.high, cells.low - box[1]), 0.0)
+    return np.asarray(away.sum(axis=1))
+
+
 def recheck(certificate: dict[str, Any]) -> tuple[bool, int]:
     """Prove the bound of a certificate anew; return whether that succeeds, and the subproblems.
 
     Where it does not, it is tried over smaller cells.
     """
     subproblems = 0
+    bodies = Bodies(certificate["bodies"]) if "bodies" in certificate else None
     for fine in (COARSE, COARSE / 10.0, COARSE / 100.0):
         machine = Machine(certificate, fine)
         walls = [machine.wall(wall) for wall in certificate["walls"]]
-        proof = Proof(walls, machine.arm.flip(), certificate["bound"])
+        proof = Proof(walls, machine.arm.flips(), certificate["bound"], bodies)
         holds = proof.holds()
         subproblems += proof.subproblems
         if holds or proof.missed > WORTH_TRYING * certificate["bound"]:

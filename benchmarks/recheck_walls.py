@@ -5,7 +5,7 @@ Lengths are in [m], angles in [rad], contact positions t in belt units.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise, product
 from typing import Any
@@ -19,7 +19,6 @@ from benchmarks.intervals import (
     Interval,
     Jet,
     Vector,
-    angle_of,
     cross,
     dot,
     exactly,
@@ -27,9 +26,8 @@ from benchmarks.intervals import (
     still,
     unit,
 )
+from benchmarks.recheck_arms import SURE, TURN, Flags, Posture, arm_of
 
-TURN = 2.0 * np.pi
-SURE = 1e-9  # more than the round-off of sums of some hundred numbers about 1
 UNKNOWN = 50.0  # more than joints turn
 COARSE = 2e-5  # [rad] sum of the pads of a cell that is looked at first
 SMALLEST = 1.0 / 1024.0  # cell that is not cut further then
@@ -39,86 +37,6 @@ TRIED = 8  # triangles of the part that are sought to be deep in the wheel
 WITNESSES = 12  # points of one
 CLOSER = 16  # times that the deepest point is looked for, each time twice as near
 GRID = np.array([(i, j, 12 - i - j) for i in range(13) for j in range(13 - i)]) / 12.0
-
-Flags = NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class Arm:
-    """The closed form of an arm with a spherical wrist, upright with all angles zero.
-
-    In the notation of Brandstoetter, Angerer and Hofbaur (2014).
-    """
-
-    a1: float
-    a2: float
-    b: float
-    c1: float
-    c2: float
-    c3: float
-    c4: float
-    offsets: Sequence[float]
-    signs: Sequence[int]
-
-    def postures(self, x: Vector, y: Vector, z: Vector, p: Vector) -> Iterator[Posture]:
-        """Yield shoulder and elbow both ways, the wrist to one side."""
-        cells = p[0].value.low
-
-        def number(value: float) -> Jet:
-            return still(value, cells)
-
-        wrist = [p[k] - number(self.c4) * z[k] for k in range(3)]
-        forearm, tilt0 = float(np.hypot(self.a2, self.c3)), float(np.arctan2(self.a2, self.c3))
-        around = wrist[0] * wrist[0] + wrist[1] * wrist[1]
-        beside = around - number(self.b**2)
-        for ahead in (beside.root(), -beside.root()):
-            theta1 = angle_of(wrist[1], wrist[0]) - angle_of(number(self.b), ahead)
-            cos1 = (wrist[0] * ahead + wrist[1] * number(self.b)) / around
-            sin1 = (wrist[1] * ahead - wrist[0] * number(self.b)) / around
-            forward, up = ahead - number(self.a1), wrist[2] - number(self.c1)
-            away = forward * forward + up * up
-            cosine = (away - number(self.c2**2 + forearm**2)) / number(2.0 * self.c2 * forearm)
-            out = (beside.value.high < -SURE) | (cosine.value.low > 1.0 + SURE)
-            out |= cosine.value.high < -1.0 - SURE
-            sine = (number(1.0) - cosine * cosine).root()
-            for bent in (sine, -sine):
-                along, across = number(self.c2) + number(forearm) * cosine, number(forearm) * bent
-                sin2 = (forward * along - up * across) / away
-                cos2 = (up * along + forward * across) / away
-                theta2, bend = angle_of(sin2, cos2), angle_of(bent, cosine)
-                sin_link = (forward - number(self.c2) * sin2) / number(forearm)
-                cos_link = (up - number(self.c2) * cos2) / number(forearm)
-                c, s = number(np.cos(tilt0)), number(np.sin(tilt0))
-                sin_tilt, cos_tilt = sin_link * c - cos_link * s, cos_link * c + sin_link * s
-                e1 = [cos_tilt * cos1, cos_tilt * sin1, -sin_tilt]
-                e3 = [sin_tilt * cos1, sin_tilt * sin1, cos_tilt]
-                z1, z2 = dot(e1, z), cos1 * z[1] - sin1 * z[0]
-                theta = (
-                    theta1,
-                    theta2,
-                    bend - number(tilt0),
-                    angle_of(z2, z1),
-                    angle_of((z1 * z1 + z2 * z2).root(), dot(e3, z)),
-                    angle_of(dot(e3, y), -dot(e3, x)),
-                )
-                joints = zip(theta, self.offsets, self.signs, strict=True)
-                q = [(one + number(o)) if k > 0 else -(one + number(o)) for one, o, k in joints]
-                yield Posture(q, out)
-
-    def flip(self) -> tuple[Array, Array]:
-        """Return sign and shift that make the wrist to the other side of one to this."""
-        sign, shift = np.ones(6), np.zeros(6)
-        sign[4], shift[4] = -1.0, 2.0 * self.offsets[4] * self.signs[4]
-        shift[3] = shift[5] = np.pi
-        return sign, shift
-
-
-@dataclass(frozen=True)
-class Posture:
-    """Joint positions over cells, and where there is none."""
-
-    q: list[Jet]
-    out_of_reach: Flags
 
 
 @dataclass(frozen=True)
@@ -177,7 +95,7 @@ class Machine:
         self._fine = fine
         self._smallest = SMALLEST * min(np.sqrt(fine / COARSE), 1.0)
         robot, wheel = certificate["robot"], certificate["wheel"]
-        self.arm = Arm(**robot["arm"])
+        self.arm = arm_of(robot["arm"])
         self._lower, self._upper = np.array(robot["lower"]), np.array(robot["upper"])
         self._width, self._radius = wheel["width"], wheel["radius"]
         self._T_base_contact0 = np.array(wheel["T_base_contact0"])
@@ -347,7 +265,7 @@ class Machine:
     def _within_limits(self, cells: Cells) -> Flags:
         """Return which some full turns, with the wrist to either side, bring within the limits."""
         kept = np.zeros(len(cells.place), dtype=bool)
-        for sign, shift in ((np.ones(6), np.zeros(6)), self.arm.flip()):
+        for _, sign, shift in self.arm.flips():
             moved = cells.moved(sign, shift, 0)
             up = TURN * np.ceil((self._lower - moved.high) / TURN - SURE)
             kept |= (moved.low + up <= self._upper + SURE).all(axis=1)

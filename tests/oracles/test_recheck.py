@@ -12,15 +12,18 @@ import numpy as np
 import pytest
 
 import benchmarks
-from benchmarks.certificate import certificate_of, certified
+from benchmarks.certificate import bodies_of, certificate_of, certified, job_of
 from benchmarks.recheck import recheck
+from benchmarks.recheck_bodies import Bodies
 from benchmarks.recheck_walls import COARSE, Machine
 from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.robot import forward_kinematics
 from opl.planning.optimal import OptimalSearch
 from tests.oracles.test_optimal import SETTINGS, recursive, v_row
+from tests.support.planned import problem_of
 
 FOLDER = Path(benchmarks.__path__[0])
-CHECKER = ("intervals", "recheck", "recheck_walls")
+CHECKER = ("intervals", "recheck", "recheck_arms", "recheck_bodies", "recheck_walls")
 
 
 @cache
@@ -40,8 +43,7 @@ def test_the_bound_of_a_row_of_the_v_part_is_proven_anew():
 
 
 def test_the_printed_bound_of_the_v_part_as_shipped_is_proven_anew():
-    certificate, printed = certified("v_shape")
-    assert certificate["bound"] == printed
+    certificate = certified("v_shape")
     assert set(certificate["pass_index"]) == set(range(5))
     holds, subproblems = recheck(json.loads(json.dumps(certificate)))
     assert holds
@@ -80,11 +82,19 @@ def test_the_checker_uses_nothing_of_opl():
         )
 
 
-@pytest.mark.parametrize("place", [0, 30, 59])
-def test_every_free_posture_lies_in_a_cell_of_the_checker(place):
-    problem, (_, certificate) = v_row(), searched()
+@cache
+def ur10e_row():
+    """Return the middle row of the V part on the UR10e."""
+    return problem_of(job_of("v_shape:1@ur10e"))
+
+
+@pytest.mark.parametrize(("make", "place"), [(v_row, 0), (v_row, 30), (v_row, 59), (ur10e_row, 30)])
+def test_every_free_posture_lies_in_a_cell_of_the_checker(make, place):
+    problem = make()
+    certificate = json.loads(json.dumps(certificate_of(problem, [], 1.0)))
     last = problem.cell.wheel.last_position
-    cells = Machine(certificate, COARSE).wall([(place, -last), (place, last)])
+    machine = Machine(certificate, COARSE)
+    cells = machine.wall([(place, -last), (place, last)])
     t = np.linspace(-1.0, 1.0, 1001) * problem.cell.wheel.last_position
     Ts = problem.cell.Ts_base_flange(t, problem.points.Ts_workpiece_cutter[place])
     q = inverse_kinematics(problem.cell.robot.arm, Ts)
@@ -92,14 +102,56 @@ def test_every_free_posture_lies_in_a_cell_of_the_checker(place):
     near = np.clip(np.searchsorted(nodes, t), 1, len(nodes) - 1)
     free = ~(problem.cuts[place, near - 1] | problem.cuts[place, near])
     held = 0
-    for family in range(4):
-        middle = (cells.low + cells.high) / 2.0
-        own = cells.family == family
-        for posture in q[free & ~np.isnan(q[:, family, 0]), family]:
-            if not problem.cell.within_limits(posture):
-                continue
-            away = posture - middle[own]
-            away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
-            assert (np.abs(away) <= (cells.high - cells.low)[own] / 2.0).all(axis=1).any()
-            held += 1
+    low, high = [], []
+    for _, sign, shift in machine.arm.flips():
+        moved = cells.moved(sign, shift, 0)
+        low.append(moved.low)
+        high.append(moved.high)
+    low, high = np.concatenate(low), np.concatenate(high)
+    for posture in q[free & ~np.isnan(q).any(axis=(1, 2))].reshape(-1, 6)[::3]:
+        if not problem.cell.within_limits(posture):
+            continue
+        away = posture - (low + high) / 2.0
+        away -= 2.0 * np.pi * np.round(away / (2.0 * np.pi))
+        assert (np.abs(away) <= (high - low) / 2.0).all(axis=1).any()
+        held += 1
     assert held > 100
+
+
+@pytest.mark.parametrize("make", [v_row, ur10e_row], ids=["MH24", "UR10e"])
+def test_bodies_that_surely_collide_do(make):
+    scene, robot = make().scene.collision, make().cell.robot
+    bodies = Bodies(json.loads(json.dumps(bodies_of(scene))))
+    random = np.random.default_rng(4)
+    q = random.uniform(np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi), (1500, 6))
+    turned = random.uniform(0.0, 0.02, q.shape)
+    _, near = bodies.collide(q, np.zeros_like(q))
+    surely, _ = bodies.collide(q, turned)
+    assert (near <= scene.collides(q)).all()
+    # pairs with a mesh are the part's
+    assert near.sum() > 0.9 * scene.collides(q).sum()
+    assert surely.sum() > 0.5 * near.sum()
+    for share in random.uniform(-1.0, 1.0, (8, *q.shape)):
+        assert scene.collides((q + share * turned)[surely]).all()
+
+
+def test_a_bound_may_rest_on_what_collides():
+    search, certificate = searched()
+    bodies = json.loads(json.dumps(bodies_of(v_row().scene.collision)))
+    claim = {**certificate, "walls": certificate["walls"][:2]}
+    # nothing that matters to this row
+    assert not recheck({**claim, "bodies": bodies})[0]
+    # one body more, where the wrist is, that must keep off what is held
+    q = search.plan.path.q
+    middle = forward_kinematics(v_row().cell.robot, q)[:, :3, 3].mean(axis=0)
+    T_base_body = np.eye(4)
+    T_base_body[:3, 3] = middle
+    T_base_body[2, 3] += v_row().cell.robot.base_height
+    wall = {
+        **bodies,
+        "joint": [*bodies["joint"], 0],
+        "Ts_joint_body": [*bodies["Ts_joint_body"], T_base_body.tolist()],
+        "sizes": [*bodies["sizes"], [1.0, 1.0, 1.0]],
+        "pairs": [(bodies["joint"].index(6), len(bodies["joint"]), 0.0)],
+    }
+    assert recheck({**claim, "bodies": wall})[0]
