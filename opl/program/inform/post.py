@@ -129,8 +129,15 @@ def describe_file(name: str, content: bytes, robot: Robot) -> list[str]:
 
 def _cautions(job: InformJob, text: str) -> list[str]:
     """Say what is wrong with a job on the controller that finds least wrong with it."""
-    by_name = {profile.name: faults_of(job, text, profile) for profile in PROFILES.values()}
-    name, faults = min(reversed(by_name.items()), key=lambda item: len(item[1]))
+    least: tuple[str, tuple[str, ...]] | None = None
+    for profile in reversed(PROFILES.values()):
+        found = faults_of(job, text, profile)
+        if not found:  # none finds less
+            return []
+        if least is None or len(found) < len(least[1]):
+            least = profile.name, found
+    assert least is not None, "there are controllers"
+    name, faults = least
     shown = [f"caution, on {name}: {fault}" for fault in faults[:_MOST_FAULTS]]
     more = len(faults) - len(shown)
     return [*shown, *([f"caution: {more} more of this kind"] if more else [])]
