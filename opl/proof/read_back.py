@@ -34,6 +34,7 @@ from opl.proof.too_wide import TooWide
 from opl.proof.written import written_findings
 from opl.verification.kinematic_checks import limit_findings, missing_points
 from opl.verification.recognise import recognise
+from opl.verification.seen import Seen
 
 EXACT = 1e-9  # [rad] of round-off between a configuration and itself, read back
 
@@ -116,6 +117,7 @@ def read_back(
     verified: VerifiedMotion,
     program: Program,
     texts: Mapping[str, str],
+    seen: Seen | None = None,
     beside: Beside | None = None,
 ) -> FileProof | None:
     """Compare the texts of a program with what was proven; None if they cannot be read.
@@ -127,6 +129,7 @@ def read_back(
         verified: What was proven.
         program: The moves that were to be written.
         texts: All files of the run.
+        seen: What was seen of the configurations that were to be written, if anything.
         beside: What may work beside this process, if anything.
     """
     reader = find_post(job.program.controller).reader
@@ -158,9 +161,8 @@ def read_back(
         findings, corners = (*findings, *proof.findings), proof.corners
     else:
         # what the moves mean is recognised anew, as `opl verify` does it: the same findings
-        found = recognise(
-            job.cell, points, playback.q, playback.duration, playback.stations, rule_of(job)
-        )
+        played = playback.q, playback.duration, playback.stations
+        found = recognise(job.cell, points, *played, rule_of(job), seen)
         motion = found.timed.motion
         corners = corner_proof(job, points, motion, playback, beside)
         findings = (

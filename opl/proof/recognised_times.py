@@ -16,10 +16,13 @@ from opl.motion.motion import Motion
 from opl.motion.timing import Timing, time_motion
 from opl.proof.prove import rule_of
 from opl.verification.recognise import recognise
+from opl.verification.seen import Seen, see
 
 
-def recognised_times(job: Job, points: CutterPoints, motion: Motion) -> Timing:
+def recognised_times(job: Job, points: CutterPoints, motion: Motion) -> tuple[Timing, Seen]:
     """Return the times of a motion to be written, with the places that a proof will recognise.
+
+    And what is seen of its configurations, which the proof can take.
 
     Args:
         job: What is requested.
@@ -31,6 +34,7 @@ def recognised_times(job: Job, points: CutterPoints, motion: Motion) -> Timing:
     """
     timing = time_motion(motion, points, job.process, job.cell.robot)
     written, duration = timing.timed.motion, timing.timed.duration
-    stations = np.arange(len(written))
-    found = recognise(job.cell, points, written.q, duration, stations, rule_of(job))
-    return time_motion(found.timed.motion, points, job.process, job.cell.robot)
+    stations, rule = np.arange(len(written)), rule_of(job)
+    seen = see(job.cell, points, written.q, rule.max_contact_error)
+    found = recognise(job.cell, points, written.q, duration, stations, rule, seen)
+    return time_motion(found.timed.motion, points, job.process, job.cell.robot), seen

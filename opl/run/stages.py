@@ -115,11 +115,13 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
     with watch.stage(Stage.MOTION):
         exact = with_speed_steps(found.plan.motion, surfaced.points, job.process, job.cell.robot)
         exact, motion = _positions(prepared, exact)
-        timing = recognised_times(job, surfaced.points, motion)
+        timing, seen = recognised_times(job, surfaced.points, motion)
         slow = slow_stretches(timing, job.process)
     timed = TimedMotion.passing(motion, timing.timed.duration)
     drawn = Later(_drawn, prepared, charted, timed, timing)
-    planned = Planned(prepared, found.plan, compared, exact, timed, timing, slow, charted, drawn)
+    planned = Planned(
+        prepared, found.plan, compared, exact, timed, timing, seen, slow, charted, drawn
+    )
     refusal = dwell_refusal(slow, job.process)
     return planned if refusal is None else Refused(planned, refusal, (), watch.seconds)
 
@@ -226,14 +228,16 @@ def write_program(proven: Proven, watch: Watch | None = None, beside: Beside | N
         OplError: If the program cannot be written for the controller.
         Cancelled: If the run was cancelled.
     """
-    watch, motion = watch or Watch(), proven.motion
-    surfaced, exact = proven.surfaced, proven.planned.exact
+    watch, motion, planned = watch or Watch(), proven.motion, proven.planned
+    job, points = proven.surfaced.job, proven.surfaced.points
     stops: frozenset[int] = frozenset()
     while True:
-        with watch.stage(Stage.EXPORT), keys_named(surfaced.job.source):
+        with watch.stage(Stage.EXPORT), keys_named(job.source):
             program, files = render_program(proven, stops)
         with watch.stage(Stage.READ_BACK):
-            found = read_back(surfaced.job, surfaced.points, exact, motion, program, files, beside)
+            found = read_back(
+                job, points, planned.exact, motion, program, files, planned.seen, beside
+            )
         # in the air a corner that would come too near to something becomes a stop
         near = frozenset() if found is None else found.stops(program) - stops
         if not near:
@@ -242,10 +246,10 @@ def write_program(proven: Proven, watch: Watch | None = None, beside: Beside | N
     if found is not None and not found.proven:
         return Refused(proven, found, (), watch.seconds)
     with watch.stage(Stage.COMPARISON):
-        proven.planned.comparison.value()
+        planned.comparison.value()
     with watch.stage(Stage.EXPORT):
-        files = {**files, **proven.planned.charted.value().charts}
-        proven.planned.drawn.value()
+        files = {**files, **planned.charted.value().charts}
+        planned.drawn.value()
     return Written(proven, program, files, found, watch.seconds)
 
 

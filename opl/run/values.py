@@ -35,6 +35,7 @@ if TYPE_CHECKING:  # what a stage makes of a value is loaded with the stage
     from opl.report.packing import Packer
     from opl.run.watch import Stage
     from opl.verification.replay import Verification
+    from opl.verification.seen import Seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +135,7 @@ class Planned:
         timed: The motion through the fewest positions that do, in the digits of the program, with
             its times.
         timing: What is written of it, move by move, and what sets the times.
+        seen: What a reader of the program will see of its configurations.
         slow: Where the ground point is slower than the feed.
         charted: What charts show of the path.
         drawn: What the page of the run draws.
@@ -145,6 +147,7 @@ class Planned:
     exact: Motion
     timed: TimedMotion
     timing: Timing
+    seen: Seen
     slow: tuple[SlowStretch, ...]
     charted: Later[Charted]
     drawn: Later[Drawn]

@@ -183,17 +183,17 @@ def place_between(
         Fractional cutter point, contact position, and distance from the contact model in [m], with
         what the part is turned counted along `LEVER`; each of shape (s, n).
     """
-    n = Ts_contact0_workpiece.shape[1]
     start, span = ends[0][:, None, None], ends[1]
     time = np.maximum(duration, 1e-9)
     even = (t_ends[1] - t_ends[0])[:, None] * time / time.sum(axis=1, keepdims=True)
     width = 1.0 / TRIED  # of cutter points around a place that is tried anew
-    tried = np.tile(start + np.arange(span * TRIED + 1) / TRIED, (1, n, 1))
+    tried = start + np.arange(span * TRIED + 1) / TRIED  # at first the same for all of a segment
     for _ in range(1 + ROUNDS):
         Ts = Ts_contact0_workpiece[:, :, None] @ points.frames_at(tried)
         t = contact_positions(wheel, Ts)
         distance, angle = misfit(wheel, Ts, t)
         apart = np.hypot(distance, LEVER * angle)
+        tried = np.broadcast_to(tried, apart.shape)
         chosen = _in_order(tried, apart, t, even, t_ends)[..., None]
         place, t, apart = (np.take_along_axis(one, chosen, axis=2) for one in (tried, t, apart))
         tried = np.clip(place + np.linspace(-width, width, 9), start, start + span)

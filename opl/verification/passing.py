@@ -32,7 +32,7 @@ class Samples:
 
     Attributes:
         q: Joint positions in [rad], shape (n, 6).
-        duration: Time of the move that ends at each in [s], shape (n,).
+        share: Of the given move that each ends, what leads to it from the one before, shape (n,).
         Ts_contact0_workpiece: Where the part is at each, shape (n, 4, 4).
         source: The given configuration that the move ends at, as an index, shape (n,).
         given: Indices of those that were given, in order.
@@ -40,7 +40,7 @@ class Samples:
     """
 
     q: Array
-    duration: Array
+    share: Array
     Ts_contact0_workpiece: Array
     source: NDArray[np.intp]
     given: NDArray[np.intp]
@@ -53,7 +53,6 @@ def sample(
     points: CutterPoints,
     part_vertices: Array,
     q: Array,
-    duration: Array,
     allowed: float,
 ) -> Samples:
     """Sample moves where they may grind.
@@ -64,7 +63,6 @@ def sample(
         points: The cutter points that may be ground.
         part_vertices: Of the held part in [m], shape (k, 3).
         q: Joint positions in [rad], joined by linear joint interpolation, shape (n, 6).
-        duration: Time of the move that ends at each configuration in [s], shape (n,).
         allowed: Farthest that a ground point may be from the contact model in [m].
     """
     Ts = _places(arm, wheel, q)
@@ -84,12 +82,11 @@ def sample(
     put_in = _passed(wheel, points, Ts, at, np.flatnonzero(close), allowed)
     at, Ts = _with(arm, wheel, q, at, Ts, np.union1d(at, put_in))
     source = np.ceil(at).astype(np.intp)
-    share = np.diff(at, prepend=0.0)
     ends = np.concatenate([[False], close])
     near = ends[source] | (at == source) & np.concatenate([close, [False]])[source]
     return Samples(
         _on_lines(q, at),
-        share * duration[source],
+        np.diff(at, prepend=0.0),
         Ts,
         source,
         np.flatnonzero(at == source),

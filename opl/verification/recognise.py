@@ -9,7 +9,7 @@ configurations there get places that never go back and lie nearest to the contac
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,9 @@ from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion, MoveKind, TimedMotion
 from opl.verification.align import Course, align
-from opl.verification.arm import Arm
-from opl.verification.contact import find_touches
 from opl.verification.contact_segments import ContactSegment, ContactSegments
-from opl.verification.passing import Samples, sample
+from opl.verification.passing import Samples
+from opl.verification.seen import Seen, see
 
 # [m] that a configuration which is written at a cutter point may be off the contact model there:
 # what the digits of a position leave. Of several that grind a point the nearest is taken by this
@@ -85,6 +84,7 @@ def recognise(
     duration: Array,
     stations: NDArray[np.intp],
     rule: Rule,
+    seen: Seen | None = None,
 ) -> Recognition:
     """Find out which cutter points a motion grinds, where on the wheel, and what the rest is.
 
@@ -95,20 +95,19 @@ def recognise(
         duration: Time of the move that ends at each configuration in [s], shape (n,).
         stations: Indices of the configurations that are written, in order.
         rule: What a motion over the wheel has to keep.
+        seen: What is seen of configurations; taken if they are these to the last bit.
     """
-    allowed = rule.max_contact_error
-    with Arm(cell) as arm:
-        samples = sample(arm, cell.wheel, points, cell.part.vertices, q, duration, allowed)
-    # of the configurations of a straight move only the last is written, and all lie near together
-    Ts, near = samples.Ts_contact0_workpiece, samples.near
-    touches = find_touches(cell.wheel, points, Ts[near], allowed)
+    if seen is None or not np.array_equal(seen.q, q):
+        seen = see(cell, points, q, rule.max_contact_error)
+    samples, touches = seen.samples, seen.touches
+    duration = samples.share * duration[samples.source]
     step = max(rule.max_contact_step, SAMPLE_STEP)
-    touches = replace(touches, configuration=near[touches.configuration])
     written = np.isin(touches.configuration, samples.given[stations])
-    time = np.cumsum(samples.duration)[touches.configuration]
+    time = np.cumsum(duration)[touches.configuration]
     ground = align(touches, Course.of(points, rule.feed), AT_POINT, step, written, time)
-    segments = ContactSegments(cell.wheel, points, Ts, samples.duration, touches)
-    ground = segments.settled(ground, allowed)
+    Ts = samples.Ts_contact0_workpiece
+    segments = ContactSegments(cell.wheel, points, Ts, duration, touches)
+    ground = segments.settled(ground, rule.max_contact_error)
     labels = _Labels(segments, rule, samples.given)
     labels.grind(ground)
     return labels.recognition(samples, stations)
@@ -174,7 +173,7 @@ class _Labels:
             )
             for k, amount in self._astray
         )
-        timed = TimedMotion(motion, np.insert(samples.duration, at + 1, 0.0))
+        timed = TimedMotion(motion, np.insert(self._segments.duration, at + 1, 0.0))
         kept = np.flatnonzero(np.isin(row, samples.given) | is_ground[row])
         return Recognition(timed.take(kept), samples.source[row[kept]], findings)
 
