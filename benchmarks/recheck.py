@@ -112,13 +112,14 @@ class Proof:
     def _near(self, first: Cells, wall: Cells) -> Cells:
         """Return the images of a wall's cells that lie within the bound of a cell of the first."""
         low, high = first.low.min(axis=0), first.high.max(axis=0)
+        most = 2 + int(np.ceil(self._bound / TURN))  # no angle is beyond a turn, nor any box here
         found = []
         for family, sign, shift in self._flips:
             moved = wall.moved(sign, shift, family)
             counts = [
                 [
                     n
-                    for n in range(-2, 3)
+                    for n in range(-most, most + 1)
                     if (self._gap(moved, low, high, TURN * n)[:, j] < self._bound).any()
                 ]
                 for j in range(6)
