@@ -96,7 +96,7 @@ class Separation:
         self._order = np.lexsort(ends.T)
         ends = ends[self._order]
         starts = np.flatnonzero(np.diff(ends, axis=0, prepend=-1).any(axis=1))
-        beyond = np.append(starts[1:], len(pairs)).astype(np.int64)
+        beyond = np.append(starts[1:], len(pairs))[: len(starts)].astype(np.int64)
         self._groups = np.column_stack([starts, beyond, ends[starts]])
         self._group_levers = np.array(
             [self.levers[self._order[a:b]].max(axis=0) for a, b in self._groups[:, :2]]

@@ -9,9 +9,10 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.families import GROWN, Placement
+from opl.planning.families import GROWN
 from opl.planning.images import Seams, wrist_flips
 from opl.planning.nodes import inverse_solutions
+from opl.planning.placement import Placement
 from opl.planning.problem import GrindingProblem, wheel_distances
 from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
@@ -88,6 +89,7 @@ class ColumnSampler:
         for block in blocks_of(*grid.shape):
             coarse = self._coarse(places[block], placements)
             free = ~cuts[block] & ~np.isnan(coarse[..., 0])
+            free &= _allowed(there.pass_index[block], placements, grid[block])
             t[block], _ = sampled(grid[block], coarse, free, box, FINE, whole=True)
         # where the part begins to cut is known to a hair only
         last = problem.cell.wheel.last_position
@@ -167,6 +169,7 @@ class ColumnSampler:
                 angles = solutions[own][:, :, placement.family]
                 q[block][own] = self._placed(angles, placement)
         free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
+        free &= _allowed(there.pass_index, placements, t)
         return Columns(places, there, tuple(placements), t, q, free)
 
     def there(self, places: Array) -> CutterPoints:
@@ -204,3 +207,12 @@ class ColumnSampler:
         """Return postures as placed, of principal angles of their family, shape (n, m, 6)."""
         start = self._seams.start[placement.family]
         return placement.of(start + np.remainder(angles - start, 2.0 * np.pi))
+
+
+def _allowed(pass_index: np.ndarray, placements: Sequence[Placement], t: Array) -> np.ndarray:
+    """Return which contact positions of places their passes may use, shape (n, m)."""
+    allowed = np.empty(t.shape, dtype=bool)
+    for index, placement in enumerate(placements):
+        own = pass_index == index
+        allowed[own] = placement.holds(t[own])
+    return allowed

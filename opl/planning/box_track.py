@@ -37,6 +37,7 @@ MOST_PARTS = 8  # into which an edge that bulges is cut at once
 FINE_SHARE = 3e-5  # of the box: what an edge may bulge
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
+EDGES_OF_WORK = 3e5  # that cost a unit of work to search, all rounds
 MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
 MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
 
@@ -103,6 +104,7 @@ class BoxTracks:
         inner = box.widened(room / 2.0)
         t, spacing = samples_in(columns.t, columns.q, columns.free, inner, SAMPLES)
         t = np.concatenate([t, levels(columns.places, rows, inner, t[:, :1])], axis=1)
+        self.sampler.work += len(t) * t.shape[1] ** 2 / EDGES_OF_WORK
         at = self.sampler.at(columns.places, columns.points, columns.placements, t)
         coarse = sampled = _Sampled(self, at, rows, inner)
         track = sampled.smoothest()
@@ -153,7 +155,7 @@ class _Sampled:
         self._swept = False
         shut = shut_edges(columns.places, columns.t, rows, box)
         for matrix in self.matrices:
-            matrix.blocked.update(shut)
+            matrix.shut = shut
 
     def sweep(self) -> None:
         """Close every node that collides."""

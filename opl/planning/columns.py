@@ -11,6 +11,7 @@ or the part deeper in the wheel than any point of it can move within the cell.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 
@@ -24,6 +25,7 @@ from opl.cell.workcell import WorkCell
 from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
+from opl.planning.barriers import on_sides
 from opl.planning.cut_cells import cells_of, cut_finer
 from opl.planning.enclosed import ROUND_OFF, EnclosedCells, enclosing
 from opl.planning.images import Images
@@ -46,6 +48,7 @@ class ColumnWalls:
         part: The triangles of the part.
         points: The cutter points.
         images: The images of each posture.
+        barriers: Contact positions that each pass stays on one side of, in order; None for none.
     """
 
     def __init__(
@@ -54,11 +57,13 @@ class ColumnWalls:
         part: PartTree,
         points: CutterPoints,
         images: Images,
+        barriers: Sequence[Array] | None = None,
     ) -> None:
         self._cell = cell
         self._part = part
         self._points = points
         self.images = images
+        self._barriers = barriers
         self.made = 0.0  # walls made so far; one cell cut finer is part of one
 
     def columns(self, places: Sequence[float]) -> list[Wall]:
@@ -82,6 +87,11 @@ class ColumnWalls:
                 pieces[number] += found
         self.made += sum(1.0 if len(corners) == 2 else PART_OF_A_CHAIN for corners in chains)
         passes = self._points.pass_index[[int(corners[0][0]) for corners in chains]]
+        if self._barriers is not None:
+            pieces = [
+                [part for piece in found for part in on_sides(piece, self._barriers[index])]
+                for found, index in zip(pieces, passes.tolist(), strict=True)
+            ]
         return [
             Wall(int(passes[k]), (min(places) + max(places)) / 2.0, tuple(pieces[k]), chains[k])
             for k, places in enumerate([place for place, _ in corners] for corners in chains)
@@ -115,7 +125,8 @@ class ColumnWalls:
         else:
             none = np.zeros(FINER, dtype=bool)
             pieces = list(self._pieces(self._cells(T_workpiece_cutter[None], [grid], [none]), 0))
-        return tuple(found for found in pieces if found.family == piece.family)
+        own = (found for found in pieces if found.family == piece.family)
+        return tuple(replace(found, side=piece.side) for found in own)
 
     def postures(self, piece: Piece, at: Array) -> Array:
         """Return the joint positions along a piece in [rad], NaN where there are none.

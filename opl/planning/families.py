@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from opl.geometry.frames import Array
 from opl.planning.images import Images
+from opl.planning.placement import Placement
 from opl.search.box import JointBox
 from opl.search.cells import Key
 from opl.search.in_box import JUMP
@@ -26,39 +28,6 @@ MOST_GROWN = 200  # times that a box is grown for a column
 NODES_OF_WORK = 6000  # that cost a unit of work to hold against a box
 MOST_KNOWN = 64  # passes in one image each that are kept at hand
 GROWN = 1e-7  # [rad] less need not be grown for
-
-
-@dataclass(frozen=True)
-class Placement:
-    """Which image of a family a pass uses.
-
-    Attributes:
-        family: The family.
-        number: Which flip of the wrist.
-        flip: Its sign and shift.
-        shift: Full turns in [rad], shape (6,).
-        loose: Joints whose full turns are counted anew at each node, shape (6,).
-        center: Where those should be near to, in [rad], shape (6,).
-    """
-
-    family: int
-    number: int
-    flip: tuple[Array, Array]
-    shift: Array
-    loose: np.ndarray
-    center: Array
-
-    @property
-    def key(self) -> tuple[int, int, bytes]:
-        """The same for those that place alike, but for loose joints."""
-        return self.family, self.number, self.shift.tobytes()
-
-    def of(self, q: Array) -> Array:
-        """Return the placed joint positions, shape (..., 6)."""
-        sign, shift = self.flip
-        placed = q * sign + shift + self.shift
-        turns = 2.0 * np.pi * np.round((self.center - placed) / (2.0 * np.pi))
-        return np.asarray(np.where(self.loose, placed + turns, placed))
 
 
 @dataclass(frozen=True)
@@ -109,11 +78,6 @@ def _grown(by_joint: Array, free: np.ndarray, box: JointBox) -> JointBox | None:
     return JointBox(low, high)
 
 
-def alike(placements: Sequence[Placement]) -> bool:
-    """Return whether all passes are ground in one family with the wrist to one side."""
-    return len({(one.family, one.number) for one in placements}) == 1
-
-
 def few_columns(pass_index: np.ndarray) -> np.ndarray:
     """Return columns spread over all of them, both ends of each pass among them."""
     step = -(-len(pass_index) // MOST_COLUMNS)
@@ -130,18 +94,30 @@ class Families:
         q: Inverse solutions at `few_columns` in [rad], shape (n, M, 8, 6).
         cuts: Where the part would sink too deep into the wheel, shape (N, M).
         pass_index: Pass of each column, shape (N,).
+        contact_positions: Those of the solutions in belt units, shape (M,).
+        barriers: Contact positions that each pass stays on one side of, in order.
 
     Attributes:
         work: What was held against boxes so far, in units of work.
     """
 
-    def __init__(self, images: Images, q: Array, cuts: np.ndarray, pass_index: np.ndarray) -> None:
+    def __init__(
+        self,
+        images: Images,
+        q: Array,
+        cuts: np.ndarray,
+        pass_index: np.ndarray,
+        contact_positions: Array,
+        barriers: Sequence[Array],
+    ) -> None:
         self._images = images
+        self._contact_positions = contact_positions
+        self._barriers = barriers
         self._places = few = few_columns(pass_index)
         cuts, pass_index = cuts[few], pass_index[few]
         self._pass_index = pass_index
         self._unrolled = {}
-        self._known: dict[tuple[int, tuple[int, int, bytes]], tuple[Array, np.ndarray]] = {}
+        self._known: dict[tuple[object, ...], tuple[Array, np.ndarray]] = {}
         self.work = 0.0
         for family in images.families:
             start = images.seams.start[family]
@@ -154,6 +130,8 @@ class Families:
     def smallest_grown(self) -> JointBox | None:
         """Return a small box that holds a point of every column, grown from one of a few nodes."""
         best: JointBox | None = None
+        if any(len(t) for t in self._barriers):
+            return None  # it might be on either side of one
         step = max(len(self._pass_index) // FEW_COLUMNS, 1)
         for family, (unrolled, free) in self._unrolled.items():
             if not free.any(axis=1).all():
@@ -201,7 +179,8 @@ class Families:
             columns = self._pass_index == index
             unrolled, free = self._unrolled[placement.family]
             q = np.ascontiguousarray(np.moveaxis(placement.of(unrolled[columns]), 1, 2))
-            found = q, np.ascontiguousarray(free[columns])
+            allowed = placement.holds(self._contact_positions)
+            found = q, np.ascontiguousarray(free[columns] & allowed)
             if not placement.loose.any():
                 if len(self._known) >= MOST_KNOWN:
                     self._known.clear()
@@ -213,13 +192,16 @@ class Families:
         self, index: int, center: Array, keys: Sequence[Key] | None
     ) -> Iterator[Placement]:
         """Yield the images that a pass may use; of families not decided yet those near a box."""
+        ends = [-np.inf, *self._barriers[index].tolist(), np.inf]
+        sides = list(pairwise(ends))
         for family, (unrolled, free) in self._unrolled.items():
             loose = ~self._images.seams.kept[family]
             if keys is not None:
-                own = [key for name, key in keys if name == family]
-                for flip, *turns in own:
-                    shift = 2.0 * np.pi * np.array(turns, dtype=float)
-                    yield Placement(family, flip, self._images.flips[flip], shift, loose, center)
+                own = [(key, side) for name, key, side in keys if name == family]
+                for (flip, *turns), side in own:
+                    shift, between = 2.0 * np.pi * np.array(turns, dtype=float), sides[side]
+                    flipped = flip, self._images.flips[flip]
+                    yield Placement(family, *flipped, shift, loose, center, between)
                 continue
             columns = self._pass_index == index
             q, open_now = unrolled[columns], free[columns]
@@ -227,7 +209,8 @@ class Families:
             for flip, (sign, shift) in enumerate(self._images.flips):
                 whole = np.round((center - mean * sign - shift) / (2.0 * np.pi))
                 whole = 2.0 * np.pi * np.where(loose, 0.0, whole)
-                yield Placement(family, flip, (sign, shift), whole, loose, center)
+                for between in sides:
+                    yield Placement(family, flip, (sign, shift), whole, loose, center, between)
 
     def _fits(self, index: int, box: JointBox, keys: Sequence[Key] | None) -> list[Fit]:
         """Return how the images that a pass may use fit into a box."""

@@ -44,6 +44,7 @@ class OpenMatrix:
         free: Which nodes may be used; shrinks, shape (n_columns, n_rows).
         ladders: Make what a search sees.
         blocked: Keys of the edges that may not be used; grows.
+        shut: Keys of others that may not, sorted.
         causes: How often each cause blocked something, by cutter point.
         cut_off: How many tracks, otherwise free, were refused for a free move: by which one, and
             the pair of bodies that blocks it.
@@ -56,18 +57,22 @@ class OpenMatrix:
     free: np.ndarray
     ladders: Ladders
     blocked: set[int] = field(default_factory=set)
+    shut: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     causes: Counter[tuple[int, str]] = field(default_factory=Counter)
     cut_off: Counter[tuple[FreeMove, Blocker]] = field(default_factory=Counter)
     reached: int = 0
     _collides: dict[tuple[int, int], dict[int, bool]] = field(default_factory=dict)
     _swept: set[int] = field(default_factory=set)
     _sorted: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    _counted: int = 0
 
     @property
     def blocked_edges(self) -> np.ndarray:
         """The blocked keys, sorted, as the searches take them."""
-        if len(self._sorted) != len(self.blocked):
-            self._sorted = np.array(sorted(self.blocked), dtype=np.int64)
+        count = len(self.blocked) + len(self.shut)
+        if self._counted != count:
+            blocked = np.fromiter(self.blocked, np.int64, len(self.blocked))
+            self._sorted, self._counted = np.union1d(self.shut, blocked), count
         return self._sorted
 
     @property
@@ -120,7 +125,10 @@ class OpenMatrix:
         """Return whether nothing on a track is blocked."""
         columns = np.arange(len(rows))
         keys = self._edge_key(columns[:-1], rows[:-1], rows[1:])
-        return bool(self.free[columns, rows].all()) and self.blocked.isdisjoint(keys.tolist())
+        blocked = self.blocked_edges
+        at = np.searchsorted(blocked, keys)
+        met = blocked[np.minimum(at, len(blocked) - 1)] == keys if len(blocked) else False
+        return bool(self.free[columns, rows].all() and not np.any(met))
 
     def _edge_key(self, column: Any, row: Any, next_row: Any) -> Any:
         """Return the numbers under which ladders know edges."""

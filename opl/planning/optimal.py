@@ -11,15 +11,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from opl.planning.barriers import barriers
 from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.box_track import BoxTracks
 from opl.planning.columns import ColumnWalls
 from opl.planning.cut_cells import whole_cells
-from opl.planning.families import Families, Placement, alike, few_columns, grown
+from opl.planning.families import Families, few_columns, grown
 from opl.planning.holders import Holder, holders
 from opl.planning.images import Images, seams_of
 from opl.planning.obstructed import Obstructions
 from opl.planning.passages import Passages, Rectangles
+from opl.planning.placement import Placement, alike
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulge
@@ -40,6 +42,7 @@ EARLY_SHARE = 0.3  # of the work: motions in boxes that are not proven to be the
 FIRST_WORK = 300  # units that may be spent on those at once
 CLEARLY_LESS = 0.005  # of the best: what a motion in such a box should be better by
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
+MOST_REFINED = 12  # times that rectangles are cut finer for one box
 MOST_ADDED = 3  # walls at once
 
 
@@ -66,15 +69,17 @@ class OptimalSearch:
             most = Travel(fallback.path.joint_travel, fallback.path.contact_travel)
         images = Images(robot, seams, largest)
         part, points = problem.scene.part, problem.points
-        self._walls = ColumnWalls(problem.cell, part, points, images)
-        self._families = Families(images, q, problem.cuts, points.pass_index)
+        sides, t = barriers(problem), problem.field.contact_positions
+        self._walls = ColumnWalls(problem.cell, part, points, images, sides)
+        self._families = Families(images, q, problem.cuts, points.pass_index, t, sides)
         self._sampler = ColumnSampler(problem, seams)
         costs, most_change = settings.costs, settings.max_contact_change
         self._tracks = BoxTracks(problem, self._sampler, costs, most_change, most)
         self.plan = fallback
         self._largest = largest
         self._proven = self._least_hope = 0.0
-        self._given_up = 0
+        self._given_up = self._refined = 0
+        self._refined_for = 0.0  # size of the box for which rectangles were cut finer last
         self._forbidden: Forbidden | None = None  # of collisions, once they are known to matter
         self._early = 0.0  # work on early motions
         self.proof = BoxProof(images.of, self._walls.finer, largest, PROOF_SHARE * settings.widen)
@@ -251,7 +256,9 @@ class OptimalSearch:
 
         def learn(bulges: Sequence[Bulge]) -> bool:
             nonlocal learnt
-            learnt = self._rectangles.refine(bulges)
+            self._refined = self._refined + 1 if box.size == self._refined_for else 0
+            self._refined_for = box.size
+            learnt = self._refined < MOST_REFINED and self._rectangles.refine(bulges)
             return learnt
 
         self.keep(self._tracks.plan(columns, passages.rows, box, self._room(box), learn))

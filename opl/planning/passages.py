@@ -15,7 +15,8 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.box_columns import ColumnSampler
-from opl.planning.families import Placement, grown
+from opl.planning.families import grown
+from opl.planning.placement import Placement
 from opl.planning.rows import Bulge, Row
 from opl.search.box import JointBox
 from opl.search.in_box import missing
@@ -162,7 +163,14 @@ class Rectangles:
         index = self._points.pass_index[int(places[0])]
         key = places[0], places[-1], len(places), self._state(), index
         image = placements[index]
-        key = *key, image.family, image.number, *image.shift, *(image.center * image.loose)
+        key = (
+            *key,
+            *image.between,
+            image.family,
+            image.number,
+            *image.shift,
+            *(image.center * image.loose),
+        )
         nodes = self._nodes.get(key)
         if nodes is None:
             for old in [old for old in self._nodes if old[4] == index and old[:3] != key[:3]]:

@@ -74,12 +74,12 @@ def levels(places: Array, rows: Sequence[Row], box: JointBox, otherwise: Array) 
     return levels
 
 
-def shut_edges(places: Array, t: Array, rows: Sequence[Row], box: JointBox) -> list[int]:
-    """Return the keys of the edges that pass a row where it lies outside of a box.
+def shut_edges(places: Array, t: Array, rows: Sequence[Row], box: JointBox) -> np.ndarray:
+    """Return the sorted keys of the edges that pass a row where it lies outside of a box.
 
     The nodes are at some places and contact positions, shape (n,) and (n, m).
     """
-    n_rows, found = t.shape[1], []
+    n_rows, found = t.shape[1], [np.empty(0, dtype=np.int64)]
     for row in rows:
         first, last = row.inside(box).T
         on = np.flatnonzero((places[:-1] >= row.places[0]) & (places[1:] <= row.places[-1]))
@@ -90,5 +90,5 @@ def shut_edges(places: Array, t: Array, rows: Sequence[Row], box: JointBox) -> l
         below = t < row.contact_position
         passed = below[edge][:, :, None] != below[edge + 1][:, None, :]
         k, here, there = np.nonzero(passed)
-        found += ((edge[k] * n_rows + here) * n_rows + there).tolist()
-    return found
+        found.append((edge[k] * n_rows + here) * n_rows + there)
+    return np.unique(np.concatenate(found))

@@ -17,7 +17,7 @@ from opl.search.walls import Image, Piece, Wall
 
 COLUMNS = 26  # start 0:6, end 6:12, pad_low 12:18, pad_high 18:24, places 24 and 25
 WALL, KEY, SOURCE, FIRST, END = range(5)  # columns of a span
-Key = tuple[int, tuple[int, ...]]  # a family, and the key of its image
+Key = tuple[int, tuple[int, ...], int]  # a family, the key of its image, and the side
 FORBIDDEN = 1e3  # [rad] presses on every face of any box by more than is of interest
 
 
@@ -111,7 +111,7 @@ class Cells:
         self.pass_index = np.append(self.pass_index, wall.pass_index)
 
     def keys_of(self, spans: np.ndarray) -> dict[int, list[Key]]:
-        """Return the families and images of spans, by their pass, as all its walls have them."""
+        """Return the families, images and sides of spans, by pass, as all its walls have them."""
         names = list(self._keys)
         both = np.unique(np.stack([self.pass_index[spans[:, WALL]], spans[:, KEY]]), axis=1)
         found: dict[int, list[Key]] = {}
@@ -200,7 +200,7 @@ class Cells:
                 more = np.empty((self._used, COLUMNS))
                 self.table = np.concatenate([self.table, more])
             self._enter(source)
-        key = self._keys.setdefault((piece.family, image.key), len(self._keys))
+        key = self._keys.setdefault((piece.family, image.key, piece.side), len(self._keys))
         return wall, key, source, first, first + n
 
     def _enter(self, source: int) -> None:

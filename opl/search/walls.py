@@ -11,7 +11,7 @@ wrist flipped.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,6 +49,7 @@ class Piece:
         pad_high: How far above, not negative, shape (n, 6).
         bends: Whether the pads hold because the curve bends little over a cell: they are h^2 / 8
             times its second derivative, shape (n,); None where they hold for other reasons.
+        side: Between which barriers it runs: a pass is ground between the same two as a whole.
     """
 
     family: int
@@ -58,6 +59,7 @@ class Piece:
     pad_low: Array
     pad_high: Array
     bends: np.ndarray | None = None
+    side: int = 0
 
     @property
     def low(self) -> Array:
@@ -73,14 +75,13 @@ class Piece:
         """Return the cells from ``first`` to before ``end`` alone."""
         corners = slice(first, end + 1)
         cells = slice(first, end)
-        return Piece(
-            self.family,
-            self.line,
-            self.at[corners],
-            self.corners[corners],
-            self.pad_low[cells],
-            self.pad_high[cells],
-            None if self.bends is None else self.bends[cells],
+        return replace(
+            self,
+            at=self.at[corners],
+            corners=self.corners[corners],
+            pad_low=self.pad_low[cells],
+            pad_high=self.pad_high[cells],
+            bends=None if self.bends is None else self.bends[cells],
         )
 
 
@@ -107,14 +108,11 @@ class Image:
     def of(self, piece: Piece) -> Piece:
         """Return a piece moved there."""
         mirrored = self.sign < 0.0
-        return Piece(
-            piece.family,
-            piece.line,
-            piece.at,
-            piece.corners * self.sign + self.shift,
-            np.where(mirrored, -piece.pad_high, piece.pad_low),
-            np.where(mirrored, -piece.pad_low, piece.pad_high),
-            piece.bends,
+        return replace(
+            piece,
+            corners=piece.corners * self.sign + self.shift,
+            pad_low=np.where(mirrored, -piece.pad_high, piece.pad_low),
+            pad_high=np.where(mirrored, -piece.pad_low, piece.pad_high),
         )
 
 

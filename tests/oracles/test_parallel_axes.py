@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from opl.cell.inverse_kinematics import inverse_kinematics, singularity_margins
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.robot import controller_poses, forward_kinematics, known_robots, load_robot
-from opl.planning.nodes import _lift
+from opl.planning.nodes import _unrolled
 from tests.support.closed_forms import difference
 
 UR10E = load_robot("ur10e")
@@ -191,5 +191,5 @@ def test_full_turns_of_nearly_every_joint_do_not_multiply_the_work():
     q = inverse_kinematics(
         UR10E.arm, forward_kinematics(UR10E, np.array([[[0.1, -1.5, 1.2, 0.3, -1.4, 0.2]]]))
     )
-    _, sheets, copies = _lift(q[:, :, 0], UR10E.lower, UR10E.upper)
+    _, sheets, copies = _unrolled(q[:, :, 0], UR10E.lower, UR10E.upper)
     assert len(sheets) == len(copies) == 1

@@ -112,7 +112,8 @@ def test_places_near_a_box_are_sampled_alike_in_blocks(monkeypatch):
     points, robot = problem.points, problem.cell.robot
     q = problem.solutions(few_columns(points.pass_index))
     seams = seams_of(q)
-    families = Families(Images(robot, seams, 10.0), q, problem.cuts, points.pass_index)
+    t, none = problem.field.contact_positions, [np.empty(0)] * points.n_passes
+    families = Families(Images(robot, seams, 10.0), q, problem.cuts, points.pass_index, t, none)
     box = families.smallest_grown()
     placements, _ = families.hold(box, {}, set(), 0.1)
     whole = np.arange(len(points), dtype=float)

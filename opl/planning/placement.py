@@ -1,0 +1,55 @@
+"""Which image of an inverse solution a pass uses, and between which barriers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.geometry.frames import Array
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Which image of a family a pass uses.
+
+    Attributes:
+        family: The family.
+        number: Which flip of the wrist.
+        flip: Its sign and shift.
+        shift: Full turns in [rad], shape (6,).
+        loose: Joints whose full turns are counted anew at each node, shape (6,).
+        center: Where those should be near to, in [rad], shape (6,).
+        between: Contact positions in belt units that the pass stays between.
+    """
+
+    family: int
+    number: int
+    flip: tuple[Array, Array]
+    shift: Array
+    loose: np.ndarray
+    center: Array
+    between: tuple[float, float] = (-np.inf, np.inf)
+
+    @property
+    def key(self) -> tuple[int, int, bytes, tuple[float, float]]:
+        """The same for those that place alike, but for loose joints."""
+        return self.family, self.number, self.shift.tobytes(), self.between
+
+    def holds(self, contact_position: Array) -> np.ndarray:
+        """Return which contact positions in belt units the pass may use."""
+        low, high = self.between
+        return (low < contact_position) & (contact_position < high)
+
+    def of(self, q: Array) -> Array:
+        """Return the placed joint positions, shape (..., 6)."""
+        sign, shift = self.flip
+        placed = q * sign + shift + self.shift
+        turns = 2.0 * np.pi * np.round((self.center - placed) / (2.0 * np.pi))
+        return np.asarray(np.where(self.loose, placed + turns, placed))
+
+
+def alike(placements: Sequence[Placement]) -> bool:
+    """Return whether all passes are ground in one family with the wrist to one side."""
+    return len({(one.family, one.number) for one in placements}) == 1
