@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opl.files.kernels import kernel
+from opl.geometry.frames import Array
 from opl.motion.corner_error import rounded_off
 from opl.motion.gradual import LEAST_COUNTED
 from opl.motion.line_error import Run, Screws, straight_off
@@ -42,8 +43,48 @@ class ChainRule:
     corner: float = np.inf
 
 
+class Lines:
+    """The lines of a run that keep their contact, found once for every choice of configurations.
+
+    Args:
+        screws: The arm.
+        run: The run, two configurations at least.
+    """
+
+    def __init__(self, screws: Screws, run: Run) -> None:
+        self._arm = screws.axes, screws.T_base_flange
+        self._values = run.arrays[:-1]
+        self._found: dict[bytes, tuple[NDArray[np.int64], NDArray[np.int64], Array]] = {}
+
+    def among(
+        self, kept: NDArray[np.intp], barred: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """Return lines between some configurations by where they end.
+
+        Args:
+            kept: Indices of those in the run, in order.
+            barred: Lines that are left out, by the places of their ends among these, shape (b, 2).
+
+        Returns:
+            Where each line starts; of each configuration the first line that ends there, and the
+            number of all; the largest error of each as a fraction of what is allowed.
+        """
+        key = kept.tobytes()
+        if key not in self._found:
+            self._found[key] = _lines(*self._arm, *(value[kept] for value in self._values))
+        starts, first, errors = self._found[key]
+        ends = np.repeat(np.arange(len(kept)), np.diff(first))
+        wanted = ~np.isin(ends * len(kept) + starts, barred[:, 1] * len(kept) + barred[:, 0])
+        counts = np.bincount(ends[wanted], minlength=len(kept))
+        return starts[wanted], np.append(0, np.cumsum(counts)), errors[wanted]
+
+
 def fewest(
-    screws: Screws, run: Run, rule: ChainRule, blocked: frozenset[tuple[int, ...]] = frozenset()
+    screws: Screws,
+    run: Run,
+    rule: ChainRule,
+    blocked: frozenset[tuple[int, ...]] = frozenset(),
+    lines: Lines | None = None,
 ) -> NDArray[np.intp] | None:
     """Return the fewest configurations that do, in order, the first and the last among them.
 
@@ -56,11 +97,13 @@ def fewest(
         rule: What the chain has to keep.
         blocked: What may not be taken: lines by the indices of their ends, and corners by where
             their lines come from, meet and lead to.
+        lines: Those of the arm and the run, if they were looked at before.
 
     Returns:
         Indices in the run; None if no chain keeps the rule.
     """
-    return chain_of(screws, run, rule, blocked, np.arange(len(run.q)))
+    lines = lines or Lines(screws, run)
+    return chain_of(screws, run, rule, blocked, np.arange(len(run.q)), lines)
 
 
 def chain_of(
@@ -69,6 +112,7 @@ def chain_of(
     rule: ChainRule,
     blocked: frozenset[tuple[int, ...]],
     kept: NDArray[np.intp],
+    lines: Lines,
 ) -> NDArray[np.intp] | None:
     """Return the fewest of some configurations, as `fewest` does.
 
@@ -81,19 +125,19 @@ def chain_of(
         for one in sorted(blocked)
         if all(row in of_kept for row in one)
     ]
-    lines, corners = (
+    barred, corners = (
         np.array([one for one in known if len(one) == n], dtype=np.int64).reshape(-1, n)
         for n in (2, 3)
     )
     arm = screws.axes, screws.T_base_flange
     limits = rule.shortest, rule.ratio, rule.zone, rule.corner
     values = (value[kept] for value in run.arrays)
-    chain = _chain(*arm, *values, *limits, lines, corners, kept)
+    chain = _chain(*arm, *values, *limits, *lines.among(kept, barred), corners, kept)
     return kept[chain] if len(chain) else None
 
 
 @kernel()
-def _lines(axes, T0, q, places, targets, freedom, room, allowed, pace, barred):  # type: ignore[no-untyped-def]
+def _lines(axes, T0, q, places, targets, freedom, room, allowed, pace):  # type: ignore[no-untyped-def]
     """Return the lines that keep their contact by where they end: starts, first ones, errors."""
     n = len(q)
     T, work = np.empty((3, 4)), np.empty((3, 6))
@@ -122,11 +166,6 @@ def _lines(axes, T0, q, places, targets, freedom, room, allowed, pace, barred): 
             )
             if error > 1.0:
                 continue
-            refused = False
-            for b in range(len(barred)):
-                refused |= barred[b, 0] == i and barred[b, 1] == j
-            if refused:
-                continue
             if count == len(starts):
                 starts = np.concatenate((starts, np.empty(count, np.int64)))
                 errors = np.concatenate((errors, np.empty(count)))
@@ -151,15 +190,13 @@ def _even(pace, i, j, k, ratio):  # type: ignore[no-untyped-def]
 @kernel()
 def _chain(  # type: ignore[no-untyped-def]
     axes, T0, q, places, targets, freedom, room, allowed, pace, tool,
-    shortest, ratio, zone, most, barred, wide, at,
+    shortest, ratio, zone, most, starts, first, errors, wide, at,
 ):  # fmt: skip
     """Return the best chain; empty if there is none. A line is charged for with all before it.
 
-    ``at`` are the indices of the configurations in the run that they are of.
+    ``starts``, ``first`` and ``errors`` are those of `_lines`; ``at`` are the indices of the
+    configurations in the run that they are of.
     """
-    starts, first, errors = _lines(
-        axes, T0, q, places, targets, freedom, room, allowed, pace, barred
-    )
     n, m = len(q), len(starts)
     cost, largest, before = np.empty(m, np.int64), np.empty(m), np.full(m, -1, np.int64)
     order = np.arange(m)  # the lines that end at a configuration, the best first

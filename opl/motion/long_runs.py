@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opl.files.kernels import kernel
-from opl.motion.fewest import ChainRule, chain_of, fewest
+from opl.motion.fewest import ChainRule, Lines, chain_of, fewest
 from opl.motion.line_error import Run, Screws, straight_off
 
 ENOUGH = 192  # configurations, evenly spread, to choose from; twice as many are left as they are
@@ -25,7 +25,11 @@ LEFT_OUT = (0.1, 0.01)
 
 
 def fewest_of_long(
-    screws: Screws, run: Run, rule: ChainRule, blocked: frozenset[tuple[int, ...]] = frozenset()
+    screws: Screws,
+    run: Run,
+    rule: ChainRule,
+    blocked: frozenset[tuple[int, ...]] = frozenset(),
+    lines: Lines | None = None,
 ) -> NDArray[np.intp] | None:
     """Return the fewest configurations that do, in order, the first and the last among them.
 
@@ -38,17 +42,19 @@ def fewest_of_long(
         run: The run, two configurations at least.
         rule: What the chain has to keep.
         blocked: What may not be taken, as in `fewest`.
+        lines: Those of the arm and the run, if they were looked at before.
 
     Returns:
         Indices in the run; None if no chain keeps the rule.
     """
     stride = len(run.q) // ENOUGH
+    lines = lines or Lines(screws, run)
     if stride <= 1:
-        return fewest(screws, run, rule, blocked)
+        return fewest(screws, run, rule, blocked, lines)
     arm, values = (screws.axes, screws.T_base_flange), run.arrays[:-1]
     for share in LEFT_OUT:
         kept, refused = _kept(*arm, *values, share, stride), blocked
-        while (chain := chain_of(screws, run, rule, refused, kept)) is not None:
+        while (chain := chain_of(screws, run, rule, refused, kept, lines)) is not None:
             missed: list[int] = []
             for line in pairwise(chain.tolist()):
                 off, place = _off(*arm, *values, *line)
@@ -58,7 +64,7 @@ def fewest_of_long(
             if not missed:
                 return chain
             kept = np.union1d(kept, missed)
-    return fewest(screws, run, rule, blocked)
+    return fewest(screws, run, rule, blocked, lines)
 
 
 @kernel()

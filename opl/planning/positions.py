@@ -20,7 +20,7 @@ from opl.errors import UnsafeError
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import MM_PER_M, ContactWheel
-from opl.motion.fewest import ChainRule
+from opl.motion.fewest import ChainRule, Lines
 from opl.motion.gradual import PLANNED_RATIO
 from opl.motion.line_error import LEVER, ROLLS, SLIDES, Run, Screws, line_errors, screws_of
 from opl.motion.long_runs import fewest_of_long
@@ -105,11 +105,12 @@ def with_fewest_positions(
     blocked: dict[int, frozenset[tuple[int, ...]]] = {}
     chosen: dict[int, NDArray[np.intp]] = {}
     runs = dict(on_wheel_runs(scene.cell, points, motion, process, rule))
+    lines = {first: Lines(screws, run) for first, run in runs.items()}
     stale = list(runs)
     while stale:
         for first in dict.fromkeys(stale):
-            run, chain = runs[first], rule.chain
-            found = fewest_of_long(screws, run, chain, blocked.get(first, frozenset()))
+            refused = blocked.get(first, frozenset())
+            found = fewest_of_long(screws, runs[first], rule.chain, refused, lines[first])
             if found is None:
                 index = motion.pass_index[first] + 1
                 raise UnsafeError(f"pass {index}: no positions keep the contact error")
@@ -125,9 +126,9 @@ def with_fewest_positions(
         wide = [turn for turn in rule.too_wide(thinned) if turn[2] - turn[0] > 2]
         for taken in (*hitting, *wide):
             of = max(start for start in runs if start <= taken[0])
-            refused = tuple(row - of for row in taken)
-            if refused not in blocked.get(of, frozenset()):
-                blocked[of] = blocked.get(of, frozenset()) | {refused}
+            barred = tuple(row - of for row in taken)
+            if barred not in blocked.get(of, frozenset()):
+                blocked[of] = blocked.get(of, frozenset()) | {barred}
                 stale.append(of)
     return thinned
 
