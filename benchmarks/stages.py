@@ -15,6 +15,7 @@ from benchmarks.measuring import MICRO, SECOND, Row, timed
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
+from opl.files.kernels import load_kernels
 from opl.job.load import Job
 from opl.planning.multi_start import plan_recursive
 from opl.planning.problem import GrindingProblem, build_problem, wheel_distances
@@ -28,6 +29,7 @@ SAMPLE = 2000  # of what is held against a reference that takes one thing at a t
 
 def stage_rows(runs: int) -> Iterator[Row]:
     """Measure every stage on the V part: inverse kinematics to the replay."""
+    load_kernels()  # as they are in a run
     job = v_job()
     points = opl.cut_surface(job).points
     scene = planning_scene(job.cell)

@@ -37,11 +37,14 @@ def inverse_kinematics(arm: Arm, Ts_base_flange: Array, near: Array | None = Non
         centre on axis 1) both are given.
     """
     shape = np.shape(Ts_base_flange)[:-2]
+    nearby = np.broadcast_to(np.zeros(6) if near is None else near, (*shape, 6)).reshape(-1, 6)
+    if isinstance(arm, SphericalWristArm):
+        q = arm.solutions(np.reshape(Ts_base_flange, (-1, 4, 4)), nearby)
+        return q.reshape(*shape, N_IK_BRANCHES, 6)
     # axes and origin of n poses, coordinates first and contiguous: numpy is fastest along n
     columns = np.reshape(Ts_base_flange, (-1, 4, 4))[:, :3].transpose(2, 1, 0)
     x, y, z, p = np.ascontiguousarray(columns, dtype=float)
     signs, offsets = np.array(arm.signs), np.array(arm.offsets)
-    nearby = np.broadcast_to(np.zeros(6) if near is None else near, (*shape, 6)).reshape(-1, 6)
     angles = arm.angles(x, y, z, p, (nearby * signs - offsets).T)
     # an elbow out of reach takes the configuration with it
     missing = np.isnan(angles[1])

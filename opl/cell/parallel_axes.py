@@ -69,8 +69,16 @@ class ParallelAxesArm:
     def angles(self, x: Array, y: Array, z: Array, p: Array, near: Array) -> tuple[Array, ...]:
         """Return theta1 to theta6 that put the flange at poses.
 
-        Arguments and result are those of `SphericalWristArm.angles`, but ``near`` gives theta6
-        where axis 6 is parallel to axes 2 to 4, which then share what the pose leaves free.
+        Args:
+            x: Axes of the flange in the base frame, shape (3, n).
+            y: As x.
+            z: As x.
+            p: Its origins in [m], shape (3, n).
+            near: Angles of a configuration nearby in [rad], shape (6, n): theta6 where axis 6 is
+                parallel to axes 2 to 4, which then share what the pose leaves free.
+
+        Returns:
+            Six arrays that broadcast to (2 flip, 2 back, 2 elbow, n), in [rad]; NaN out of reach.
         """
         w = p - self.c5 * z
         theta1, ahead = heading_to(w, self.b)

@@ -26,12 +26,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.triangle import bend_to, heading_to
+from opl.cell.full_turns import FULL_TURN
+from opl.cell.triangle import STRETCH_TOLERANCE
+from opl.files.kernels import kernel, kernels_are_loaded, prange, threads_are_allowed
 from opl.geometry.frames import Array
 
 # Below this sine of theta5, axes 4 and 6 are one axis. Taking the wrist for straight there turns
 # the flange by no more than this in [rad]; just above it theta4 still stands out of round-off.
 _WRIST_TOLERANCE = 1e-12
+FEW = 4000  # poses that are not worth more than one thread: others wait for a while in vain
 
 
 @dataclass(frozen=True)
@@ -66,34 +69,34 @@ class SphericalWristArm:
         """Farthest that the wrist centre can be from axis 1 in [m]."""
         return float(np.hypot(self.a1 + self.c2 + np.hypot(self.a2, self.c3), self.b))
 
-    def angles(self, x: Array, y: Array, z: Array, p: Array, near: Array) -> tuple[Array, ...]:
-        """Return theta1 to theta6 that put the flange at poses.
+    def solutions(self, Ts_base_flange: Array, near: Array) -> Array:
+        """Return all configurations that put the flange at poses, limits not regarded.
+
+        The same to the last digit by compiled code, on all cores where there are many poses, and by
+        numpy until any compiled code is loaded.
 
         Args:
-            x: Axes of the flange in the base frame, shape (3, n).
-            y: As x.
-            z: As x.
-            p: Its origins in [m], shape (3, n).
-            near: Angles of a configuration nearby in [rad], shape (6, n): theta4 of the straight
-                wrist.
+            Ts_base_flange: Shape (n, 4, 4).
+            near: Configurations nearby in [rad], shape (n, 6): joint 4 of the straight wrist.
 
         Returns:
-            Six arrays that broadcast to (2 flip, 2 back, 2 elbow, n), in [rad]; NaN out of reach.
+            In (-pi, pi] [rad], shape (n, 8 slots, 6); NaN out of reach.
         """
-        wrist = p - self.c4 * z
-        theta1, ahead = heading_to(wrist, self.b)
         forearm, forearm_tilt = np.hypot(self.a2, self.c3), np.arctan2(self.a2, self.c3)
-        theta2, bend = bend_to(ahead - self.a1, wrist[2] - self.c1, self.c2, forearm)
-        theta3 = bend - forearm_tilt
-        theta4, theta5, theta6, half_turn = _orientation(theta1, theta2 + theta3, x, y, z, near[3])
-        return (
-            theta1,
-            theta2,
-            theta3,
-            np.stack([theta4, theta4 + half_turn]),
-            np.stack([theta5, -theta5]),
-            np.stack([theta6, theta6 + half_turn]),
-        )
+        sizes = np.array([self.a1, self.b, self.c1, self.c2, self.c4, forearm, forearm_tilt])
+        offsets, signs = np.array(self.offsets), np.array(self.signs, dtype=float)
+        theta4_free = near[:, 3] * signs[3] - offsets[3]
+        if not kernels_are_loaded():
+            T = np.moveaxis(Ts_base_flange, 0, -1)
+            found = np.empty((8, 6, len(Ts_base_flange)))
+            _solve.plain(*T[:3].reshape(12, -1), theta4_free, sizes, offsets, signs, found)
+            return np.ascontiguousarray(np.moveaxis(found, -1, 0))
+        q = np.empty((len(Ts_base_flange), 8, 6))
+        kernel = _solve_all if len(q) > FEW and threads_are_allowed() else _solve_few
+        # compiled for arrays that can be written to
+        Ts = np.array(Ts_base_flange, dtype=float, order="C")
+        kernel(Ts, theta4_free, sizes, offsets, signs, q)
+        return q
 
     def margins(self, theta: Array) -> Array:
         """Return the figures of `singularity_margins` for angles in [rad], shape (..., 6)."""
@@ -113,58 +116,123 @@ class SphericalWristArm:
         )
 
 
-def _orientation(
-    theta1: Array, tilt: Array, x: Array, y: Array, z: Array, theta4_free: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Return theta4, theta5 and theta6 that give the flange its axes x, y, z.
+@kernel(for_arrays=np.where)
+def _either(condition, one, other):  # type: ignore[no-untyped-def]
+    """Return one of two numbers."""
+    return one if condition else other
 
-    Along e1, e2, e3, the columns of Rz(theta1) Ry(tilt), the flange axis z has the coordinates
-    (cos theta4 sin theta5, sin theta4 sin theta5, cos theta5). Axis 5 points along
-    -sin theta4 e1 + cos theta4 e2, and its coordinates along x and y are sin theta6 and cos theta6.
-    Theta6 is measured against that axis 5, not found from z: near the straight wrist theta4 is
-    hardly known, and their sum comes out right only if both rest on the same theta4.
+
+@kernel()
+def _principal(angle):  # type: ignore[no-untyped-def]
+    """Turn an angle into (-pi, pi], as `opl.cell.full_turns.principal`."""
+    return np.minimum(angle - FULL_TURN * np.ceil(angle / FULL_TURN - 0.5), np.pi)
+
+
+@kernel()
+def _from_zero(value, scale):  # type: ignore[no-untyped-def]
+    """Take values below 0 by round-off for 0, and others below 0 for NaN."""
+    return _either(value < -STRETCH_TOLERANCE * scale, np.nan, np.maximum(value, 0.0))
+
+
+@kernel()
+def _solve(  # type: ignore[no-untyped-def]
+    x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2, theta4_free, sizes, offsets, signs, q
+):
+    """Set all configurations of a pose, (8, 6), or of n poses given as arrays, (8, 6, n).
+
+    Columns and origin of the pose are given row by row.
+
+    The position of the wrist centre fixes theta1 to theta3. Along e1, e2, e3, the columns of
+    Rz(theta1) Ry(theta2 + theta3), the flange axis z has the coordinates (cos theta4 sin theta5,
+    sin theta4 sin theta5, cos theta5). Axis 5 points along -sin theta4 e1 + cos theta4 e2, and its
+    coordinates along x and y are sin theta6 and cos theta6. Theta6 is measured against that axis 5,
+    not found from z: near the straight wrist theta4 is hardly known, and their sum comes out right
+    only if both rest on the same theta4.
 
     Turning axis 4 by half a turn and bending the wrist to the other side gives the same axes. A
-    straight wrist has no other side; both slots then keep theta4_free.
-
-    Args:
-        theta1: Angle of axis 1 in [rad], shape (2 back, 1, n).
-        tilt: theta2 + theta3 in [rad], shape (2 back, 2 elbow, n).
-        x: Axes in the base frame, shape (3, n).
-        y: As x.
-        z: As x.
-        theta4_free: Of the straight wrist in [rad], shape (n,).
-
-    Returns:
-        theta4, theta5 >= 0, theta6, and what to add to theta4 and theta6 where theta5 turns
-        negative: pi, or 0 for a straight wrist. All in [rad], shape (2 back, 2 elbow, n).
+    straight wrist has no other side; both slots then keep ``theta4_free``.
     """
-    cos1, sin1, cos_tilt, sin_tilt = np.cos(theta1), np.sin(theta1), np.cos(tilt), np.sin(tilt)
+    a1, b, c1, c2, c4 = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4]
+    forearm, forearm_tilt = sizes[5], sizes[6]
+    w0, w1, w2 = p0 - c4 * z0, p1 - c4 * z1, p2 - c4 * z2
+    in_front = np.sqrt(_from_zero(w0 * w0 + w1 * w1 - b * b, b * b))
+    heading = np.arctan2(w1, w0)
+    cos4_free, sin4_free = np.cos(theta4_free), np.sin(theta4_free)
+    for back in range(2):
+        ahead = in_front * (1.0 - 2.0 * back)
+        theta1 = heading - np.arctan2(b, ahead)
+        forward, up = ahead - a1, w2 - c1
+        # law of cosines; the bend is the angle between upper arm and forearm, 0 when in line
+        apart = forward * forward + up * up
+        cos_bend = (apart - c2 * c2 - forearm * forearm) / (2.0 * c2 * forearm)
+        sin_bend = np.sqrt(_from_zero(1.0 - cos_bend * cos_bend, 2.0))
+        bend = np.arctan2(sin_bend, cos_bend)
+        # the end stands off the upper arm by the angle that the bent forearm subtends
+        to_end = np.arctan2(forward, up)
+        subtended = np.arctan2(forearm * sin_bend, c2 + forearm * cos_bend)
+        cos1, sin1 = np.cos(theta1), np.sin(theta1)
+        # along the heading of the arm, and to the left of it
+        x_ahead, y_ahead = cos1 * x0 + sin1 * x1, cos1 * y0 + sin1 * y1
+        z_ahead = cos1 * z0 + sin1 * z1
+        x_left, y_left = cos1 * x1 - sin1 * x0, cos1 * y1 - sin1 * y0
+        z_left = cos1 * z1 - sin1 * z0
+        turned1 = _principal((theta1 + offsets[0]) * signs[0])
+        for elbow in range(2):
+            side = 1.0 - 2.0 * elbow
+            theta2 = to_end - side * subtended
+            theta3 = side * bend - forearm_tilt
+            tilt = theta2 + theta3
+            cos_tilt, sin_tilt = np.cos(tilt), np.sin(tilt)
+            z_along = cos_tilt * z_ahead - sin_tilt * z2
+            sin5 = np.sqrt(z_along * z_along + z_left * z_left)
+            straight = sin5 < _WRIST_TOLERANCE
+            sin5 = _either(straight, 0.0, sin5)
+            length = _either(straight, 1.0, sin5)
+            cos4 = _either(straight, cos4_free, z_along / length)
+            sin4 = _either(straight, sin4_free, z_left / length)
+            sin6 = cos4 * x_left - sin4 * (cos_tilt * x_ahead - sin_tilt * x2)
+            cos6 = cos4 * y_left - sin4 * (cos_tilt * y_ahead - sin_tilt * y2)
+            theta4, theta6 = np.arctan2(sin4, cos4), np.arctan2(sin6, cos6)
+            theta5 = np.arctan2(sin5, sin_tilt * z_ahead + cos_tilt * z2)
+            half_turn = _either(straight, 0.0, np.pi)
+            # an elbow out of reach takes the configuration with it
+            missing = np.isnan(theta2)
+            turned2 = _principal((theta2 + offsets[1]) * signs[1])
+            turned3 = _principal((theta3 + offsets[2]) * signs[2])
+            for flip in range(2):
+                slot = 4 * flip + 2 * back + elbow
+                turned4 = _principal((theta4 + flip * half_turn + offsets[3]) * signs[3])
+                turned5 = _principal(((1.0 - 2.0 * flip) * theta5 + offsets[4]) * signs[4])
+                turned6 = _principal((theta6 + flip * half_turn + offsets[5]) * signs[5])
+                q[slot, 0] = _either(missing, np.nan, turned1)
+                q[slot, 1] = _either(missing, np.nan, turned2)
+                q[slot, 2] = _either(missing, np.nan, turned3)
+                q[slot, 3] = _either(missing, np.nan, turned4)
+                q[slot, 4] = _either(missing, np.nan, turned5)
+                q[slot, 5] = _either(missing, np.nan, turned6)
 
-    def in_plane(v: Array) -> Array:
-        return np.asarray(cos1 * v[0] + sin1 * v[1])  # along the heading of the arm
 
-    def along_e1(v: Array) -> Array:
-        return np.asarray(cos_tilt * in_plane(v) - sin_tilt * v[2])
+@kernel()
+def _solve_one(T, theta4_free, sizes, offsets, signs, q):  # type: ignore[no-untyped-def]
+    """Set all configurations of a pose."""
+    _solve(
+        T[0, 0], T[0, 1], T[0, 2], T[0, 3], T[1, 0], T[1, 1], T[1, 2], T[1, 3],
+        T[2, 0], T[2, 1], T[2, 2], T[2, 3], theta4_free, sizes, offsets, signs, q,
+    )  # fmt: skip
 
-    def along_e2(v: Array) -> Array:
-        return np.asarray(cos1 * v[1] - sin1 * v[0])
 
-    def along_e3(v: Array) -> Array:
-        return np.asarray(sin_tilt * in_plane(v) + cos_tilt * v[2])
+_POSES = (
+    "void(float64[:,:,::1],float64[::1],float64[::1],float64[::1],float64[::1],float64[:,:,::1])"
+)
 
-    z1, z2 = along_e1(z), along_e2(z)
-    sin5 = np.sqrt(z1**2 + z2**2)
-    straight = sin5 < _WRIST_TOLERANCE
-    sin5 = np.where(straight, 0.0, sin5)
-    length = np.where(straight, 1.0, sin5)
-    cos4 = np.where(straight, np.cos(theta4_free), z1 / length)
-    sin4 = np.where(straight, np.sin(theta4_free), z2 / length)
-    sin6 = cos4 * along_e2(x) - sin4 * along_e1(x)
-    cos6 = cos4 * along_e2(y) - sin4 * along_e1(y)
-    return (
-        np.arctan2(sin4, cos4),
-        np.arctan2(sin5, along_e3(z)),
-        np.arctan2(sin6, cos6),
-        np.where(straight, 0.0, np.pi),
-    )
+
+@kernel(_POSES)
+def _solve_few(Ts, theta4_free, sizes, offsets, signs, q):  # type: ignore[no-untyped-def]
+    for n in range(len(Ts)):
+        _solve_one(Ts[n], theta4_free[n], sizes, offsets, signs, q[n])
+
+
+@kernel(_POSES, threads=True)
+def _solve_all(Ts, theta4_free, sizes, offsets, signs, q):  # type: ignore[no-untyped-def]
+    for n in prange(len(Ts)):
+        _solve_one(Ts[n], theta4_free[n], sizes, offsets, signs, q[n])

@@ -8,7 +8,7 @@ from opl.geometry.frames import Array
 
 # A cosine this far beyond 1 is taken for round-off of an arm in line. A stretched arm then misses
 # the pose by less than 1e-9 of its length, a folded MH24 by 10 nm.
-_STRETCH_TOLERANCE = 1e-9
+STRETCH_TOLERANCE = 1e-9
 
 
 def bend_to(forward: Array, up: Array, upper_arm: float, forearm: float) -> tuple[Array, Array]:
@@ -50,4 +50,4 @@ def heading_to(p: Array, lateral: float) -> tuple[Array, Array]:
 
 def from_zero(value: Array, scale: float) -> Array:
     """Return values with those below 0 by round-off as 0, and the others below 0 as NaN."""
-    return np.where(value < -_STRETCH_TOLERANCE * scale, np.nan, np.maximum(value, 0.0))
+    return np.where(value < -STRETCH_TOLERANCE * scale, np.nan, np.maximum(value, 0.0))

@@ -30,13 +30,21 @@ class Kernel:
         signature: Types of result and arguments in the words of numba; None if they are those that
             it is called with.
         threads: Whether loops over `prange` are shared among threads.
+        for_arrays: What does for arrays what it does for scalars, None for the function itself.
     """
 
-    def __init__(self, function: FunctionType, signature: str | None, threads: bool) -> None:
+    def __init__(
+        self,
+        function: FunctionType,
+        signature: str | None,
+        threads: bool,
+        for_arrays: Callable[..., Any] | None,
+    ) -> None:
         self.__wrapped__ = function
         self.__doc__ = function.__doc__
         self._signature = signature
         self._threads = threads
+        self._for_arrays = for_arrays
 
     def __call__(self, *arguments: Any) -> Any:  # noqa: D102
         assert not self._threads or threads_are_allowed(), "a copy of a process has no threads"
@@ -56,6 +64,8 @@ class Kernel:
     @cached_property
     def plain(self) -> Any:
         """The function in Python alone, which takes arrays where it is compiled for scalars."""
+        if self._for_arrays is not None:
+            return self._for_arrays
         function = self.__wrapped__
         known = {**function.__globals__}
         for name in function.__code__.co_names:
@@ -69,11 +79,15 @@ def kernels_are_loaded() -> bool:
     return _numba.cache_info().currsize > 0
 
 
-def kernel(signature: str | None = None, threads: bool = False) -> Callable[[Any], Kernel]:
+def kernel(
+    signature: str | None = None,
+    threads: bool = False,
+    for_arrays: Callable[..., Any] | None = None,
+) -> Callable[[Any], Kernel]:
     """Return what makes a `Kernel` of a function, with arguments as there."""
 
     def make(function: FunctionType) -> Kernel:
-        made = Kernel(function, signature, threads)
+        made = Kernel(function, signature, threads, for_arrays)
         _made.append(made)
         return made
 

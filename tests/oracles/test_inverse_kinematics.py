@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
+from opl.cell import spherical_wrist
 from opl.cell.full_turns import full_turns
 from opl.cell.inverse_kinematics import N_IK_BRANCHES, ik_branch_name, inverse_kinematics
 from opl.cell.robot import forward_kinematics, load_robot
@@ -43,6 +44,28 @@ def assert_reaches(q, T_base_flange, atol=1e-11):
     found = q[~np.isnan(q).any(axis=-1)]
     assert len(found)
     np.testing.assert_allclose(forward_kinematics(MH24, found) - T_base_flange, 0, atol=atol)
+
+
+# compiled, and by numpy
+
+
+@pytest.mark.parametrize("arm", [ARM, ODD_ARM], ids=["mh24", "odd"])
+def test_compiled_code_numpy_and_threads_give_the_same_to_the_last_digit(monkeypatch, arm):
+    q = random_configurations(3000)
+    q[:300, 4] = 0.0  # straight wrist
+    q[300:600, 2] = STRETCHED_U
+    q[600:800] = np.round(q[600:800] / (np.pi / 2)) * (np.pi / 2)
+    Ts = forward_kinematics(MH24, q)
+    Ts[2500:, :3, 3] *= 1.3
+    near = random_configurations(3000, seed=1)
+    for nearby in (None, near):
+        monkeypatch.setattr(spherical_wrist, "kernels_are_loaded", lambda: False)
+        by_numpy = inverse_kinematics(arm, Ts, nearby)
+        monkeypatch.setattr(spherical_wrist, "kernels_are_loaded", lambda: True)
+        for few in (10_000, 100):
+            monkeypatch.setattr(spherical_wrist, "FEW", few)
+            np.testing.assert_array_equal(inverse_kinematics(arm, Ts, nearby), by_numpy)
+        assert 0.0 < np.isnan(by_numpy).mean() < 1.0
 
 
 # closing the circle
