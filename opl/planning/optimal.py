@@ -41,6 +41,7 @@ CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may mi
 EARLY_SHARE = 0.3  # of the work: motions in boxes that are not proven to be the least
 FIRST_WORK = 300  # units that may be spent on those at once
 CLEARLY_LESS = 0.005  # of the best: what a motion in such a box should be better by
+MOST_IN_VAIN = 2  # such boxes in which no motion is free: what collides is left out from then on
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_REFINED = 12  # times that rectangles are cut finer for one box
 MOST_ADDED = 3  # walls at once
@@ -82,6 +83,7 @@ class OptimalSearch:
         self._refined_for = 0.0  # size of the box for which rectangles were cut finer last
         self._forbidden: Forbidden | None = None  # of collisions, once they are known to matter
         self._early = 0.0  # work on early motions
+        self._in_vain = 0  # boxes in which none of these was free
         self.proof = BoxProof(images.of, self._walls.finer, largest, PROOF_SHARE * settings.widen)
         self._places: set[float] = set()
         self._work = Work(problem.scene, self._walls, self._families, self._tracks)
@@ -148,6 +150,9 @@ class OptimalSearch:
         if not candidate.settled:
             if not self._sampler.collisions and placements:
                 self._look_for_more(box, placements)
+                if self._in_vain >= MOST_IN_VAIN:
+                    self._mind_collisions()
+                    return
             if missed:
                 self.proof.show_soon()
                 self._add(missed)
@@ -203,8 +208,10 @@ class OptimalSearch:
         if self._early < FIRST_WORK + EARLY_SHARE * before:
             columns, _, inner = self._look(larger, placements)
             if inner is not None:
-                room = self._room(inner)
-                self.keep(self._tracks.plan(columns, (), inner, room, lambda _: False))
+                room, checks = self._room(inner), self._tracks.checks
+                found = self._tracks.plan(columns, (), inner, room, lambda _: False)
+                self.keep(found)
+                self._in_vain += int(found is None and self._tracks.checks > checks)
             self._early += self._work.done - before
 
     def _hope(self, box: JointBox | None) -> None:
