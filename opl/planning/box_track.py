@@ -34,6 +34,7 @@ from opl.search.smooth import Travel, smoothest_within
 SAMPLES = 17  # contact positions of a place
 ROUNDS = 3  # of sampling closer around a track
 MOST_PARTS = 8  # into which an edge that bulges is cut at once
+BULGE = 1.75  # times the room of a motion: how far it may leave its box between two places
 FINE_SHARE = 3e-5  # of the box: what an edge may bulge
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
@@ -110,7 +111,7 @@ class BoxTracks:
         track = sampled.smoothest()
         if track is None:
             return self.plan(columns, (), box, room, learn) if rows else None
-        bulges = sampled.bulges(track, box.widened(room))
+        bulges = sampled.bulges(track, box.widened(BULGE * room))
         if any(bulge.steep for bulge in bulges) and learn(bulges):
             return None
         for _ in range(ROUNDS):
@@ -119,7 +120,7 @@ class BoxTracks:
             if finer is None:
                 break
             sampled, track, spacing = closer, finer, spacing * 2.0 / (SAMPLES - 1)
-        bulges = sampled.bulges(track, box.widened(room))
+        bulges = sampled.bulges(track, box.widened(BULGE * room))
         if bulges and learn(bulges):
             return None
         plan = sampled.check(track)
