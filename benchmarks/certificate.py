@@ -14,11 +14,13 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import coal
 import numpy as np
 
 from benchmarks.recheck import recheck
 from opl.cell.collision import CollisionScene
 from opl.cell.robot import load_robot
+from opl.geometry.frames import Array, transform
 from opl.job.load import Job, load_job
 from opl.planning.multi_start import plan_recursive
 from opl.planning.optimal import OptimalSearch
@@ -74,17 +76,32 @@ def certificate_of(
 
 
 def bodies_of(scene: CollisionScene) -> dict[str, Any]:
-    """Return the bodies of a scene, and its pairs without those of meshes."""
+    """Return the bodies of a scene, and its pairs."""
     bodies = scene._bodies
-    pairs = zip(scene._geometry.collisionPairs, scene._margins, scene._has_mesh, strict=True)
+    corners = [
+        transform(body.placement.homogeneous, _corners(body.geometry))
+        for body in scene._geometry.geometryObjects
+    ]
+    pairs = zip(scene._geometry.collisionPairs, scene._margins, strict=True)
     return {
         "Ts_before_joint": bodies.Ts_before_joint.tolist(),
         "axes": bodies.axes.tolist(),
         "joint": bodies.joint.tolist(),
         "Ts_joint_body": bodies.Ts_joint_body.tolist(),
         "sizes": bodies.sizes.tolist(),
-        "pairs": [(pair.first, pair.second, float(far)) for pair, far, mesh in pairs if not mesh],
+        "corners": [places.tolist() for places in corners],
+        "pairs": [(pair.first, pair.second, float(far)) for pair, far in pairs],
     }
+
+
+def _corners(shape: coal.CollisionGeometry) -> Array:
+    """Return the corners of a mesh, shape (n, 3); none of a box or a cylinder."""
+    if isinstance(shape, coal.BVHModelBase):
+        return np.array([shape.vertex(k) for k in range(shape.num_vertices)])
+    if isinstance(shape, coal.ConvexBase):
+        return np.array([shape.point(k) for k in range(shape.num_points)])
+    assert isinstance(shape, (coal.Box, coal.Cylinder)), f"no witness is sought in a {shape}"
+    return np.empty((0, 3))
 
 
 def job_of(case: str) -> Job:

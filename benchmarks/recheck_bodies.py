@@ -18,18 +18,21 @@ PROJECTED = 40  # times that a point is brought from one body to the other
 DEEPER = 40  # steps to where it is deepest in both
 FIRST_STEP = 0.05  # [m] of these
 SHORTER = 0.8  # each than the one before
+CORNERS = 500  # of a mesh that are looked at, at the most
+BLOCK = 200  # configurations at once for those
 CUT = 6  # halvings of a cell in which bodies collide, but not for sure all over it
 
 
 class Bodies:
-    """Boxes and cylinders on a chain of joints, and which pairs of them must stay apart.
+    """Bodies on a chain of joints, and which pairs of them must stay apart.
 
     Args:
         facts: ``Ts_before_joint``, poses of the joints at zero in the frame of the one before;
             ``axes``, in their own frames; ``joint``, the number of the joint that moves each body,
             0 for none; ``Ts_joint_body``, middles and axes of the bodies; ``sizes``, half the edges
-            of a box, or radius, half length and -1 of a cylinder about z; ``pairs``, first body,
-            second body and how far apart they must be.
+            of a box, or radius, half length and -1 of a cylinder about z, for a mesh a box around
+            it; ``corners`` of meshes, in the frame of the joint, empty for boxes and cylinders;
+            ``pairs``, first body, second body and how far apart they must be.
     """
 
     def __init__(self, facts: dict[str, Any]) -> None:
@@ -38,6 +41,9 @@ class Bodies:
         self._joint = np.array(facts["joint"], dtype=int)
         self._Ts_joint_body = np.array(facts["Ts_joint_body"])
         self._sizes = np.array(facts["sizes"])
+        self._corners = [
+            np.array(corners)[:: 1 + len(corners) // CORNERS] for corners in facts["corners"]
+        ]
         self._pairs = [(int(a), int(b), float(margin)) for a, b, margin in facts["pairs"]]
 
     def cleared(self, cells: Cells, which: Flags) -> Cells:
@@ -85,7 +91,15 @@ class Bodies:
             some = np.flatnonzero((apart < margin) & ~surely)
             if not len(some):
                 continue
-            x, depth = self._between(a, b, Ta[some], Tb[some])
+            meshes = [one for one in (a, b) if len(self._corners[one])]
+            if len(meshes) == 2:
+                continue
+            if meshes:
+                solid, T_base_solid = (b, Tb) if meshes[0] == a else (a, Ta)
+                T_base_joint = Ts[self._joint[meshes[0]]]
+                x, depth = self._corner(meshes[0], T_base_joint[some], solid, T_base_solid[some])
+            else:
+                x, depth = self._between(a, b, Ta[some], Tb[some])
             hit = depth < margin
             some, x, depth = some[hit], x[hit], depth[hit]
             near[some] = True
@@ -133,6 +147,27 @@ class Bodies:
             x = best - step * np.where(less[:, None], to_one + to_other, to_one) / 2.0
             step *= SHORTER
         return best, least
+
+    def _corner(self, mesh: int, Ts: Array, solid: int, T_base_solid: Array) -> tuple[Array, Array]:
+        """Return the corner of a mesh that is nearest to a body or deepest in it, and how far.
+
+        Args:
+            mesh: Which body is the mesh.
+            Ts: Poses of the joint that moves it, shape (n, 4, 4).
+            solid: Which one is the box or cylinder.
+            T_base_solid: Its poses, shape (n, 4, 4).
+        """
+        x, depth = np.empty((len(Ts), 3)), np.empty(len(Ts))
+        corners = self._corners[mesh]
+        for first in range(0, len(Ts), BLOCK):
+            now = slice(first, first + BLOCK)
+            places = corners @ np.swapaxes(Ts[now, :3, :3], 1, 2) + Ts[now, None, :3, 3]
+            n, k = places.shape[:2]
+            T = np.repeat(T_base_solid[now], k, axis=0)
+            away = self._away(solid, T, places.reshape(-1, 3))[0].reshape(n, k)
+            nearest = away.argmin(axis=1)
+            x[now], depth[now] = places[np.arange(n), nearest], away.min(axis=1)
+        return x, depth
 
     def _away(self, body: int, T: Array, x: Array) -> tuple[Array, Array]:
         """Return how far points are from a body, negative inside, and the way that grows."""

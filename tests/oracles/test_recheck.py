@@ -128,7 +128,6 @@ def test_bodies_that_surely_collide_do(make):
     _, near = bodies.collide(q, np.zeros_like(q))
     surely, _ = bodies.collide(q, turned)
     assert (near <= scene.collides(q)).all()
-    # pairs with a mesh are the part's
     assert near.sum() > 0.9 * scene.collides(q).sum()
     assert surely.sum() > 0.5 * near.sum()
     for share in random.uniform(-1.0, 1.0, (8, *q.shape)):
@@ -152,6 +151,7 @@ def test_a_bound_may_rest_on_what_collides():
         "joint": [*bodies["joint"], 0],
         "Ts_joint_body": [*bodies["Ts_joint_body"], T_base_body.tolist()],
         "sizes": [*bodies["sizes"], [1.0, 1.0, 1.0]],
+        "corners": [*bodies["corners"], []],
         "pairs": [(bodies["joint"].index(6), len(bodies["joint"]), 0.0)],
     }
     assert recheck({**claim, "bodies": wall})[0]
