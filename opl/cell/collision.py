@@ -14,12 +14,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from opl.cell.coal_shapes import coal_mesh, coal_solid
 from opl.cell.robot_shapes import collision_shapes
 from opl.cell.separation import Bodies, Separation
 from opl.cell.workcell import PART, SECOND_OPINION, SECOND_OPINION_OF_A_LINK, WHEEL, WorkCell
 from opl.geometry.frames import Array, transform
-from opl.geometry.mesh import TriangleMesh
-from opl.geometry.shapes import Body, Box, Cylinder
 
 BodyPair = tuple[str, str]
 ROUND_OFF = 1e-6  # [m] of coal: bodies farther apart by more than this do not collide for it
@@ -73,6 +72,7 @@ class CollisionScene:
             # the default of 1 mm goes on to measure distances of pairs nearly in contact
             request.break_distance = 0.0
         _begin_anew(self._geometry_data)
+        self._wider: dict[float, CollisionScene] = {}
         # coal looks only at pairs that are not certainly farther apart than this
         self._enough = np.array(margins) + ROUND_OFF
         self._enough[list(unchecked)] = -np.inf
@@ -92,6 +92,15 @@ class CollisionScene:
         scene._margins = self._margins + reserves
         scene._prepare(scene._margins, range(0))
         return scene
+
+    def wider(self, reserve: float) -> CollisionScene:
+        """Return the scene with more clearance [m] for all pairs; made once."""
+        if reserve not in self._wider:
+            scene = copy(self)
+            scene._margins = self._margins + reserve
+            scene._prepare(scene._margins, range(0))
+            self._wider[reserve] = scene
+        return self._wider[reserve]
 
     def against_surroundings(self, reserve: float) -> CollisionScene:
         """Return the scene with more clearance [m], only for pairs with what does not move."""
@@ -223,11 +232,11 @@ class CollisionScene:
         flange = self._model.frames[self._model.getFrameId("tool0")]
         base = self._model.frames[self._model.getFrameId("base")]
         self._T_base_world = base.placement.inverse().homogeneous  # base does not move
-        self._add(PART, _mesh(cell.part), flange, cell.T_flange_workpiece)
+        self._add(PART, coal_mesh(cell.part), flange, cell.T_flange_workpiece)
         for body in cell.fixture:
-            self._add(body.name, _solid(body), flange, body.T_parent_body)
+            self._add(body.name, coal_solid(body), flange, body.T_parent_body)
         for body in (cell.wheel_body(), *cell.obstacles):
-            self._add(body.name, _solid(body), base, body.T_parent_body)
+            self._add(body.name, coal_solid(body), base, body.T_parent_body)
 
     def _add(
         self, name: str, shape: coal.CollisionGeometry, frame: pin.Frame, T_frame_body: Array
@@ -279,20 +288,3 @@ def _begin_anew(data: pin.GeometryData) -> None:
         warnings.simplefilter("ignore", DeprecationWarning)
         for request in (*data.collisionRequests, *data.distanceRequests):
             request.enable_cached_gjk_guess = False
-
-
-def _solid(body: Body) -> coal.CollisionGeometry:
-    if isinstance(body.shape, Box):
-        return coal.Box(*body.shape.size)
-    if isinstance(body.shape, Cylinder):
-        return coal.Cylinder(body.shape.radius, body.shape.length)
-    return _mesh(body.shape)
-
-
-def _mesh(mesh: TriangleMesh) -> coal.CollisionGeometry:
-    model = coal.BVHModelOBBRSS()
-    model.beginModel(len(mesh.faces), len(mesh.vertices))
-    model.addVertices(np.asarray(mesh.vertices))
-    model.addTriangles(np.asarray(mesh.faces, dtype=np.int32))
-    model.endModel()
-    return model

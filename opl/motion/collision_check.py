@@ -17,6 +17,10 @@ from opl.geometry.mesh import box_corners
 from opl.motion.motion import Motion
 
 RESOLUTION = np.deg2rad(1.0)  # largest joint change between two configurations that are checked
+# A robot that moves along what it must not come near to could be nearer between two of these: where
+# it is nearer than this beyond its clearance, no point moves farther than FINE from one to the next
+NEARBY = 4e-3  # [m]
+FINE = 3e-3  # [m]
 # Where the part may touch the wheel it turns and slides by many times what it may sink in: no
 # corner of its box moves farther than this between two places that are looked at
 STEP = 1e-3  # [m]
@@ -120,16 +124,45 @@ def colliding_moves(
     unrefused = (chosen & ~sunk)[move]
     hits = np.zeros(len(q), dtype=bool)
     hits[unrefused] = scene.collides(q[unrefused])
+    between = _between(scene, q, move, unrefused & ~hits & ~motion.free[move])
     faults = []
-    for index in np.unique(np.concatenate([np.flatnonzero(sunk), move[hits]])):
+    for index in np.unique([*np.flatnonzero(sunk), *move[hits], *between]):
         if sunk[index]:
             faults.append(CollidingMove(int(index), (PART, WHEEL), bool(sunk_at_end[index])))
             continue
         on_move = np.flatnonzero(move == index)
-        first = on_move[hits[on_move]][0]
-        pair = scene.colliding_pairs(q[first])[0]
+        first = q[on_move[hits[on_move]][0]] if hits[on_move].any() else between[int(index)]
+        pair = scene.colliding_pairs(first)[0]
         faults.append(CollidingMove(int(index), pair, bool(hits[on_move[-1]])))
     return faults
+
+
+def _between(
+    scene: CollisionScene, q: Array, move: np.ndarray, chosen: np.ndarray
+) -> dict[int, Array]:
+    """Return which moves collide between two configurations that are checked, and where first.
+
+    Args:
+        scene: The scene.
+        q: The configurations in [rad], shape (m, 6).
+        move: The move of each, shape (m,).
+        chosen: Which are looked at, and the way to them from the one before, shape (m,).
+    """
+    near = np.zeros(len(q), dtype=bool)
+    around = chosen.copy()
+    around[:-1] |= chosen[1:]
+    near[around] = scene.wider(NEARBY).collides(q[around])
+    ends = np.flatnonzero(chosen[1:] & (near[1:] | near[:-1])) + 1
+    parts = np.ceil(np.abs(q[ends] - q[ends - 1]) @ scene.levers() / FINE).astype(int)
+    ends, parts = ends[parts > 1], parts[parts > 1]
+    if not len(ends):
+        return {}
+    end = np.repeat(ends, parts - 1)
+    begin = np.repeat(np.cumsum(parts - 1) - (parts - 1), parts - 1)
+    share = (np.arange(len(end)) - begin + 1) / np.repeat(parts, parts - 1)
+    finer = q[end - 1] + share[:, None] * (q[end] - q[end - 1])
+    hits = np.flatnonzero(scene.collides(finer))
+    return {int(move[end[k]]): finer[k] for k in hits[::-1].tolist()}
 
 
 def _at_wheel(

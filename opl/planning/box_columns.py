@@ -21,6 +21,7 @@ from opl.search.in_box import missing_chords, nearest_points, sampled
 FINE = 33  # contact positions of a place at which a box is held against it
 POSTURES_OF_WORK = 400  # that cost a unit of work
 CLOSER = 2  # times that places are sampled closer where collisions begin
+SPARE = 3e-4  # [m] of clearance: a motion may come nearer between two places than at both
 BORDER = 1e-2  # belt units to look beyond what lies in the box
 
 
@@ -183,9 +184,12 @@ class ColumnSampler:
         )
 
     def collides(self, q: Array) -> np.ndarray:
-        """Return which postures collide, or mirrored do, q in [rad], shape (n, 6)."""
+        """Return which postures collide, or mirrored do, with a little to spare for the way on.
+
+        q in [rad], shape (n, 6).
+        """
         sign, shift = self.flips[self.mirrored]
-        return self._problem.scene.collision.collides(q * sign + shift)
+        return self._problem.scene.collision.wider(SPARE).collides(q * sign + shift)
 
     def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m).

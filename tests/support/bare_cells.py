@@ -106,6 +106,9 @@ class Ghosts:
     def against_surroundings(self, reserve):
         return Ghosts(self._q, self._radius + reserve)
 
+    def wider(self, reserve):
+        return Ghosts(self._q, 0.0)  # ghosts haunt places, not the ways between them
+
     def less(self, amount):
         return Ghosts(self._q, self._radius - amount)
 
