@@ -200,9 +200,10 @@ class ColumnWalls:
                 corners = np.concatenate([start[None], start + np.cumsum(steps, axis=0)])
                 radius = cells.radius[family][:, now][:, low:high].T
                 off_low, off_high = enclosing(corners, middle, radius)
+                # pads that the postures themselves make narrower tell nothing of the bend
+                bends = (sure & (pad_low >= off_low) & (pad_high <= off_high)).all(axis=1)
                 pad_low = np.where(sure, np.maximum(pad_low, off_low), off_low)
                 pad_high = np.where(sure, np.minimum(pad_high, off_high), off_high)
-                bends = sure.all(axis=1)
                 piece = Piece(family, line, t[low : high + 1], corners, pad_low, pad_high, bends)
                 yield from self._within_limits(piece)
 

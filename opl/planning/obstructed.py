@@ -58,19 +58,7 @@ class Obstructions:
     def clear(
         self, piece: Piece, flip: int, first: int, end: int, looks: int
     ) -> tuple[Array, Array]:
-        """Return which part of each cell of a piece is not known to be forbidden.
-
-        Args:
-            piece: The piece.
-            flip: Which flip of its postures.
-            first: Cells from this one on are looked at,
-            end: to before this one.
-            looks: 1 to look at them, and those around them; 2 to look closer.
-
-        Returns:
-            Where it begins and ends in fractions of the cell, each of shape (n,); it ends before it
-            begins where nothing is left.
-        """
+        """Return what is left of cells as `Forbidden.clear` does; the first look is wider."""
         n = len(piece.pad_low)
         known = self._known.get((id(piece), flip))
         if known is None:
