@@ -16,10 +16,8 @@ from opl.planning.columns import ColumnWalls
 from opl.planning.cut_cells import halved
 from opl.search.walls import Piece
 
-WITHIN = (
-    2,
-    6,
-)  # halvings of a cell all in collision, but not deep enough to be sure: at first, later
+# halvings of a cell all in collision, but not deep enough to be sure, at the first look and second
+WITHIN = (2, 6)
 AROUND = 16  # cells on either side of those asked about that are looked at as well, at first
 
 

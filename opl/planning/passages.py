@@ -161,19 +161,14 @@ class Rectangles:
     def _sampled(self, places: Array, box: JointBox, placements: Sequence[Placement]) -> _Nodes:
         """Return the postures of a rectangle; near a box only those that do not collide count."""
         index = self._points.pass_index[int(places[0])]
-        key = places[0], places[-1], len(places), self._state(), index
         image = placements[index]
-        key = (
-            *key,
-            *image.between,
-            image.family,
-            image.number,
-            *image.shift,
-            *(image.center * image.loose),
-        )
+        turned = *image.shift, *(image.center * image.loose)
+        which = image.family, image.number, *image.between, *turned
+        left_out = self._sampler.collisions, self._sampler.mirrored
+        key = places[0], places[-1], len(places), index, *map(float, (*left_out, *which))
         nodes = self._nodes.get(key)
         if nodes is None:
-            for old in [old for old in self._nodes if old[4] == index and old[:3] != key[:3]]:
+            for old in [old for old in self._nodes if old[3] == index and old[:3] != key[:3]]:
                 del self._nodes[old]
             t = np.broadcast_to(self._t, (len(places), len(self._t)))
             columns = self._sampler.at(places, self._sampler.there(places), [image], t)
@@ -184,10 +179,6 @@ class Rectangles:
             nodes.looked_at |= near
             nodes.free[near] = ~self._sampler.collides(nodes.q[near])
         return nodes
-
-    def _state(self) -> float:
-        """Return a number for which postures the sampler leaves out."""
-        return float(self._sampler.collisions) * (1.0 + float(self._sampler.mirrored))
 
     def _rows(self, nodes: _Nodes, box: JointBox, room: float) -> list[Row]:
         """Return the contact positions that motions in a box pass between finer places."""
