@@ -14,6 +14,15 @@ DIRECTIONS = 18  # that are tried for a pair
 SHORTEST = 1e-4  # of a vector that gives a direction
 SLACK = 1e-12  # [m] rounding of how far a group has moved
 
+# types of what both kernels are given first
+_GIVEN = (
+    "float64[:,::1],"
+    "Tuple((float64[:,:,::1],float64[:,::1],int64[::1],float64[:,:,::1],float64[:,::1],"
+    "float64[:,::1])),"
+    "Tuple((int64[:,::1],int64[::1],int64[:,::1],float64[:,::1])),"
+    "float64[::1],float64,"
+)
+
 
 @kernel()
 def _reach(bodies, sizes, b, x, y, z):  # type: ignore[no-untyped-def]
@@ -121,38 +130,22 @@ def _turn_about(axis, angle, T):  # type: ignore[no-untyped-def]
     T[2, 0], T[2, 1], T[2, 2] = d * z * x - s * y, d * z * y + s * x, c + d * z * z
 
 
-@kernel(
-    "void(float64[:,::1],float64[:,:,::1],float64[:,::1],int64[::1],float64[:,:,::1],"
-    "float64[:,::1],float64[:,::1],int64[:,::1],int64[::1],int64[:,::1],float64[:,::1],float64[::1],"
-    "float64,float64[::1],float64[::1],int64[::1],boolean[:,::1])"
-)
-def separate(  # type: ignore[no-untyped-def]
-    q,
-    before_joint,
-    axes,
-    joint,
-    joint_body,
-    sizes,
-    levers,
-    pairs,
-    order,
-    groups,
-    group_levers,
-    enough,
-    more,
-    last,
-    apart,
-    best,
-    near,
-):
+@kernel("void(" + _GIVEN + "float64[::1],float64[::1],int64[::1],boolean[:,::1])")
+def separate(q, solids, paired, enough, more, last, apart, best, near):  # type: ignore[no-untyped-def]
     """Go through configurations one after the other; see `Separation.near`.
 
     Kept up to date from one call to the next: joints ``last``, bounds ``apart``, directions
     ``best``. What may be near is set in ``near``, the rest of which is left as it is.
 
+    ``solids`` are the arrays of `Bodies`; ``paired`` the bodies of the pairs, the order in which
+    pairs are gone through, and of each group its first place in there, the one after its last, the
+    first joint between its bodies, the one after the last, and its levers.
+
     A group of pairs is looked at when something of it could have become near: by the joints that
     move one body of each and not the other, with the largest levers of the group.
     """
+    before_joint, axes, joint, joint_body, sizes, levers = solids
+    pairs, order, groups, group_levers = paired
     n_joints, n_bodies = len(before_joint), len(joint)
     placed = np.zeros((n_joints + 1, 4, 4))  # of the joints in the world
     for k in range(4):
@@ -235,35 +228,15 @@ def separate(  # type: ignore[no-untyped-def]
 
 
 @kernel(
-    "void(float64[:,::1],float64[:,:,::1],float64[:,::1],int64[::1],float64[:,:,::1],"
-    "float64[:,::1],float64[:,::1],int64[:,::1],int64[::1],int64[:,::1],float64[:,::1],float64[::1],"
-    "float64,float64[:,::1],float64[:,::1],int64[:,::1],boolean[:,::1],int64)",
+    "void(" + _GIVEN + "float64[:,::1],float64[:,::1],int64[:,::1],boolean[:,::1],int64)",
     threads=True,
 )
 def separate_parts(  # type: ignore[no-untyped-def]
-    q,
-    before_joint,
-    axes,
-    joint,
-    joint_body,
-    sizes,
-    levers,
-    pairs,
-    order,
-    groups,
-    group_levers,
-    enough,
-    more,
-    last,
-    apart,
-    best,
-    near,
-    length,
+    q, solids, paired, enough, more, last, apart, best, near, length
 ):
     """Go through parts of this length as `separate` does, each with a state of its own."""
     for part in prange(len(last)):
         own = slice(part * length, min((part + 1) * length, len(q)))
         separate(
-            q[own], before_joint, axes, joint, joint_body, sizes, levers, pairs, order,
-            groups, group_levers, enough, more, last[part], apart[part], best[part], near[own],
-        )  # fmt: skip
+            q[own], solids, paired, enough, more, last[part], apart[part], best[part], near[own]
+        )

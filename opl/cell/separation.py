@@ -81,26 +81,34 @@ class Separation:
             bodies: The bodies.
             pairs: Numbers of two bodies each, shape (p, 2).
         """
-        self._bodies = bodies
+        self._solids = (
+            bodies.Ts_before_joint,
+            bodies.axes,
+            bodies.joint,
+            bodies.Ts_joint_body,
+            bodies.sizes,
+            bodies.levers,
+        )
         pairs = np.array(pairs, dtype=np.int64).reshape(-1, 2)
         # the one that is moved by fewer joints first
-        order = bodies.joint[pairs].argsort(axis=1, kind="stable")
-        self._pairs = np.ascontiguousarray(np.take_along_axis(pairs, order, axis=1))
-        first, second = self._pairs.T
+        lower_first = bodies.joint[pairs].argsort(axis=1, kind="stable")
+        pairs = np.ascontiguousarray(np.take_along_axis(pairs, lower_first, axis=1))
+        first, second = pairs.T
         number = np.arange(len(bodies.axes))
         between = (number >= bodies.joint[first, None]) & (number < bodies.joint[second, None])
         # by how much a pair can come apart while a joint turns by 1 rad, in [m], shape (p, j)
         self.levers = np.where(between, bodies.levers[second], 0.0)
         # one after the other those of which the same joints move one body and not the other
-        ends = bodies.joint[self._pairs]
-        self._order = np.lexsort(ends.T)
-        ends = ends[self._order]
+        ends = bodies.joint[pairs]
+        order = np.lexsort(ends.T)
+        ends = ends[order]
         starts = np.flatnonzero(np.diff(ends, axis=0, prepend=-1).any(axis=1))
         beyond = np.append(starts[1:], len(pairs))[: len(starts)].astype(np.int64)
-        self._groups = np.column_stack([starts, beyond, ends[starts]])
-        self._group_levers = np.array(
-            [self.levers[self._order[a:b]].max(axis=0) for a, b in self._groups[:, :2]]
+        groups = np.column_stack([starts, beyond, ends[starts]])
+        group_levers = np.array(
+            [self.levers[order[a:b]].max(axis=0) for a, b in groups[:, :2]]
         ).reshape(-1, len(bodies.axes))
+        self._paired = pairs, order, groups, group_levers
         self._last = np.zeros(len(bodies.axes))
         self._best = np.zeros(len(pairs), dtype=np.int64)  # direction of each pair
         self.apart = np.full(len(pairs), -np.inf)  # at the last configuration, at the least, in [m]
@@ -115,20 +123,11 @@ class Separation:
         Returns:
             Shape (n, p) of bool.
         """
-        near: np.ndarray = np.zeros((len(q), len(self._pairs)), dtype=bool)
-        bodies = self._bodies
+        near: np.ndarray = np.zeros((len(q), len(self.apart)), dtype=bool)
         given = (
             np.array(q, dtype=float, order="C"),  # compiled for arrays that can be written to
-            bodies.Ts_before_joint,
-            bodies.axes,
-            bodies.joint,
-            bodies.Ts_joint_body,
-            bodies.sizes,
-            bodies.levers,
-            self._pairs,
-            self._order,
-            self._groups,
-            self._group_levers,
+            self._solids,
+            self._paired,
             enough,
             MORE,
         )
@@ -138,7 +137,7 @@ class Separation:
         # each part begins with nothing known, whatever the number of threads
         n_parts = -(-len(q) // PART)
         last = np.zeros((n_parts, len(self._last)))
-        apart = np.full((n_parts, len(self._pairs)), -np.inf)
+        apart = np.full((n_parts, len(self.apart)), -np.inf)
         best = np.tile(self._best, (n_parts, 1))
         separate_parts(*given, last, apart, best, near, PART)
         self._last[:], self.apart[:], self._best[:] = last[-1], apart[-1], best[-1]
