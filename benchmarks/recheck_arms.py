@@ -31,6 +31,70 @@ class Posture:
 
 
 @dataclass(frozen=True)
+class Heading:
+    """Axis 1 turned to where a point lies ahead of it, in [m]; its angle, with cosine and sine."""
+
+    ahead: Jet
+    angle: Jet
+    cosine: Jet
+    sine: Jet
+    out_of_reach: Flags
+
+
+@dataclass(frozen=True)
+class Links:
+    """Two links that reach a point: angle of the first, what the second is bent by, its direction.
+
+    Angles from upright towards ahead; cosine and sine are those of the second link.
+    """
+
+    first: Jet
+    bend: Jet
+    cosine: Jet
+    sine: Jet
+    out_of_reach: Flags
+
+
+def headings(point: Vector, beside: float) -> Iterator[Heading]:
+    """Turn axis 1 either way so that a point is as far beside the arm as that, in [m]."""
+    offset = still(beside, point[0].value.low)
+    around = point[0] * point[0] + point[1] * point[1]
+    square = around - still(beside**2, point[0].value.low)
+    for ahead in (square.root(), -square.root()):
+        yield Heading(
+            ahead,
+            angle_of(point[1], point[0]) - angle_of(offset, ahead),
+            (point[0] * ahead + point[1] * offset) / around,
+            (point[1] * ahead - point[0] * offset) / around,
+            square.value.high < -SURE,
+        )
+
+
+def two_links(forward: Jet, up: Jet, first: float, second: float) -> Iterator[Links]:
+    """Bend two links of these lengths in [m] either way to where they reach a point."""
+    cells = forward.value.low
+
+    def number(value: float) -> Jet:
+        return still(value, cells)
+
+    away = forward * forward + up * up
+    cosine = (away - number(first**2 + second**2)) / number(2.0 * first * second)
+    out = (cosine.value.low > 1.0 + SURE) | (cosine.value.high < -1.0 - SURE)
+    sine = (number(1.0) - cosine * cosine).root()
+    for bent in (sine, -sine):
+        along, across = number(first) + number(second) * cosine, number(second) * bent
+        sin_first = (forward * along - up * across) / away
+        cos_first = (up * along + forward * across) / away
+        yield Links(
+            angle_of(sin_first, cos_first),
+            angle_of(bent, cosine),
+            (up - number(first) * cos_first) / number(second),
+            (forward - number(first) * sin_first) / number(second),
+            out,
+        )
+
+
+@dataclass(frozen=True)
 class SphericalWrist:
     """The closed form of an arm with a spherical wrist, upright with all angles zero.
 
@@ -56,38 +120,25 @@ class SphericalWrist:
 
         wrist = [p[k] - number(self.c4) * z[k] for k in range(3)]
         forearm, tilt0 = float(np.hypot(self.a2, self.c3)), float(np.arctan2(self.a2, self.c3))
-        around = wrist[0] * wrist[0] + wrist[1] * wrist[1]
-        beside = around - number(self.b**2)
-        for ahead in (beside.root(), -beside.root()):
-            theta1 = angle_of(wrist[1], wrist[0]) - angle_of(number(self.b), ahead)
-            cos1 = (wrist[0] * ahead + wrist[1] * number(self.b)) / around
-            sin1 = (wrist[1] * ahead - wrist[0] * number(self.b)) / around
-            forward, up = ahead - number(self.a1), wrist[2] - number(self.c1)
-            away = forward * forward + up * up
-            cosine = (away - number(self.c2**2 + forearm**2)) / number(2.0 * self.c2 * forearm)
-            out = (beside.value.high < -SURE) | (cosine.value.low > 1.0 + SURE)
-            out |= cosine.value.high < -1.0 - SURE
-            sine = (number(1.0) - cosine * cosine).root()
-            for bent in (sine, -sine):
-                along, across = number(self.c2) + number(forearm) * cosine, number(forearm) * bent
-                sin2 = (forward * along - up * across) / away
-                cos2 = (up * along + forward * across) / away
-                theta2, bend = angle_of(sin2, cos2), angle_of(bent, cosine)
-                sin_link = (forward - number(self.c2) * sin2) / number(forearm)
-                cos_link = (up - number(self.c2) * cos2) / number(forearm)
+        for heading in headings(wrist, self.b):
+            cos1, sin1 = heading.cosine, heading.sine
+            forward, up = heading.ahead - number(self.a1), wrist[2] - number(self.c1)
+            for links in two_links(forward, up, self.c2, forearm):
+                cos_link, sin_link = links.cosine, links.sine
                 c, s = number(np.cos(tilt0)), number(np.sin(tilt0))
                 sin_tilt, cos_tilt = sin_link * c - cos_link * s, cos_link * c + sin_link * s
                 e1 = [cos_tilt * cos1, cos_tilt * sin1, -sin_tilt]
                 e3 = [sin_tilt * cos1, sin_tilt * sin1, cos_tilt]
                 z1, z2 = dot(e1, z), cos1 * z[1] - sin1 * z[0]
                 theta = (
-                    theta1,
-                    theta2,
-                    bend - number(tilt0),
+                    heading.angle,
+                    links.first,
+                    links.bend - number(tilt0),
                     angle_of(z2, z1),
                     angle_of((z1 * z1 + z2 * z2).root(), dot(e3, z)),
                     angle_of(dot(e3, y), -dot(e3, x)),
                 )
+                out = heading.out_of_reach | links.out_of_reach
                 yield Posture(in_joints(theta, self.offsets, self.signs), out)
 
     def flips(self) -> list[Flip]:
@@ -125,12 +176,8 @@ class ParallelAxes:
             return still(value, cells)
 
         crossing = [p[k] - number(self.c5) * z[k] for k in range(3)]
-        around = crossing[0] * crossing[0] + crossing[1] * crossing[1]
-        beside = around - number(self.b**2)
-        for ahead in (beside.root(), -beside.root()):
-            theta1 = angle_of(crossing[1], crossing[0]) - angle_of(number(self.b), ahead)
-            cos1 = (crossing[0] * ahead + crossing[1] * number(self.b)) / around
-            sin1 = (crossing[1] * ahead - crossing[0] * number(self.b)) / around
+        for heading in headings(crossing, self.b):
+            cos1, sin1 = heading.cosine, heading.sine
             # along the heading of the arm, and upwards
             x1, y1, z1 = (cos1 * v[0] + sin1 * v[1] for v in (x, y, z))
             for sin5 in ((z1 * z1 + z[2] * z[2]).root(), -(z1 * z1 + z[2] * z[2]).root()):
@@ -139,25 +186,14 @@ class ParallelAxes:
                 theta6 = angle_of(
                     -(sin_tilt * x1 + cos_tilt * x[2]), -(sin_tilt * y1 + cos_tilt * y[2])
                 )
-                forward = ahead - number(self.a1) - number(self.c4) * sin_tilt
+                forward = heading.ahead - number(self.a1) - number(self.c4) * sin_tilt
                 up = crossing[2] - number(self.c1) - number(self.c4) * cos_tilt
-                away = forward * forward + up * up
-                cosine = away - number(self.c2**2 + self.c3**2)
-                cosine = cosine / number(2.0 * self.c2 * self.c3)
-                out = (beside.value.high < -SURE) | (cosine.value.low > 1.0 + SURE)
-                out |= cosine.value.high < -1.0 - SURE
-                sine = (number(1.0) - cosine * cosine).root()
-                for bent in (sine, -sine):
-                    along = number(self.c2) + number(self.c3) * cosine
-                    across = number(self.c3) * bent
-                    sin2 = (forward * along - up * across) / away
-                    cos2 = (up * along + forward * across) / away
-                    sin_link = (forward - number(self.c2) * sin2) / number(self.c3)
-                    cos_link = (up - number(self.c2) * cos2) / number(self.c3)
+                for links in two_links(forward, up, self.c2, self.c3):
+                    cos_link, sin_link = links.cosine, links.sine
                     theta = (
-                        theta1,
-                        angle_of(sin2, cos2),
-                        angle_of(bent, cosine),
+                        heading.angle,
+                        links.first,
+                        links.bend,
                         angle_of(
                             sin_tilt * cos_link - cos_tilt * sin_link,
                             cos_tilt * cos_link + sin_tilt * sin_link,
@@ -165,6 +201,7 @@ class ParallelAxes:
                         theta5,
                         theta6,
                     )
+                    out = heading.out_of_reach | links.out_of_reach
                     yield Posture(in_joints(theta, self.offsets, self.signs), out)
 
     def flips(self) -> list[Flip]:
