@@ -17,8 +17,8 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.collision_check import colliding_moves
 from opl.motion.free_move_search import FreeMoveSearch
-from opl.motion.motion import Motion, MoveKind
-from opl.motion.path import GrindingPath
+from opl.motion.motion import Motion
+from opl.motion.path import GrindingPath, PassEnd
 from opl.motion.process_settings import ProcessSettings
 from opl.motion.whole_motion import lead, reachable_lead
 
@@ -50,29 +50,12 @@ class FreeLeads:
         Raises:
             UnreachableApproachError: As `find` does.
         """
-        leads = []
-        for index in range(points.n_passes):
-            on_pass = np.flatnonzero(path.pass_index == index)
-            lead_in, lead_out = (
-                self.find(
-                    points, process, kind, path.ik_branch, int(path.cutter_point[k]),
-                    float(path.contact_position[k]), path.q[k],
-                )
-                for kind, k in ((MoveKind.APPROACH, on_pass[0]), (MoveKind.RETRACT, on_pass[-1]))
-            )  # fmt: skip
-            leads.append((lead_in, lead_out))
-        return leads
+        return [
+            (self.find(points, process, first), self.find(points, process, last))
+            for first, last in path.pass_ends()
+        ]
 
-    def find(
-        self,
-        points: CutterPoints,
-        process: ProcessSettings,
-        kind: MoveKind,
-        ik_branch: int,
-        column: int,
-        contact_position: float,
-        q_contact: Array,
-    ) -> Array:
+    def find(self, points: CutterPoints, process: ProcessSettings, end: PassEnd) -> Array:
         """Return configurations from just off the wheel to the far end of a lead, shape (k, 6).
 
         The lead with the longest run that is free as a whole; where none is, what is free of the
@@ -81,25 +64,22 @@ class FreeLeads:
         Args:
             points: The cutter points.
             process: How far leads should lead.
-            kind: Whether it is the approach or the retract.
-            ik_branch: The inverse solution.
-            column: The cutter point.
-            contact_position: Where it is ground in belt units.
-            q_contact: There, in [rad], shape (6,).
+            end: The end of a pass where it leads to or from.
 
         Raises:
             UnreachableApproachError: If nothing of it is free and it leaves reach or limits.
         """
         key = (
-            process.lead_shape(), kind, ik_branch, points.Ts_workpiece_cutter[column].tobytes(),
-            points.direction_at(column), column, contact_position, q_contact.tobytes(),
+            process.lead_shape(), end.kind, end.ik_branch,
+            points.Ts_workpiece_cutter[end.cutter_point].tobytes(),
+            points.direction_at(end.cutter_point), end.cutter_point, end.contact_position,
+            end.q.tobytes(),
         )  # fmt: skip
         if key not in self._known:
-            at = kind, ik_branch, column, contact_position, q_contact
             best, farthest = None, 0.0
             for run in np.array(SHARES) * process.approach_run:
-                q, cause = reachable_lead(self._cell, points, process, *at, run)
-                free = self._free_moves_of(q_contact, q, kind)
+                q, cause = reachable_lead(self._cell, points, process, end, run)
+                free = self._free_moves_of(end, q)
                 if cause is None and free == len(q):
                     best = q
                     break
@@ -110,15 +90,15 @@ class FreeLeads:
                     best, farthest = q[:free], float(away)
             if best is None:
                 shortest = SHARES[-1] * process.approach_run
-                best = lead(self._cell, points, process, *at, shortest)
+                best = lead(self._cell, points, process, end, shortest)
             self._known[key] = best
         return self._known[key]
 
-    def _free_moves_of(self, q_contact: Array, q: Array, kind: MoveKind) -> int:
+    def _free_moves_of(self, end: PassEnd, q: Array) -> int:
         """Return how many moves of a lead are free before one is not."""
         if not len(q):
             return 0
         # the same configurations either way round
-        motion = Motion.off_wheel(np.vstack([q_contact, q]), kind, 0)
+        motion = Motion.off_wheel(np.vstack([end.q, q]), end.kind, 0)
         faults = colliding_moves(self._cell, self._scene, self._part, motion)
         return max(faults[0].move - 1, 0) if faults else len(q)

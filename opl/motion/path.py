@@ -7,6 +7,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
+from opl.motion.motion import MoveKind
+
+
+@dataclass(frozen=True, eq=False)
+class PassEnd:
+    """Where a pass begins or ends on the wheel: there its approach ends, or its retract begins.
+
+    Attributes:
+        kind: Which of the two.
+        ik_branch: Slot of the inverse kinematics.
+        cutter_point: The first or the last cutter point of the pass.
+        contact_position: Where it is ground, in belt units.
+        q: There, in [rad], shape (6,).
+    """
+
+    kind: MoveKind
+    ik_branch: int
+    cutter_point: int
+    contact_position: float
+    q: Array
 
 
 @dataclass(frozen=True)
@@ -51,6 +71,21 @@ class GrindingPath:
     def contact_travel(self) -> float:
         """Sum over all moves of the absolute change of t in belt units, on the wheel only."""
         return float(np.abs(np.diff(self.contact_position)[self._on_wheel]).sum())
+
+    def pass_ends(self) -> list[tuple[PassEnd, PassEnd]]:
+        """Return where each pass begins and where it ends."""
+        ends = []
+        for index in range(int(self.pass_index[-1]) + 1):
+            on_pass = np.flatnonzero(self.pass_index == index)
+            first, last = (
+                PassEnd(
+                    kind, self.ik_branch, int(self.cutter_point[k]),
+                    float(self.contact_position[k]), self.q[k],
+                )
+                for kind, k in ((MoveKind.APPROACH, on_pass[0]), (MoveKind.RETRACT, on_pass[-1]))
+            )  # fmt: skip
+            ends.append((first, last))
+        return ends
 
     @property
     def _on_wheel(self) -> np.ndarray:

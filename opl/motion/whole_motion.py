@@ -18,7 +18,7 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.free_move_search import BlockedMoveError, FreeMoveSearch
 from opl.motion.motion import Motion, MoveKind
-from opl.motion.path import GrindingPath
+from opl.motion.path import GrindingPath, PassEnd
 from opl.motion.process_settings import ProcessSettings
 
 
@@ -72,18 +72,14 @@ def whole_motion(
     """
     home = Motion.off_wheel(process.home[None], MoveKind.HOME, -1)
     parts = [home]
+    if leads is None:
+        leads = [
+            (lead(cell, points, process, first), lead(cell, points, process, last))
+            for first, last in path.pass_ends()
+        ]
     for index in range(points.n_passes):
         on_pass = np.flatnonzero(path.pass_index == index)
-        if leads is None:
-            lead_in, lead_out = (
-                lead(
-                    cell, points, process, kind, path.ik_branch, int(path.cutter_point[k]),
-                    float(path.contact_position[k]), path.q[k],
-                )
-                for kind, k in ((MoveKind.APPROACH, on_pass[0]), (MoveKind.RETRACT, on_pass[-1]))
-            )  # fmt: skip
-        else:
-            lead_in, lead_out = leads[index]
+        lead_in, lead_out = leads[index]
         free = MoveKind.HOME if index == 0 else MoveKind.LINK
         place = path.cutter_point[on_pass]
         if process.home_between and index > 0:
@@ -125,26 +121,20 @@ def lead(
     cell: WorkCell,
     points: CutterPoints,
     process: ProcessSettings,
-    kind: MoveKind,
-    ik_branch: int,
-    column: int,
-    contact_position: float,
-    q_contact: Array,
+    end: PassEnd,
     run: float | None = None,
 ) -> Array:
     """Return configurations from just off the wheel to the far end of a lead, shape (k, 6).
 
-    `q_contact` in [rad], shape (6,), grinds the cutter point of the column at the contact position.
-    The part moves on along the pass by the run in [m], that of the process by default.
+    `end` is the end of a pass where it leads to or from; the part moves on along the pass by the
+    run in [m], that of the process by default.
 
     Raises:
         UnreachableApproachError: If it leaves reach or limits.
     """
-    q, cause = reachable_lead(
-        cell, points, process, kind, ik_branch, column, contact_position, q_contact, run
-    )
+    q, cause = reachable_lead(cell, points, process, end, run)
     if cause is not None:
-        raise UnreachableApproachError(column, cause)
+        raise UnreachableApproachError(end.cutter_point, cause)
     return q
 
 
@@ -152,30 +142,27 @@ def reachable_lead(
     cell: WorkCell,
     points: CutterPoints,
     process: ProcessSettings,
-    kind: MoveKind,
-    ik_branch: int,
-    column: int,
-    contact_position: float,
-    q_contact: Array,
+    end: PassEnd,
     run: float | None = None,
 ) -> tuple[Array, str | None]:
     """Return a lead as `lead` does, as far as it is within reach and limits, and what ends it.
 
     That is None where it is there as a whole, else ``reach`` or ``limits`` with those by name.
     """
-    offsets = process.lead_shape(run).offsets(kind, points.direction_at(column))
+    column, t = end.cutter_point, end.contact_position
+    offsets = process.lead_shape(run).offsets(end.kind, points.direction_at(column))
     T_contact_away = np.tile(np.eye(4), (len(offsets), 1, 1))
     T_contact_away[:, :3, 3] = offsets
-    T_base_contact = cell.wheel.T_base_contact(contact_position)
-    T_base_flange = cell.Ts_base_flange(contact_position, points.Ts_workpiece_cutter[column])
+    T_base_contact = cell.wheel.T_base_contact(t)
+    T_base_flange = cell.Ts_base_flange(t, points.Ts_workpiece_cutter[column])
     T_contact_flange = np.linalg.solve(T_base_contact, T_base_flange)
     Ts_base_flange = T_base_contact @ T_contact_away @ T_contact_flange
-    solutions = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_contact)[:, ik_branch]
+    solutions = inverse_kinematics(cell.robot.arm, Ts_base_flange, end.q)[:, end.ik_branch]
     out_of_reach = np.isnan(solutions).any(axis=1)
     cause = "reach" if out_of_reach.any() else None
     solutions = solutions[: int(np.argmax(out_of_reach)) if cause else None]
-    steps = principal(np.diff(solutions, axis=0, prepend=q_contact[None]))
-    q = q_contact + np.cumsum(steps, axis=0)
+    steps = principal(np.diff(solutions, axis=0, prepend=end.q[None]))
+    q = end.q + np.cumsum(steps, axis=0)
     within = cell.within_limits(q)
     if not within.all():
         cause = f"limits of {' '.join(cell.broken_limits(q))}"

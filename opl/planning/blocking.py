@@ -14,6 +14,7 @@ from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
 from opl.motion.collision_check import CollidingMove
 from opl.motion.motion import Motion, MoveKind
+from opl.motion.path import PassEnd
 from opl.motion.whole_motion import UnreachableApproachError
 from opl.planning.filling import BrokenEdgeError
 from opl.planning.open_matrix import FreeMove, OpenMatrix
@@ -131,9 +132,10 @@ def _away(
 ) -> Array | None:
     """Return where approach or retract of a node is farthest off, None if it cannot be made."""
     nodes, leads = matrix.nodes, problem.scene.free_leads
-    t, q = float(nodes.contact_position[column, row]), nodes.at(column, row)
+    t = float(nodes.contact_position[column, row])
+    end = PassEnd(kind, nodes.ik_branch, column, t, nodes.at(column, row))
     try:
-        away = leads.find(problem.points, problem.process, kind, nodes.ik_branch, column, t, q)
+        away = leads.find(problem.points, problem.process, end)
     except UnreachableApproachError:
         return None
     return np.asarray(away[-1])

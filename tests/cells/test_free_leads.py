@@ -12,9 +12,8 @@ from tests.support.planned import small_plan, small_problem, with_problem_cell
 
 
 def asked_for(problem, path, kind):
-    k = -1 if kind is MoveKind.RETRACT else 0
-    at = int(path.cutter_point[k]), float(path.contact_position[k]), path.q[k]
-    return problem.points, problem.process, kind, path.ik_branch, *at
+    end = path.pass_ends()[0][0] if kind is MoveKind.APPROACH else path.pass_ends()[-1][1]
+    return problem.points, problem.process, end
 
 
 def found_of(problem, path, kind=MoveKind.RETRACT):
