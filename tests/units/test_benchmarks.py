@@ -30,6 +30,12 @@ def test_a_process_that_fails_or_takes_too_long_has_no_time():
     assert found.least <= found.median <= found.most and found.memory > 80_000_000
 
 
+def test_a_process_finds_its_modules_compiled(monkeypatch):
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    script = "import sys; sys.exit(sys.dont_write_bytecode)"
+    assert timed_process([sys.executable, "-c", script], 1, 60.0) is not None
+
+
 def test_a_time_is_that_of_one_of_what_is_counted():
     calls = []
     found = timed(lambda: calls.append(sum(range(20_000))), 3, count=10)
