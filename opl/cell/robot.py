@@ -32,6 +32,9 @@ from opl.geometry.frames import Array, from_roll_pitch_yaw, read_only
 # In which a joint is taken to reach its top speed where nobody knows its acceleration, in [s].
 # Integrators guess 0.1 s for arms of this kind; slower is the safe side.
 ASSUMED_RAMP = 0.4
+# Configurations nearer to each other than this in every joint [rad] are one: a micrometre at the
+# end of the arm, a tenth of an encoder pulse.
+SAME_CONFIGURATION = 1e-6
 _ENDS = "base", "tool0"
 
 

@@ -16,7 +16,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.cell.robot import Robot, forward_kinematics
+from opl.cell.robot import SAME_CONFIGURATION, Robot, forward_kinematics
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.gradual import counted, gradual, largest_ratio
@@ -33,9 +33,6 @@ MOST_ROUNDS = 4  # of asking the joints again after moves were slowed for their 
 # Changes of speed from one move to the next, as `_suddenness` has them, that the corners of a time
 # law leave as well: its own are up to 1.3 of what a joint can, because they take more than a move.
 SUDDEN = 1.4
-# Configurations nearer to each other than this in every joint [rad] are one: a micrometre at the
-# end of the arm, a tenth of an encoder pulse.
-SAME_CONFIGURATION = 1e-6
 SHORTEST_FREE = 0.05  # [s] of a free move: a shorter one is over before a robot is at its speed
 
 

@@ -16,10 +16,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from opl.cell.robot import SAME_CONFIGURATION
 from opl.errors import UnsafeError
 from opl.geometry.frames import Array
 from opl.motion.motion import Motion, MoveKind, Phase, TimedMotion, VerifiedMotion
-from opl.motion.timing import SAME_CONFIGURATION
 from opl.program.actions import NO_ACTIONS, Action, Actions
 from opl.program.stops import actions_at, stops_at
 

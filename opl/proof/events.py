@@ -14,10 +14,10 @@ from difflib import SequenceMatcher
 import numpy as np
 from numpy.typing import NDArray
 
+from opl.cell.robot import SAME_CONFIGURATION
 from opl.findings import Finding, Level
 from opl.job.load import Job
 from opl.motion.motion import Motion
-from opl.motion.timing import SAME_CONFIGURATION
 from opl.program.events import Event, meanings
 from opl.program.moves import START_SPEED, Move, Program
 from opl.program.played import Playback, Reading

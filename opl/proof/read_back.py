@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opl.cell.robot import forward_kinematics
+from opl.cell.robot import SAME_CONFIGURATION, forward_kinematics
 from opl.cell.wheel_distance import PartTree
 from opl.files.beside import Beside
 from opl.findings import Finding, Level
@@ -22,7 +22,6 @@ from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion, VerifiedMotion
-from opl.motion.timing import SAME_CONFIGURATION
 from opl.planning.positions import PositionRule
 from opl.program.moves import Program
 from opl.program.played import Playback

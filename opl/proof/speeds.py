@@ -15,9 +15,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from opl.cell.robot import SAME_CONFIGURATION
 from opl.findings import Finding, Level
 from opl.motion.motion import Motion, MoveKind, Phase, TimedMotion
-from opl.motion.timing import SAME_CONFIGURATION, Timing
+from opl.motion.timing import Timing
 from opl.program.played import Playback, ReadMove, SpeedUnit
 from opl.program.posts import PASS_TIME_TOLERANCE
 from opl.program.speeds import MOST_CORRECTION

@@ -6,12 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from opl.cell.robot import SAME_CONFIGURATION
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion, TimedMotion
-from opl.motion.timing import SAME_CONFIGURATION, time_motion
+from opl.motion.timing import time_motion
 from opl.program.moves import Purpose
 from opl.program.played import Playback
 from opl.program.posts import Reader

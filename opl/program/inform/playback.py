@@ -7,11 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from opl.cell.robot import Robot
+from opl.cell.robot import SAME_CONFIGURATION, Robot
 from opl.errors import InputError
 from opl.findings import Finding
 from opl.geometry.frames import Array
-from opl.motion.timing import SAME_CONFIGURATION
 from opl.program.controller import ControllerProfile
 from opl.program.events import Event
 from opl.program.inform.heads import head_findings
