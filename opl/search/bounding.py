@@ -148,12 +148,17 @@ def trim(cells, spans, n_walls, prices, low, high, left):  # type: ignore[no-unt
     return n
 
 
-@kernel("float64(float64[:,::1],int64,int64,float64[::1],float64[::1])")
-def distance(cells, first, end, low, high):  # type: ignore[no-untyped-def]
-    """Return by how much a box misses the chords of a span, in [rad]."""
-    best = np.inf
-    for cell in range(first, end):
-        if cells[cell, 12] > 0.0:
-            continue  # forbidden
-        best, _ = nearest_on_chord(cells[cell, :6], cells[cell, 6:12], low, high, best)
-    return best
+@kernel("float64[::1](float64[:,::1],int64[:,::1],float64[::1],float64[::1])")
+def distances(cells, spans, low, high):  # type: ignore[no-untyped-def]
+    """Return by how much a box misses the chords of each span, shape (n, 5), in [rad]."""
+    found = np.empty(len(spans))
+    for k in range(len(spans)):
+        best = np.inf
+        for cell in range(spans[k, 3], spans[k, 4]):
+            if cells[cell, 12] > 0.0:
+                continue  # forbidden
+            best, _ = nearest_on_chord(cells[cell, :6], cells[cell, 6:12], low, high, best)
+            if best == 0.0:
+                break
+        found[k] = best
+    return found

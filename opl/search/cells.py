@@ -8,7 +8,7 @@ cells turn out to be forbidden, their rows are made shorter, for all subproblems
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,6 +17,10 @@ from opl.search.walls import Image, Piece, Wall
 
 COLUMNS = 26  # start 0:6, end 6:12, pad_low 12:18, pad_high 18:24, places 24 and 25
 WALL, KEY, SOURCE, FIRST, END = range(5)  # columns of a span
+# columns of a source: its piece, number of its image, whether the whole motion has the wrist
+# flipped, its cells, the first -1 where they are not in the table yet, number of its key, and which
+# flip of its piece the robot makes
+PIECE, IMAGE, MIRRORED, FIRST_CELL, N_CELLS, KEY_OF, FLIP = range(7)
 Key = tuple[int, tuple[int, ...], int]  # a family, the key of its image, and the side
 FORBIDDEN = 1e3  # [rad] presses on every face of any box by more than is of interest
 
@@ -58,6 +62,7 @@ class Cells:
         walls: The walls.
         pass_index: The pass of each.
         table: The cells, shape (capacity, 26); rows not in use are at its end.
+        entered: How many cells were entered into the table, again or for the first time.
         changes: How often cells in the table became shorter.
     """
 
@@ -75,16 +80,18 @@ class Cells:
         self.table = np.empty((1024, COLUMNS))
         self._used = 0
         self._keys: dict[Key, int] = {}
-        # piece, number of its image, and whether the whole motion has the wrist flipped
-        self._sources: list[tuple[Piece, int, bool]] = []
-        self._first: list[int] = []  # cell of each source, -1 for those not in the table yet
-        # sources, whether mirrored, and boxes around them
-        self._of_wall: list[tuple[np.ndarray, np.ndarray, Array, Array]] = []
+        # a source is a piece in one image; those of a piece follow each other
+        self._pieces: list[Piece] = []
+        self._sources_of: list[slice] = []
+        self._sources = np.empty((1024, 7), dtype=np.int64)
+        self._n_sources = 0
+        # of each family sign, shift and flip of its images
+        self._moves: dict[int, tuple[Array, Array, np.ndarray]] = {}
+        # sources and boxes around them
+        self._of_wall: list[tuple[np.ndarray, Array, Array]] = []
         self._finer: dict[tuple[int, int], np.ndarray] = {}
-        # sources of a flip of a piece, by its place in memory, and looks at its cells
-        self._of_piece: dict[tuple[int, int], list[int]] = {}
-        self._looks: dict[tuple[int, int], np.ndarray] = {}
-        self.changes = 0
+        self._looks: dict[tuple[int, int], np.ndarray] = {}  # at the cells of a flip of a piece
+        self.entered = self.changes = 0
 
     @property
     def n_keys(self) -> int:
@@ -93,20 +100,18 @@ class Cells:
 
     def add(self, wall: Wall) -> None:
         """Take in a wall."""
-        first, low, high = len(self._sources), [], []
-        both = [False, True][: 1 if self._forbidden is None else self._forbidden.n_flips]
+        first, low, high = self._n_sources, [np.empty((0, 6))], [np.empty((0, 6))]
+        both = np.arange(1 if self._forbidden is None else self._forbidden.n_flips)
         for piece in wall.pieces:
-            ends = piece.low.min(axis=0), piece.high.max(axis=0)
-            for number, image in enumerate(self._images(piece.family)):
-                moved = image.sign * np.array(ends) + image.shift
-                for mirrored in both:
-                    self._new_source(piece, number, mirrored)
-                    low.append(moved.min(axis=0))
-                    high.append(moved.max(axis=0))
-        sources = np.arange(first, len(self._sources))
-        mirrors = np.array([self._sources[source][2] for source in sources.tolist()], dtype=bool)
-        boxes = np.reshape(low, (-1, 6)), np.reshape(high, (-1, 6))
-        self._of_wall.append((sources, mirrors, *boxes))
+            sign, shift, _ = self._moves_of(piece.family)
+            ends = np.stack([piece.low.min(axis=0), piece.high.max(axis=0)])
+            moved = np.repeat(sign[:, None] * ends + shift[:, None], len(both), axis=0)
+            low.append(moved.min(axis=1))
+            high.append(moved.max(axis=1))
+            numbers = np.arange(len(sign))
+            self._new_sources(piece, np.repeat(numbers, len(both)), np.tile(both, len(sign)))
+        sources = np.arange(first, self._n_sources)
+        self._of_wall.append((sources, np.concatenate(low), np.concatenate(high)))
         self.walls.append(wall)
         self.pass_index = np.append(self.pass_index, wall.pass_index)
 
@@ -121,33 +126,32 @@ class Cells:
 
     def mirrored(self, spans: np.ndarray) -> bool:
         """Return whether spans are of whole motions with the wrist flipped."""
-        return self._sources[int(spans[0, SOURCE])][2]
+        return bool(self._sources[spans[0, SOURCE], MIRRORED])
 
     def spans_of(
         self, wall: int, low: Array, high: Array, closing: float, mirrored: bool
     ) -> np.ndarray:
         """Return the spans of a wall that boxes below a size can hold, the core given."""
-        sources, mirrors, least, most = self._of_wall[wall]
+        sources, least, most = self._of_wall[wall]
         edges = np.maximum(least, high) - np.minimum(most, low)
-        small = np.maximum(edges, 0.0).sum(axis=1) < closing
+        kept = np.maximum(edges, 0.0).sum(axis=1) < closing
         if wall == 0:
             # the whole motion has images: of these the first is looked at, and its flip
-            kept = [one for one in sources[small].tolist() if self._sources[one][1] == 0]
+            kept &= self._sources[sources, IMAGE] == 0
         else:
-            kept = sources[small & (mirrors == mirrored)].tolist()
-        return np.array([self._span(wall, source) for source in kept], np.int64).reshape(-1, 5)
+            kept &= self._sources[sources, MIRRORED] == mirrored
+        return self._spans(wall, sources[kept])
 
     def finer(self, span: np.ndarray) -> np.ndarray:
         """Return the spans of a single cell cut into smaller ones."""
         wall, _, source, cell, _ = span.tolist()
         at = source, cell
         if at not in self._finer:
-            piece, image, mirrored = self._sources[source]
-            found = []
-            for smaller in self._cut(piece, cell - self._first[source]):
-                self._new_source(smaller, image, mirrored)
-                found.append(self._span(wall, len(self._sources) - 1))
-            self._finer[at] = np.array(found, np.int64).reshape(-1, 5)
+            number, image, mirrored, first = self._sources[source, : FIRST_CELL + 1].tolist()
+            begin = self._n_sources
+            for smaller in self._cut(self._pieces[number], cell - first):
+                self._new_sources(smaller, np.array([image]), np.array([mirrored]))
+            self._finer[at] = self._spans(wall, np.arange(begin, self._n_sources))
         return self._finer[at]
 
     def cleared(self, spans: np.ndarray, looks: int) -> bool:
@@ -161,65 +165,101 @@ class Cells:
             return False
         before = self.changes
         for _, _, source, first, end in spans.tolist():
-            piece, flip = self._flipped(source)
-            cells = slice(first - self._first[source], end - self._first[source])
-            at = id(piece), flip
-            looked = self._looks.setdefault(at, np.zeros(len(piece.pad_low), int))
+            number, _, _, first_cell, _, _, flip = self._sources[source].tolist()
+            piece = self._pieces[number]
+            cells = slice(first - first_cell, end - first_cell)
+            looked = self._looks.setdefault((number, flip), np.zeros(len(piece.pad_low), int))
             if (looked[cells] >= looks).all():
                 continue
             looked[cells] = looks
             rows = self.table[first:end]
             known = rows.copy()
             self._forbidden.clear(piece, flip, cells.start, cells.stop, looks)
-            for same in self._of_piece[at]:
-                if self._first[same] >= 0:
-                    self._enter(same)
+            same = self._sources_of[number]
+            alike = (self._sources[same, FLIP] == flip) & (self._sources[same, FIRST_CELL] >= 0)
+            self._enter(same.start + np.flatnonzero(alike))
             self.changes += int((rows != known).any())
         return self.changes > before
 
-    def _flipped(self, source: int) -> tuple[Piece, int]:
-        """Return the piece of a source, and which flip of it the robot makes."""
-        piece, number, mirrored = self._sources[source]
-        return piece, self._images(piece.family)[number].flip ^ mirrored
+    def _moves_of(self, family: int) -> tuple[Array, Array, np.ndarray]:
+        """Return sign, shift, shape (n, 6), and flip, shape (n,), of the images of a family."""
+        if family not in self._moves:
+            images = self._images(family)
+            sign, shift = np.array([image.sign for image in images]), [one.shift for one in images]
+            self._moves[family] = sign, np.array(shift), np.array([one.flip for one in images])
+        return self._moves[family]
 
-    def _new_source(self, piece: Piece, image: int, mirrored: bool) -> None:
-        number = len(self._sources)
-        self._sources.append((piece, image, mirrored))
-        self._first.append(-1)
-        self._of_piece.setdefault((id(piece), self._flipped(number)[1]), []).append(number)
+    def _new_sources(self, piece: Piece, numbers: np.ndarray, mirrored: np.ndarray) -> None:
+        """Note a piece in some of its images."""
+        first, end = self._n_sources, self._n_sources + len(numbers)
+        self._sources = _with_room(self._sources, end)
+        new = self._sources[first:end]
+        new[:, PIECE], new[:, IMAGE], new[:, MIRRORED] = len(self._pieces), numbers, mirrored
+        new[:, FIRST_CELL], new[:, N_CELLS] = -1, len(piece.pad_low)
+        # the one that the robot makes
+        new[:, FLIP] = self._moves_of(piece.family)[2][numbers] ^ mirrored
+        self._pieces.append(piece)
+        self._sources_of.append(slice(first, end))
+        self._n_sources = end
 
-    def _span(self, wall: int, source: int) -> tuple[int, int, int, int, int]:
-        """Return a whole piece in one image as a span; its cells are entered if they are not."""
-        piece, number, _ = self._sources[source]
-        image, n = self._images(piece.family)[number], len(piece.pad_low)
-        first = self._first[source]
-        if first < 0:
-            first = self._first[source] = self._used
-            self._used += n
-            if self._used > len(self.table):
-                more = np.empty((self._used, COLUMNS))
-                self.table = np.concatenate([self.table, more])
-            self._enter(source)
-        key = self._keys.setdefault((piece.family, image.key, piece.side), len(self._keys))
-        return wall, key, source, first, first + n
+    def _spans(self, wall: int, sources: np.ndarray) -> np.ndarray:
+        """Return whole pieces as spans; cells that are not in the table are entered."""
+        new = sources[self._sources[sources, FIRST_CELL] < 0]
+        if len(new):
+            n_cells = self._sources[new, N_CELLS]
+            self._sources[new, FIRST_CELL] = self._used + np.cumsum(n_cells) - n_cells
+            self._used += int(n_cells.sum())
+            self.table = _with_room(self.table, self._used)
+            for source, (number, image) in zip(
+                new.tolist(), self._sources[new, : IMAGE + 1].tolist(), strict=True
+            ):
+                piece = self._pieces[number]
+                key = piece.family, self._images(piece.family)[image].key, piece.side
+                self._sources[source, KEY_OF] = self._keys.setdefault(key, len(self._keys))
+            for number in np.unique(self._sources[new, PIECE]).tolist():
+                own = new[self._sources[new, PIECE] == number]
+                for flip in np.unique(self._sources[own, FLIP]).tolist():
+                    self._enter(own[self._sources[own, FLIP] == flip])
+        of = self._sources[sources]
+        ends = of[:, FIRST_CELL] + of[:, N_CELLS]
+        walls = np.full(len(sources), wall)
+        return np.stack([walls, of[:, KEY_OF], sources, of[:, FIRST_CELL], ends], axis=1)
 
-    def _enter(self, source: int) -> None:
-        """Enter the cells of a source into the table, as far as they are not forbidden."""
-        piece, number, _ = self._sources[source]
-        moved = self._images(piece.family)[number].of(piece)
-        rows = self.table[self._first[source] : self._first[source] + len(piece.pad_low)]
-        low, high = np.zeros(len(rows)), np.ones(len(rows))
+    def _enter(self, sources: np.ndarray) -> None:
+        """Enter the cells of sources into the table, as far as they are not forbidden.
+
+        Those of one piece, which the robot makes with the same flip of the wrist.
+        """
+        piece = self._pieces[self._sources[sources[0], PIECE]]
+        sign, shift, _ = self._moves_of(piece.family)
+        number, n = self._sources[sources, IMAGE], len(piece.pad_low)
+        mirrored = sign[number, None] < 0.0
+        corners = piece.corners * sign[number, None] + shift[number, None]
+        start, end = corners[:, :-1], corners[:, 1:]
+        rows = np.empty((len(sources), n, COLUMNS))
+        rows[..., 0:6], rows[..., 6:12] = start, end
+        rows[..., 12:18] = np.where(mirrored, -piece.pad_high, piece.pad_low)
+        rows[..., 18:24] = np.where(mirrored, -piece.pad_low, piece.pad_high)
+        rows[..., 24], rows[..., 25] = piece.at[:-1], piece.at[1:]
         if self._forbidden is not None:
-            low, high = self._forbidden.clear(*self._flipped(source), 0, 0, 1)
-        low, high = low[:, None], high[:, None]
-        step, along = np.diff(moved.corners, axis=0), np.diff(moved.at)[:, None]
-        rows[:, 0:6] = np.where(low > 0.0, moved.corners[:-1] + low * step, moved.corners[:-1])
-        rows[:, 6:12] = np.where(high < 1.0, moved.corners[:-1] + high * step, moved.corners[1:])
-        rows[:, 12:18], rows[:, 18:24] = moved.pad_low, moved.pad_high
-        none = (low > high)[:, 0]
-        rows[none, :12] = np.tile(moved.corners[:-1][none], 2)
-        rows[none, 12:18], rows[none, 18:24] = FORBIDDEN, -FORBIDDEN
-        rows[:, 24], rows[:, 25] = moved.at[:-1], moved.at[1:]
-        some = ~none
-        rows[some, 24:25] += (low * along)[some]
-        rows[some, 25:26] -= ((1.0 - high) * along)[some]
+            flip = int(self._sources[sources[0], FLIP])
+            low, high = self._forbidden.clear(piece, flip, 0, 0, 1)
+            none, step, along = low > high, end - start, np.diff(piece.at)
+            begins, ends = (low > 0.0) & ~none, (high < 1.0) & ~none
+            rows[:, begins, 0:6] += (low[:, None] * step)[:, begins]
+            rows[:, ends, 6:12] = (start + high[:, None] * step)[:, ends]
+            rows[:, none, 6:12] = start[:, none]
+            rows[:, none, 12:18], rows[:, none, 18:24] = FORBIDDEN, -FORBIDDEN
+            rows[..., 24] += np.where(none, 0.0, low * along)
+            rows[..., 25] -= np.where(none, 0.0, (1.0 - high) * along)
+        self.table[self._sources[sources, FIRST_CELL][:, None] + np.arange(n)] = rows
+        self.entered += len(sources) * n
+
+
+def _with_room(table: Any, rows: int) -> Any:
+    """Return a table with room for so many rows, twice of what it had at the least."""
+    if rows <= len(table):
+        return table
+    larger = np.empty((max(rows, 2 * len(table)), *table.shape[1:]), table.dtype)
+    larger[: len(table)] = table
+    return larger

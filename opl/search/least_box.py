@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.search.bounding import distance, tighten, trim
+from opl.search.bounding import distances, tighten, trim
 from opl.search.cells import END, FIRST, WALL, Cells, Forbidden
 from opl.search.relaxation import least_box
 from opl.search.subproblems import Candidate, Relaxation, Subproblem
@@ -221,11 +221,10 @@ class BoxProof:
         if np.count_nonzero(walls == 0) > 1:
             return 0, float(found.place[0])
         missed, lost = np.full(node.n_walls, np.inf), found.lost.copy()
-        for wall, (first, end) in zip(walls.tolist(), node.spans[:, FIRST:].tolist(), strict=True):
-            if end == first + 1 and table[first, 25] - table[first, 24] < SMALLEST:
-                missed[wall] = lost[wall] = 0.0
-            away = distance(table, first, end, found.low, found.high)
-            missed[wall] = min(missed[wall], away)
+        np.minimum.at(missed, walls, distances(table, node.spans, found.low, found.high))
+        first, end = node.spans[:, FIRST], node.spans[:, END]
+        tiny = walls[(end == first + 1) & (table[first, 25] - table[first, 24] < SMALLEST)]
+        missed[tiny] = lost[tiny] = 0.0
         score = np.maximum(missed, lost)
         wall = int(np.argmax(score))
         if score[wall] > SETTLED * self._gap * self.threshold:
@@ -239,10 +238,7 @@ class BoxProof:
             # the nearest, and all others
             table, box = self._cells.table, node.found
             assert box is not None
-            away = [
-                distance(table, first, end, box.low, box.high)
-                for first, end in own[:, FIRST:].tolist()
-            ]
+            away = distances(table, own, box.low, box.high)
             k = int(np.argmin(away))
             halves = [own[k : k + 1], np.delete(own, k, axis=0)]
         else:
