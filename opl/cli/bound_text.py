@@ -43,7 +43,8 @@ def _certified(report: opl.Report) -> Iterator[str]:
     why = "" if path.open_because is None else f"; more than wanted: {path.open_because}"
     yield (
         f"no motion along these passes has a joint range sum below {bound:.4f} rad, {COVERED}, "
-        f"with the plan's clearances: the one found is within {100.0 * gap:.3f} % of the least{why}"
+        "with the plan's clearances and leads as the job sets them: the one found is within "
+        f"{100.0 * gap:.3f} % of the least{why}"
     )
 
 

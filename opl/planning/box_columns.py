@@ -14,6 +14,7 @@ from opl.planning.images import Seams, wrist_flips
 from opl.planning.nodes import inverse_solutions
 from opl.planning.placement import Placement
 from opl.planning.problem import GrindingProblem, wheel_distances
+from opl.planning.shut_leads import ShutLeads
 from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
 from opl.search.in_box import missing_chords, nearest_points, sampled
@@ -70,6 +71,7 @@ class ColumnSampler:
         self._seams = seams
         self.collisions = False  # whether postures that collide are left out
         self.mirrored = False  # whether they are those with the wrist flipped that may not collide
+        self.leads = ShutLeads(problem)
         self.flips = wrist_flips(problem.cell.robot.arm)
         self.work = 0.0  # what was sampled so far, in units of work
 
@@ -171,7 +173,20 @@ class ColumnSampler:
                 q[block][own] = self._placed(angles, placement)
         free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
         free &= _allowed(there.pass_index, placements, t)
+        if self.collisions:
+            self._leave_out_leads(there, placements, t, free)
         return Columns(places, there, tuple(placements), t, q, free)
+
+    def _leave_out_leads(
+        self, there: CutterPoints, placements: Sequence[Placement], t: Array, free: np.ndarray
+    ) -> None:
+        """Leave postures out, flags of shape (n, m), where passes cannot begin or end."""
+        changes = np.flatnonzero(np.diff(there.pass_index))
+        for column in {0, *changes.tolist(), *(changes + 1).tolist(), len(free) - 1}:
+            own, row = placements[int(there.pass_index[column])], np.flatnonzero(free[column])
+            flip = own.number ^ int(self.mirrored)
+            T = there.Ts_workpiece_cutter[column]
+            free[column, row] = ~self.leads.at(T, own.family, flip, t[column, row])
 
     def there(self, places: Array) -> CutterPoints:
         """Return fractional cutter points of some passes, shape (n,), as points of their own."""

@@ -98,20 +98,42 @@ def _surely_cuts(
     cell: WorkCell, part: PartTree, Ts_workpiece_cutter: Array, low: Array, high: Array
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return in which cells the part cuts into the wheel all over, and at the middle."""
+    allowed = -cell.planned_penetration
+    return surely_nearer(cell, part, Ts_workpiece_cutter, low, high, allowed)
+
+
+def surely_nearer(
+    cell: WorkCell,
+    part: PartTree,
+    Ts_workpiece_cutter: Array,
+    low: Array,
+    high: Array,
+    distance: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return in which cells the part is nearer to the wheel all over, and at the middle.
+
+    Args:
+        cell: The cell.
+        part: The triangles of the part.
+        Ts_workpiece_cutter: The place of each cell, shape (n, 4, 4).
+        low: Least contact position of each, all of it on the flat or on one edge, shape (n,).
+        high: Greatest.
+        distance: Nearer than this in [m], less than 0 for how deep.
+    """
     wheel = cell.wheel
     middle, radius = (low + high) / 2.0, (high - low) / 2.0
     Ts_cutter_workpiece = frames.inverse(Ts_workpiece_cutter)
     x, _, z = np.moveaxis(frames.transform(Ts_cutter_workpiece, part.spheres[0, :3]), -1, 0)
-    # about the edge; and a point in the wheel is not farther from it than the wheel is large
+    # about the edge; and a point so near is not farther from it than the wheel is large
     lever = np.minimum(
-        np.hypot(x, z) + part.spheres[0, 3], np.hypot(wheel.width, 2.0 * wheel.radius)
+        np.hypot(x, z) + part.spheres[0, 3],
+        np.hypot(wheel.width, 2.0 * wheel.radius) + max(distance, 0.0),
     )
     rolled = np.abs(middle) > wheel.flat_end
     moved = np.where(rolled, 2.0 * np.sin(np.deg2rad(radius) / 2.0) * lever, radius / MM_PER_M)
     Ts_contact0_workpiece = wheel.T_contact0_contact(middle) @ Ts_cutter_workpiece
-    allowed = -cell.planned_penetration
-    clearance = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, allowed)
-    return (clearance + moved + TOLERANCE < allowed), clearance < allowed
+    clearance = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, distance)
+    return (clearance + moved + TOLERANCE < distance), clearance < distance
 
 
 def cut_finer(t: Array, parts: np.ndarray) -> Array:

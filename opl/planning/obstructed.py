@@ -14,6 +14,7 @@ from opl.cell.collision import CollisionScene
 from opl.geometry.frames import Array
 from opl.planning.columns import ColumnWalls
 from opl.planning.cut_cells import halved
+from opl.planning.shut_leads import ShutLeads
 from opl.search.walls import Piece
 
 # halvings of a cell all in collision, but not deep enough to be sure, at the first look and second
@@ -39,11 +40,13 @@ class Obstructions:
 
     Args:
         collision: The scene; motions that come nearer than its clearances do not count.
+        leads: Where passes cannot begin or end; such motions do not count either.
         walls: Where the pieces are from. Those with the wrist flipped collide elsewhere.
     """
 
-    def __init__(self, collision: CollisionScene, walls: ColumnWalls) -> None:
+    def __init__(self, collision: CollisionScene, leads: ShutLeads, walls: ColumnWalls) -> None:
         self._collision = collision
+        self._leads = leads
         self._walls = walls
         self._flips = walls.images.flips
         self._known: dict[tuple[int, int], _Known] = {}
@@ -74,14 +77,23 @@ class Obstructions:
         step = np.diff(piece.corners, axis=0)
 
         def surely(_: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
+            shut, shut_there = self._leads.surely(piece, flip, *(along(end) for end in (low, high)))
+            left = ~shut
+            shut[left], near = collides(low[left], high[left])
+            shut_there[left] |= near
+            return shut, shut_there
+
+        def along(place: Array) -> Array:
+            return np.interp(place, np.arange(len(piece.at)), piece.at)
+
+        def collides(low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
             middle, half = (low + high) / 2.0, (high - low)[:, None] / 2.0
             cell = middle.astype(int)
             q = piece.corners[cell] + step[cell] * (middle - cell)[:, None]
             turned = np.abs(step[cell]) * half + pads[cell]
             if looks > 1 and piece.bends is not None:
                 # from the curve itself, whose slope is that of the chord but for four pads a cell
-                at = piece.at[cell] + np.diff(piece.at)[cell] * (middle - cell)
-                on_curve = self._walls.postures(piece, at)
+                on_curve = self._walls.postures(piece, along(middle))
                 there = piece.bends[cell] & ~np.isnan(on_curve[:, 0])
                 q[there] = on_curve[there]
                 turned[there] = ((np.abs(step[cell]) + 4.0 * pads[cell]) * half)[there]

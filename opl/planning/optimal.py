@@ -222,7 +222,8 @@ class OptimalSearch:
 
     def _mind_collisions(self) -> None:
         """Leave out where the robot collides: it does wherever a motion might have been."""
-        self._forbidden = Obstructions(self._problem.scene.collision, self._walls)
+        scene, leads = self._problem.scene.collision, self._sampler.leads
+        self._forbidden = Obstructions(scene, leads, self._walls)
         self._sampler.collisions = True
         self._places.clear()
         self.proof.put_back()  # before what is proven is noted

@@ -10,9 +10,15 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from opl.cell.collision import CollisionScene
+from opl.cell.full_turns import full_turns
 from opl.cell.inverse_kinematics import inverse_kinematics
-from opl.motion.collision_check import RESOLUTION, densify
+from opl.motion.collision_check import RESOLUTION, colliding_moves, densify
 from opl.motion.figures import figures_of_path
+from opl.motion.free_leads import FreeLeads
+from opl.motion.free_move_search import FreeMoveSearch
+from opl.motion.motion import Motion, MoveKind
+from opl.motion.path import PassEnd
+from opl.motion.whole_motion import UnreachableApproachError
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.columns import ColumnWalls
 from opl.planning.images import Images, seams_of
@@ -21,6 +27,7 @@ from opl.planning.least_range import plan_optimal
 from opl.planning.multi_start import plan_recursive
 from opl.planning.obstructed import Obstructions
 from opl.planning.settings import ObjectiveWeights
+from opl.planning.shut_leads import ShutLeads
 from opl.planning.weighted import plan_weighted
 from opl.verification.replay import replay
 from tests.support.bare_cells import Ghosts
@@ -221,7 +228,7 @@ def test_what_is_left_out_of_a_wall_collides_all_over():
     walls = ColumnWalls(cell, problem.scene.part, problem.points, images)
     wall = walls.columns([7.0])[0]
     scene = CollisionScene(cell.widened(0.036))
-    obstructions = Obstructions(scene, walls)
+    obstructions = Obstructions(scene, ShutLeads(problem), walls)
     T_workpiece_cutter = problem.points.Ts_workpiece_cutter[7]
     left_out, kept = [], 0
     for piece in wall.pieces:
@@ -240,6 +247,64 @@ def test_what_is_left_out_of_a_wall_collides_all_over():
     left_out = np.concatenate(left_out)
     assert kept > 50 and len(left_out) > 100
     assert scene.collides(left_out).all()
+
+
+def in_a_narrow_cell(problem):
+    """Everything must stay far apart: leads collide."""
+    cell = problem.cell.widened(0.03)
+    return with_scene(problem, cell=cell, collision=CollisionScene(cell).for_second_opinion())
+
+
+def with_a_lazy_elbow(problem):
+    """Joint 3 comes to its limit on the way off the wheel for some contact positions."""
+    cell = problem.cell
+    q = problem.solutions(np.arange(len(problem.points)))[:, :, :4, 2]
+    upper = cell.robot.upper.copy()
+    upper[2] = np.nanquantile(q, 0.6)
+    cell = replace(cell, robot=replace(cell.robot, upper=upper))
+    return with_scene(problem, cell=cell)
+
+
+@pytest.mark.parametrize("changed", [in_a_narrow_cell, with_a_lazy_elbow])
+def test_no_lead_is_free_where_it_is_surely_shut(changed):
+    problem = changed(one_row())
+    cell, points, random = problem.cell, problem.points, np.random.default_rng(3)
+    scene = problem.scene
+    free_moves = FreeMoveSearch(cell, scene.collision, scene.part)
+    leads = FreeLeads(cell, scene.collision, scene.part, free_moves)
+    shut_leads = ShutLeads(problem)
+    images = Images(cell.robot, seams_of(problem.solutions(np.arange(len(points)))), 10.0)
+    walls = ColumnWalls(cell, scene.part, points, images)
+    shut, asked, all_cells = 0, 0, 0
+    for kind, column in ((MoveKind.APPROACH, 0), (MoveKind.RETRACT, len(points) - 1)):
+        (wall,) = walls.columns([float(column)])
+        for piece, flip in product(wall.pieces, range(2)):
+            corners = np.arange(len(piece.at))
+            at = np.interp(np.linspace(0.0, corners[-1], 8 * corners[-1] + 1), corners, piece.at)
+            surely, near = shut_leads.surely(piece, flip, at[:-1], at[1:])
+            assert not (surely & ~near).any()
+            all_cells += len(surely)
+            branch = piece.family + 4 * flip
+            shut += np.count_nonzero(surely)
+            for k in random.permutation(np.flatnonzero(surely))[:5]:
+                t = random.uniform(at[k], at[k + 1])
+                Ts = cell.Ts_base_flange(t, points.Ts_workpiece_cutter[column])
+                q = inverse_kinematics(cell.robot.arm, Ts)[branch]
+                for turns in full_turns(cell.robot.lower, cell.robot.upper):
+                    if not cell.within_limits((q + turns)[None])[0]:
+                        continue
+                    asked += 1
+                    end = PassEnd(kind, branch, column, t, q + turns)
+                    try:
+                        found = leads.find(points, problem.process, end)
+                    except UnreachableApproachError:
+                        continue
+                    motion = Motion.off_wheel(np.vstack([end.q, found]), kind, 0)
+                    faults = colliding_moves(cell, scene.collision, scene.part, motion)
+                    assert faults or free_moves.blocked_at(found[-1]) is not None
+    assert shut > 10
+    assert asked > 5
+    assert shut < 0.8 * all_cells
 
 
 def test_every_motion_crosses_a_chain_within_the_pads_of_its_pieces():
