@@ -20,6 +20,9 @@ from opl.geometry.wheel import MM_PER_M, ContactWheel
 
 CELL = 1.0  # belt units that a cell covers at first
 MOST_HALVINGS = 12  # of a cell where something begins
+# of one that is deep in the wheel, but hardly deeper than allowed: along the flat it may be so all
+# over, and each halving is twice the work
+MOST_WITHIN = 7
 
 
 def whole_cells(wheel: ContactWheel) -> Array:
@@ -51,7 +54,7 @@ def cells_of(
     def surely(place: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
         return _surely_cuts(cell, part, Ts_workpiece_cutter[place], low, high)
 
-    place, low, high, cuts = halved(place, low[place, some], high[place, some], surely)
+    place, low, high, cuts = halved(place, low[place, some], high[place, some], surely, MOST_WITHIN)
     ends = np.searchsorted(place, np.arange(k + 1))
     runs = [slice(a, b) for a, b in pairwise(ends)]
     return [np.append(low[run], high[run][-1:]) for run in runs], [cuts[run] for run in runs]
