@@ -37,6 +37,8 @@ PROOF_SHARE = 0.9  # of the widening: how far the bound may stay below the path
 ROOM_SHARE = 0.4  # of the widening: how much larger than its box the path may be
 MISSED = 0.05  # of the widening: what a box may miss a cutter point by and still hold it
 RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for next
+GUESSED = 1.5  # times what is proven: what is hoped for where no box tells
+FIRST_GUESS = 0.5  # [rad] what is hoped for where nothing is proven either
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
 EARLY_SHARE = 0.3  # of the work: motions in boxes that are not proven to be the least
 FIRST_WORK = 300  # units that may be spent on those at once
@@ -79,6 +81,7 @@ class OptimalSearch:
         self.plan = fallback
         self._largest = largest
         self._proven = self._least_hope = 0.0
+        self._told = fallback is not None  # whether a motion or a box tells what to hope for
         self._given_up = self._refined = 0
         self._refined_for = 0.0  # size of the box for which rectangles were cut finer last
         self._forbidden: Forbidden | None = None  # of collisions, once they are known to matter
@@ -91,6 +94,7 @@ class OptimalSearch:
         positions = whole_cells(problem.cell.wheel)
         self._rectangles = Rectangles(self._sampler, points, positions)
         self._hope(self._families.smallest_grown())
+        self.proof.threshold = min(self.proof.threshold, self._guess)
         first = [0.0, float(len(points) // 2), float(len(points) - 1)]
         self._add(list(dict.fromkeys(first + self._families.unreached())))
 
@@ -217,6 +221,7 @@ class OptimalSearch:
     def _hope(self, box: JointBox | None) -> None:
         """Look only for what is as good as a motion in a box would be."""
         if box is not None:
+            self._told = True
             hoped = max(box.size * (1.0 + self._settings.widen), self._least_hope)
             self.proof.threshold = min(self.proof.threshold, hoped)
 
@@ -227,11 +232,19 @@ class OptimalSearch:
         self._sampler.collisions = True
         self._places.clear()
         self.proof.put_back()  # before what is proven is noted
-        self._begin_again(self._value, 0.0)
+        self._told = self.plan is not None
+        self._begin_again(self._guess, 0.0)
+
+    @property
+    def _guess(self) -> float:
+        """What to hope for where nothing is told: all images of all walls are many."""
+        least = max(GUESSED * self.lower_bound, FIRST_GUESS)
+        return self._value if self._told else min(least, self._value)
 
     def _hope_for_less(self) -> None:
-        """Begin the proof again: no motion is as good as a box had made hope."""
-        hope = min(self._value, self.proof.threshold * RAISED)
+        """Begin the proof again: no motion is as good as was hoped."""
+        raised = RAISED if self._told else GUESSED
+        hope = min(self._value, self.proof.threshold * raised)
         self._begin_again(hope, hope)
 
     def _begin_again(self, threshold: float, least_hope: float) -> None:
