@@ -16,7 +16,7 @@ from opl.geometry.wheel import ContactWheel
 WHEEL = "wheel"
 PART = "part"
 # [m] how much nearer the second opinion may see two bodies than they are: PyBullet was seen to
-# differ by 0.08 mm at the rim of the wheel, and it is held to rounding the edges of a link
+# differ by 0.05 mm, and it is held to rounding the edges of a link by a millimetre
 SECOND_OPINION = 1e-4
 SECOND_OPINION_OF_A_LINK = 1e-3
 # [rad] configurations are rounded to what a program can express before they are proven; pulses and

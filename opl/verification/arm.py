@@ -9,10 +9,10 @@ import numpy as np
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.rotations import quaternion
-from opl.verification.engine import pybullet, start
+from opl.verification.engine import SCALE, pybullet, start
 
 BASE_LINK = -1  # Bullet's number of the link that does not move
-At = tuple[Sequence[float], Sequence[float]]  # a pose as Bullet has it: position in [m], x y z w
+At = tuple[Sequence[float], Sequence[float]]  # a pose as Bullet has it: position, x y z w
 
 
 class Arm:
@@ -28,7 +28,8 @@ class Arm:
         self._client.setPhysicsEngineParameter(enableFileCaching=0)
         self._robot = self._client.loadURDF(
             str(cell.robot.urdf),
-            basePosition=[0.0, 0.0, -cell.robot.base_height],
+            basePosition=[0.0, 0.0, -SCALE * cell.robot.base_height],
+            globalScaling=SCALE,
             useFixedBase=True,
             # else Bullet inscribes prisms of 32 sides in cylinders
             flags=pybullet.URDF_USE_IMPLICIT_CYLINDER,
@@ -65,12 +66,12 @@ class Arm:
 
 def as_placed(T: Array) -> At:
     """Return a pose as Bullet takes it."""
-    return T[:3, 3].tolist(), quaternion(T[:3, :3]).tolist()
+    return (SCALE * T[:3, 3]).tolist(), quaternion(T[:3, :3]).tolist()
 
 
 def as_pose(position: Sequence[float], xyzw: Sequence[float]) -> Array:
     """Return a pose as Bullet gives it, shape (4, 4)."""
     T = np.eye(4)
     T[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(xyzw), (3, 3))
-    T[:3, 3] = position
+    T[:3, 3] = np.divide(position, SCALE)
     return T

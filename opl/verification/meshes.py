@@ -15,7 +15,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh
-from opl.verification.engine import BulletClient, pybullet
+from opl.verification.engine import SCALE, BulletClient, pybullet
 
 RAY = np.array([0.2748, 0.5913, 0.7582])  # not along any edge of a likely mesh
 
@@ -25,7 +25,7 @@ def triangle_body(client: BulletClient, mesh: TriangleMesh) -> int:
 
     Bullet makes one convex shape for each object of an OBJ file; here each triangle is an object.
     """
-    lines = ["v {:.9g} {:.9g} {:.9g}".format(*vertex) for vertex in mesh.vertices]
+    lines = ["v {:.9g} {:.9g} {:.9g}".format(*vertex) for vertex in SCALE * mesh.vertices]
     for number, face in enumerate(mesh.faces + 1):
         lines += [f"o t{number}", "f {} {} {}".format(*face)]
     with tempfile.TemporaryDirectory() as folder:
@@ -52,7 +52,7 @@ def concave_shape(client: BulletClient, corners: Array) -> int:
     with _FILLED:
         _CORNERS.extend([] for _ in range(n - len(_CORNERS)))
         _GIVEN[:] = _CORNERS[:n]
-        for row, corner in zip(_GIVEN, corners.tolist(), strict=True):
+        for row, corner in zip(_GIVEN, (SCALE * corners).tolist(), strict=True):
             row[:] = corner
         _NUMBERS[:] = range(n)
         shape = client.createCollisionShape(

@@ -18,12 +18,12 @@ from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Body, Box, Cylinder
 from opl.verification.arm import BASE_LINK, Arm, as_placed, as_pose
-from opl.verification.engine import pybullet
+from opl.verification.engine import SCALE, pybullet
 from opl.verification.meshes import concave_shape, is_inside, triangle_body
 from opl.verification.patches import Drum, Patches
 
-# Bullet rounds the edges of a link's boxes by about this much, so that they seem farther away than
-# they are; it is added to what is needed
+# Bullet rounds the edges of a link's boxes, so that they seem farther away than they are: by less
+# than a tenth of this, 0.085 mm was seen. It is added to what is needed
 LINK_ROUNDING = 1e-3  # [m]
 # Bullet rounds the edges of cylinders by their margin and blows up meshes by it: the default of
 # 1 mm is as much as the contact itself
@@ -163,8 +163,9 @@ class World(Arm):
 
     def _measured(self, first: Solid, second: Solid, within: float) -> float:
         """Return what Bullet says of two solids, as `distance`."""
-        contacts = self._closest_points(first.body, second.body, within, first.link, second.link)
-        return min((contact[8] for contact in contacts), default=np.inf)
+        bodies, links = (first.body, second.body), (first.link, second.link)
+        contacts = self._closest_points(*bodies, SCALE * within, *links)
+        return min((contact[8] for contact in contacts), default=np.inf) / SCALE
 
     def gap(self, within: float, counts: float = np.inf) -> float:
         """Return the distance of the part from the wheel in [m], as `distance`.
@@ -189,7 +190,7 @@ class World(Arm):
         """Return the meshes around flange or part as posed: distances are those of surfaces."""
         state = self._link_state(self._robot, self._flange, computeForwardKinematics=True)
         points = [
-            np.array(state[4]),
+            np.array(state[4]) / SCALE,
             transform(self._T_base_workpiece, self._cell.part.vertices[0]),
         ]
         found = []
@@ -211,13 +212,14 @@ class World(Arm):
         farther body of the pair hangs on, and the body stretched out beyond it.
         """
         self.move_to(np.zeros(len(self._joints)))
-        origins = [np.array(self._link_state(self._robot, joint)[4]) for joint in self._joints]
+        states = [self._link_state(self._robot, joint) for joint in self._joints]
+        origins = [np.array(state[4]) / SCALE for state in states]
         lengths = np.linalg.norm(np.diff(origins, axis=0), axis=1)
         radii = {}
         for solid in (*self._links[1:], *(held for held, _ in self._held)):
             origin = origins[solid.moved_by - 1]
-            low, high = self._client.getAABB(solid.body, solid.link)
-            away = np.maximum(np.abs(np.array(low) - origin), np.abs(np.array(high) - origin))
+            box = np.array(self._client.getAABB(solid.body, solid.link)) / SCALE
+            away = np.abs(box - origin).max(axis=0)
             radii[solid] = float(np.linalg.norm(away))
         found = np.zeros((len(pairs), len(self._joints)))
         for row, pair in zip(found, pairs, strict=True):
@@ -238,12 +240,14 @@ class World(Arm):
     def _add(self, body: Body, T_base_body: Array | None = None) -> Solid:
         client = self._client
         if isinstance(body.shape, Box):
-            half = [edge / 2.0 for edge in body.shape.size]
+            half = [SCALE * edge / 2.0 for edge in body.shape.size]
             shape = client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half)
             solid = self._body(body.name, shape)
         elif isinstance(body.shape, Cylinder):
             shape = client.createCollisionShape(
-                pybullet.GEOM_CYLINDER, radius=body.shape.radius, height=body.shape.length
+                pybullet.GEOM_CYLINDER,
+                radius=SCALE * body.shape.radius,
+                height=SCALE * body.shape.length,
             )
             solid = self._body(body.name, shape)
         else:
@@ -258,7 +262,7 @@ class World(Arm):
         return self._as_solid(name, body)
 
     def _as_solid(self, name: str, body: int) -> Solid:
-        self._client.changeDynamics(body, BASE_LINK, collisionMargin=MARGIN)
+        self._client.changeDynamics(body, BASE_LINK, collisionMargin=SCALE * MARGIN)
         return Solid(name, body, BASE_LINK)
 
 
