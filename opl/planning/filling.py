@@ -30,7 +30,7 @@ class BrokenEdgeError(Exception):
         self.cause = cause
 
 
-MOST_HALVINGS = 6  # of a move between intermediate nodes; 64 times denser always was enough
+MOST_HALVINGS = 6  # of a move between intermediate nodes
 
 
 def fill_in(
@@ -39,7 +39,9 @@ def fill_in(
     """Put intermediate nodes between the nodes of a track.
 
     Contact position, origin, axis z and axis x of the cutter frame are interpolated linearly, and
-    the inverse kinematics is solved on the same IK branch, nearest to the joint interpolation.
+    the inverse kinematics is solved on the same IK branch, nearest to the joint interpolation. Near
+    a singularity joints turn far from place to place: there as well nodes are put in, until no step
+    is larger than that from node to node may be.
 
     `rows` are those of the track in each column, one for each cutter point, shape (N,).
 
@@ -60,10 +62,8 @@ def fill_in(
         pass_index = points.pass_index[place.astype(int)]
         on_wheel = np.diff(pass_index) == 0
         jumps = on_wheel & (np.abs(np.diff(q, axis=0)).max(axis=1) > rule.max_joint_step)
-        if jumps.any():
-            raise BrokenEdgeError(int(place[:-1][jumps][0]), "continuity")
         error = _contact_error_between(cell, points, t_node, place, q, on_wheel)
-        coarse = np.flatnonzero(error > rule.max_contact_error)
+        coarse = np.flatnonzero((error > rule.max_contact_error) | jumps)
         if not len(coarse):
             return GrindingPath(nodes.ik_branch, q, t, place, pass_index)
         halves = (place[coarse] + place[coarse + 1]) / 2.0

@@ -26,6 +26,7 @@ from opl.search.walls import Piece
 
 AT_ONCE = 4  # configurations of a lead that are looked at together
 HALVINGS = 10  # of the way between two contact positions of the field
+SPARE = 3e-4  # [m] of clearance, where samples are looked at
 # places of the part that each lead goes through as if they were ground, shape (k, 4, 4)
 Leads = tuple[Array, ...]
 
@@ -214,9 +215,10 @@ class _Cells:
         """Return which postures collide, however far joints turn, shape (n,)."""
         sign, shift = self._flip
         collision, placed = self._scene.collision, q * sign + shift
+        if not turned.any():
+            return collision.wider(SPARE).collides(placed)
         hits = collision.collides(placed)
-        if turned.any():
-            hits[hits] = collision.collides_throughout(placed[hits], turned[hits])
+        hits[hits] = collision.collides_throughout(placed[hits], turned[hits])
         return np.asarray(hits)
 
 

@@ -248,6 +248,16 @@ def test_a_jump_is_refused():
     assert broken(cell, points, nodes, rows, rule).cause == "continuity"
 
 
+def test_steps_too_large_between_nodes_are_made_smaller():
+    cell, points, nodes, rows = two_points()
+    coarse = fill_in(cell, points, nodes, rows, small_problem().interpolation)
+    largest = np.abs(np.diff(coarse.q, axis=0)).max()
+    rule = replace(small_problem().interpolation, max_joint_step=largest / 3.0)
+    finer = fill_in(cell, points, nodes, rows, rule)
+    assert np.abs(np.diff(finer.q, axis=0)).max() <= largest / 3.0
+    assert len(finer.q) > len(coarse.q)
+
+
 def test_an_error_that_no_density_keeps_is_refused():
     cell, points, nodes, rows = two_points()
     rule = replace(small_problem().interpolation, max_contact_error=1e-16)
