@@ -149,8 +149,8 @@ class CollisionScene:
         for first in range(0, len(q), BLOCK):
             block = q[first : first + BLOCK]
             near = self._separation.near(block, self._enough)
-            for k in np.flatnonzero(near.any(axis=1)) if near.any() else ():
-                found[first + k] = any(True for _ in self._hits(block[k], near[k]))
+            for k in near.any(axis=1).nonzero()[0].tolist() if near.any() else ():
+                found[first + k] = next(self._hits(block[k], near[k]), None) is not None
         return found
 
     def collides_throughout(self, q: Array, turned: Array) -> np.ndarray:
@@ -193,7 +193,7 @@ class CollisionScene:
     def _hits(self, q: Array, near: np.ndarray) -> Iterator[int]:
         """Yield which of the pairs marked, shape (p,), collide at a configuration."""
         self.place(q)
-        for index in np.flatnonzero(near).tolist():
+        for index in near.nonzero()[0].tolist():
             if pin.computeCollision(self._geometry, self._geometry_data, index):
                 yield index
 

@@ -95,6 +95,19 @@ class StraightMoves:
         wheel = self._cell.wheel
         Ts_base_flange = forward_kinematics(self._cell.robot, q)
         Ts_contact0_workpiece = self._cell.Ts_contact0_workpiece(Ts_base_flange)
+        near: np.ndarray = np.zeros(len(q), dtype=bool)
+        x, y, z, radius = self._part.spheres[0]
+        middle = Ts_contact0_workpiece[:, :3, :3] @ np.array([x, y, z])
+        middle += Ts_contact0_workpiece[:, :3, 3]
+        close = np.flatnonzero(wheel.signed_distance(middle) - radius < needed)
+        if not len(close):
+            return near
+        near[close] = self._near_wheel(Ts_contact0_workpiece[close], needed)
+        return near
+
+    def _near_wheel(self, Ts_contact0_workpiece: Array, needed: float) -> np.ndarray:
+        """Return at which poses, shape (n, 4, 4), the part is nearer to the wheel than needed."""
+        wheel = self._cell.wheel
         R = Ts_contact0_workpiece[:, :3, :3].swapaxes(1, 2)
         p = Ts_contact0_workpiece[:, None, :3, 3]
         near = np.asarray((wheel.signed_distance(self._corners @ R + p) < needed).any(axis=1))

@@ -29,8 +29,12 @@ def block(problem: GrindingProblem, matrix: OpenMatrix, rows: np.ndarray, blocke
     """
     track = rows.tolist()
     if isinstance(blocked, Collides):
+        pass_index = problem.points.pass_index
+        starts = np.flatnonzero(np.diff(pass_index, prepend=-1, append=-1)).tolist()
         for fault in blocked.faults:
-            _block_fault(problem, matrix, track, blocked.motion, fault)
+            index = int(blocked.motion.pass_index[fault.move])
+            ends = starts[index], starts[index + 1] - 1
+            _block_fault(problem, matrix, track, ends, blocked.motion, fault)
     elif isinstance(blocked, NoFreeMove):
         _block_link(problem, matrix, track, blocked)
     elif isinstance(blocked.error, BrokenEdgeError):
@@ -48,14 +52,13 @@ def _block_fault(
     problem: GrindingProblem,
     matrix: OpenMatrix,
     track: list[int],
+    ends: tuple[int, int],
     motion: Motion,
     fault: CollidingMove,
 ) -> None:
-    """Block the node or the edge that a colliding move belongs to."""
+    """Block the node or the edge that a colliding move belongs to; its pass has these ends."""
     cause = " and ".join(fault.pair)
-    kind, index = motion.kind[fault.move], int(motion.pass_index[fault.move])
-    on_pass = np.flatnonzero(problem.points.pass_index == index)
-    first, last = int(on_pass[0]), int(on_pass[-1])
+    kind, (first, last) = motion.kind[fault.move], ends
     if kind.on_wheel:
         point = motion.cutter_point[fault.move]
         end = int(np.ceil(point))

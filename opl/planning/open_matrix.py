@@ -61,7 +61,7 @@ class OpenMatrix:
     causes: Counter[tuple[int, str]] = field(default_factory=Counter)
     cut_off: Counter[tuple[FreeMove, Blocker]] = field(default_factory=Counter)
     reached: int = 0
-    _collides: dict[tuple[int, int], dict[int, bool]] = field(default_factory=dict)
+    _collides: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
     _swept: set[int] = field(default_factory=set)
     _sorted: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     _counted: int = 0
@@ -72,7 +72,8 @@ class OpenMatrix:
         count = len(self.blocked) + len(self.shut)
         if self._counted != count:
             blocked = np.fromiter(self.blocked, np.int64, len(self.blocked))
-            self._sorted, self._counted = np.union1d(self.shut, blocked), count
+            both = np.union1d(self.shut, blocked) if len(blocked) else self.shut
+            self._sorted, self._counted = both, count
         return self._sorted
 
     @property
@@ -112,12 +113,17 @@ class OpenMatrix:
         rows = np.flatnonzero(self.free[column])
         positions = self.nodes.position_index[rows]
         # full turns bring the same bodies to the same places, in this matrix and in others
-        known = self._collides.setdefault((self.nodes.ik_branch, column), {})
-        asked, first = np.unique(positions, return_index=True)
-        new = np.array([position not in known for position in asked.tolist()], dtype=bool)
-        hits = scene.collides(self.nodes.at(column, rows[first[new]]))
-        known.update(zip(asked[new].tolist(), hits.tolist(), strict=True))
-        hit = np.array([known[position] for position in positions.tolist()], dtype=bool)
+        key = self.nodes.ik_branch, column
+        known = self._collides.get(key, np.empty(0, dtype=np.int8))
+        more = int(self.nodes.position_index.max()) + 1 - len(known)
+        if more > 0:
+            # -1 where nothing is known
+            known = self._collides[key] = np.append(known, np.full(more, -1, dtype=np.int8))
+        new = rows[known[positions] < 0]
+        if len(new):
+            asked, first = np.unique(self.nodes.position_index[new], return_index=True)
+            known[asked] = scene.collides(self.nodes.at(column, new[first]))
+        hit = known[positions] > 0
         self.free[column, rows[hit]] = False
         self.causes[column, cause] += int(hit.sum())
 
@@ -162,7 +168,7 @@ class Ladders:
 def open_matrices(problem: GrindingProblem) -> list[OpenMatrix]:
     """Return every matrix of a problem, nothing blocked yet but nodes that cut into the wheel."""
     matrices, ladders = [], Ladders(problem)
-    collides: dict[tuple[int, int], dict[int, bool]] = {}
+    collides: dict[tuple[int, int], np.ndarray] = {}
     for nodes in problem.field.matrices:
         free = problem.free_nodes(nodes)
         matrices.append(OpenMatrix(nodes, free, ladders, _collides=collides))

@@ -79,7 +79,8 @@ def shut_edges(places: Array, t: Array, rows: Sequence[Row], box: JointBox) -> n
 
     The nodes are at some places and contact positions, shape (n,) and (n, m).
     """
-    n_rows, found = t.shape[1], [np.empty(0, dtype=np.int64)]
+    n_rows = t.shape[1]
+    shut = np.zeros((len(t) - 1, n_rows, n_rows), dtype=bool)
     for row in rows:
         first, last = row.inside(box).T
         on = np.flatnonzero((places[:-1] >= row.places[0]) & (places[1:] <= row.places[-1]))
@@ -88,7 +89,5 @@ def shut_edges(places: Array, t: Array, rows: Sequence[Row], box: JointBox) -> n
         over = np.searchsorted(last, places[on] - SAME)
         edge = on[begun <= over]
         below = t < row.contact_position
-        passed = below[edge][:, :, None] != below[edge + 1][:, None, :]
-        k, here, there = np.nonzero(passed)
-        found.append((edge[k] * n_rows + here) * n_rows + there)
-    return np.unique(np.concatenate(found))
+        shut[edge] |= below[edge][:, :, None] != below[edge + 1][:, None, :]
+    return np.flatnonzero(shut)

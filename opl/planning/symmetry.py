@@ -49,15 +49,21 @@ def _followers(nodes: NodeMatrix, positions: np.ndarray) -> Iterator[np.ndarray]
         if (rows >= 0).all() and nodes.exists[np.arange(len(rows)), rows].all():
             yield rows
         return
-    for start in np.flatnonzero(nodes.position_index == positions[0]):
-        rows = np.full(len(positions), start)
-        for column in range(1, len(positions)):
-            alike = np.flatnonzero(nodes.position_index == positions[column])
-            before = nodes.at(column - 1, rows[column - 1])
-            away = np.abs(nodes.at(column, alike) - before).sum(axis=1)
-            if np.isnan(away).all():
+    order = np.argsort(nodes.position_index, kind="stable")
+    first, end = np.searchsorted(nodes.position_index[order], [positions, positions + 1])
+    alike = [order[a:b] for a, b in zip(first.tolist(), end.tolist(), strict=True)]
+    columns = np.repeat(np.arange(len(positions)), end - first)
+    q = np.split(nodes.at(columns, np.concatenate(alike)), np.cumsum(end - first)[:-1])
+    for start in range(len(alike[0])):
+        rows, before = [alike[0][start]], q[0][start]
+        for own, there in zip(alike[1:], q[1:], strict=True):
+            away = np.abs(there - before).sum(axis=1)
+            away[np.isnan(away)] = np.inf
+            if not (away < np.inf).any():
                 break
-            rows[column] = alike[np.nanargmin(away)]
+            nearest = int(np.argmin(away))
+            rows.append(own[nearest])
+            before = there[nearest]
         else:
-            if nodes.exists[0, start]:
-                yield rows
+            if nodes.exists[0, rows[0]]:
+                yield np.array(rows)
