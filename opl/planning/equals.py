@@ -27,6 +27,7 @@ from opl.planning.track_check import Free, check_path
 CLEAR_OF_LIMITS = np.deg2rad(5.0)  # of every joint; motions that keep it come before all others
 SAME_TIME = 1e-6  # [s] choices that differ by less are equally long
 MOST_CHECKS = 12  # of motions, the shortest choices first
+MOST_WORK = 2000.0  # units, after which no other is checked once one is free
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,7 @@ def quickest_of_equals(
         nameable: Which configurations the program names without doubt; None for all.
     """
     best, least = plan, (len(plan.path.q) + 1, True, np.inf)
+    begun = problem.scene.work
     choices = []
     for choice in _choices(problem, plan, keeps_ranges):
         path = _image(problem, plan.path, choice)
@@ -79,6 +81,8 @@ def quickest_of_equals(
     choices.sort(key=lambda item: item[:2])
     for unnamed, _, choice, path in choices[:MOST_CHECKS]:
         if (unnamed, choice.near_limit, choice.seconds + SAME_TIME) > least:
+            break
+        if best is not plan and problem.scene.work - begun > MOST_WORK:
             break
         found = check_path(problem, path)
         if not isinstance(found, Free):

@@ -233,7 +233,11 @@ class OptimalSearch:
         self._places.clear()
         self.proof.put_back()  # before what is proven is noted
         self._told = self.plan is not None
-        self._begin_again(self._guess, 0.0)
+        made, gap = self._walls, PROOF_SHARE * self._settings.widen
+        minding = BoxProof(made.images.of, made.finer, self._value, gap, self._forbidden)
+        for wall in self.proof.walls:
+            minding.add(wall)
+        self._begin_again(minding, self._guess, 0.0)
 
     @property
     def _guess(self) -> float:
@@ -245,18 +249,14 @@ class OptimalSearch:
         """Begin the proof again: no motion is as good as was hoped."""
         raised = RAISED if self._told else GUESSED
         hope = min(self._value, self.proof.threshold * raised)
-        self._begin_again(hope, hope)
+        self._begin_again(self.proof, hope, hope)
 
-    def _begin_again(self, threshold: float, least_hope: float) -> None:
-        """Begin the proof again: boxes up to a larger size are of interest."""
+    def _begin_again(self, proof: BoxProof, threshold: float, least_hope: float) -> None:
+        """Begin a proof again: boxes up to another size are of interest."""
         self._proven = self.lower_bound
         self._least_hope = least_hope
-        made, walls = self._walls, self.proof.walls
-        gap = PROOF_SHARE * self._settings.widen
-        self.proof = BoxProof(made.images.of, made.finer, threshold, gap, self._forbidden)
+        self.proof = proof.again(threshold)
         self._work.begin_again(self.proof)
-        for wall in walls:
-            self.proof.add(wall)
 
     def _add(self, places: list[float]) -> None:
         for wall in self._walls.columns(places):

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Sequence
+from copy import copy
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from opl.search.walls import Image, Piece, Wall
 SETTLED = 0.04  # of the gap wanted: what the bend of the spans may lose where none is split further
 MOST_TRIMS = 3  # of spans, before one is split
 NUMBERS_OF_A_CELL = 200  # worked on to cut off what no box can hold
+NUMBERS_OF_AN_ENTRY = 1000  # that entering a cell into the table is worth
 MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 SMALLEST = 1e-6  # along a wall: a cell that is not cut further
@@ -53,6 +55,9 @@ class BoxProof:
     ) -> None:
         self._cells = Cells(images, cut, forbidden)
         self._gap = gap
+        self._begin(threshold)
+
+    def _begin(self, threshold: float) -> None:
         self.threshold = threshold
         self.stuck = np.inf  # least bound of what could not be split
         self.subproblems = 0
@@ -62,6 +67,12 @@ class BoxProof:
         self._open: list[Subproblem] = []
         nothing = np.empty((0, 5), dtype=np.int64)
         self._push(0.0, nothing, 0, np.full(6, np.inf), np.full(6, -np.inf))
+
+    def again(self, threshold: float) -> BoxProof:
+        """Return the proof begun again for boxes below another size, with the walls of this one."""
+        other = copy(self)
+        other._begin(threshold)
+        return other
 
     @property
     def walls(self) -> list[Wall]:
@@ -174,6 +185,7 @@ class BoxProof:
     def _bound(self, node: Subproblem) -> bool:
         """Bound a subproblem; return whether it is still of interest."""
         cells, closing, n_walls = self._cells, self.closing, len(self.walls)
+        entered = cells.entered
         if len(node.spans) != 1 and node.n_walls <= 1:
             n_walls = 1  # one span of the first wall tells which images of the others matter
         mirrored = len(node.spans) > 0 and cells.mirrored(node.spans)
@@ -181,6 +193,7 @@ class BoxProof:
             cells.spans_of(wall, node.low, node.high, closing, mirrored)
             for wall in range(node.n_walls, n_walls)
         ]
+        self.work += NUMBERS_OF_AN_ENTRY * (cells.entered - entered)
         spans = np.concatenate([node.spans, *new])
         low, high, table = node.low.copy(), node.high.copy(), cells.table
         sizes, place, lost = (np.empty(n_walls) for _ in range(3))
