@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from opl.findings import Finding, Level
 from opl.geometry.coverage import AreaSamples, lying_on_others, uncovered
-from opl.geometry.frames import rotation_angle
+from opl.geometry.frames import Array, rotation_angle
 from opl.geometry.mesh_surface import MeshSurface
 from opl.geometry.passes import LaidPasses, MachinedSurface, Order, Passes, longest_side
 from opl.geometry.wheel import ContactWheel
@@ -20,6 +20,9 @@ LARGEST_TURN = np.deg2rad(20.0)
 
 # less than this part of the area may stay uncovered without a word
 UNCOVERED = 0.01
+
+# [m] that the proof leaves for triangles of the solid that lie off the surface
+OFF_SOLID = 1e-4
 
 # the area is looked at about this often across a pitch, and this often across the surface at most
 _LOOKS_PER_PITCH, _MOST_LOOKS = 6.0, 150.0
@@ -51,6 +54,7 @@ def inspect(
     laid: LaidPasses,
     wheel: ContactWheel,
     max_belt_penetration: float,
+    heights: Array,
 ) -> Inspection:
     """Look for what is doubtful about cutter points.
 
@@ -60,8 +64,10 @@ def inspect(
         laid: The cutter points.
         wheel: The wheel.
         max_belt_penetration: How deep the part may sink into the belt in [m].
+        heights: How far above cutter points the solid lies, see `heights_of_solid`.
     """
     pointed = [
+        *_off_solid(heights),
         *_hollows(laid, wheel, max_belt_penetration),
         *_segments(laid, passes),
         *_jumps(laid),
@@ -99,6 +105,27 @@ def inspect(
             )
         )
     return Inspection(tuple(findings), doubtful, missed, fraction)
+
+
+def _off_solid(heights: Array) -> Iterator[_Doubt]:
+    """Yield where the triangles of the solid lie off the surface.
+
+    Contact is planned on the surface and proven on the triangles.
+    """
+    for off, effect in (
+        (-heights, "below the surface, so that part and wheel may not touch"),
+        (heights, "above the surface, and as much deeper in the belt"),
+    ):
+        chosen = off > OFF_SOLID
+        if chosen.any():
+            most = int(np.argmax(off))
+            amount = f"up to {1e3 * off[most]:.2g} mm" if off[most] < np.inf else "far"
+            yield (
+                "solid",
+                chosen,
+                f"the triangles of the solid lie {amount} {effect}, farthest at cutter point "
+                f"{most} ({1e3 * OFF_SOLID:g} mm is left for it); export a finer mesh",
+            )
 
 
 def _hollows(laid: LaidPasses, wheel: ContactWheel, penetration: float) -> Iterator[_Doubt]:

@@ -17,6 +17,8 @@ _FACTOR = 50.0  # between surface and solid; units differ by 1000 or 25.4
 _LOOKS = 24
 _DEPTH = 1e-3
 
+_REACH = 2e-3  # [m] within which triangles of the solid are sought around a cutter point
+
 # the surface is sampled about this often across its longest side, to choose the places from
 _SAMPLES = 12
 
@@ -81,6 +83,48 @@ def facing_inward(surface: MachinedSurface, part: TriangleMesh) -> float:
     )
     decided = np.count_nonzero(ahead != behind)
     return np.count_nonzero(ahead & ~behind) / decided if decided else 0.0
+
+
+def heights_of_solid(Ts_workpiece_cutter: Array, part: TriangleMesh) -> Array:
+    """Return how far off cutter points the nearest triangles of the solid lie.
+
+    Args:
+        Ts_workpiece_cutter: The cutter frames, shape (n, 4, 4).
+        part: The solid.
+
+    Returns:
+        In [m], negative where they lie below the surface, -inf where there are none within 2 mm,
+        shape (n,).
+    """
+    triangles = part.triangles
+    low, high = triangles.min(axis=1) - _REACH, triangles.max(axis=1) + _REACH
+    heights = np.full(len(Ts_workpiece_cutter), -np.inf)
+    for k, T in enumerate(Ts_workpiece_cutter):
+        near = ((low <= T[:3, 3]) & (high >= T[:3, 3])).all(axis=1)
+        places = _nearest_to_origin(triangles[near] - T[:3, 3])
+        away = np.linalg.norm(places, axis=1)
+        if len(away) and away.min() < _REACH:
+            heights[k] = np.copysign(away.min(), places[away.argmin()] @ T[:3, 2])
+    return heights
+
+
+def _nearest_to_origin(triangles: Array) -> Array:
+    """Return points of triangles, shape (m, 3, 3), one of which is nearest to the origin, (k, 3).
+
+    That of each side, and where a triangle is right below or above the origin that of its inside.
+    """
+    sides = np.roll(triangles, -1, axis=1) - triangles
+    squares = np.maximum(np.square(sides).sum(axis=2), np.finfo(float).tiny)
+    share = np.clip(-(triangles * sides).sum(axis=2) / squares, 0.0, 1.0)
+    on_sides = triangles + share[..., None] * sides
+    normals = np.cross(sides[:, 0], sides[:, 1])
+    flat = np.square(normals).sum(axis=1) > 0.0
+    triangles, sides, normals = triangles[flat], sides[flat], normals[flat]
+    along = (triangles[:, 0] * normals).sum(axis=1) / np.square(normals).sum(axis=1)
+    feet = along[:, None] * normals
+    left_of = np.cross(sides, feet[:, None] - triangles) @ normals[..., None]
+    inside = (left_of[..., 0] >= 0.0).all(axis=1)
+    return np.concatenate([on_sides.reshape(-1, 3), feet[inside]])
 
 
 def _size(box: Array) -> float:

@@ -8,6 +8,7 @@ from opl.errors import InputError
 from opl.geometry.inspection import inspect
 from opl.geometry.nurbs import DegenerateNormalError
 from opl.geometry.passes import PassesError, lay_passes
+from opl.geometry.surface_on_solid import heights_of_solid
 from opl.job import keys
 from opl.job.load import Job
 from opl.motion.pass_order import quickest_order
@@ -38,7 +39,10 @@ def cut_surface(job: Job, watch: Watch | None = None) -> Surfaced:
             raise InputError(job.source.at(keys.PASSES), str(error)) from error
         _check_count(job, len(laid.points))
         cell = job.cell
-        found = inspect(job.surface, job.passes, laid, cell.wheel, cell.max_belt_penetration)
+        heights = heights_of_solid(laid.points.Ts_workpiece_cutter, cell.part)
+        found = inspect(
+            job.surface, job.passes, laid, cell.wheel, cell.max_belt_penetration, heights
+        )
         return Surfaced(job, laid, found)
 
 

@@ -17,12 +17,13 @@ def wheel(radius=0.15, roll=45.0):
     return ContactWheel(0.05, radius, np.deg2rad(roll), np.eye(4))
 
 
-def found(surface, plane_normal, penetration=0.5e-3, on=None, **changes):
+def found(surface, plane_normal, penetration=0.5e-3, on=None, above=0.0, **changes):
     plan = Passes(
         plane_normal, **{"pitch": 5e-3, "max_bow_height": 0.05e-3, "largest_step": 4e-3, **changes}
     )
     laid = lay_passes(surface, plan)
-    looked_at = inspect(surface, plan, laid, on or wheel(), penetration)
+    heights = np.full(len(laid.points), above)
+    looked_at = inspect(surface, plan, laid, on or wheel(), penetration, heights)
     return laid, {f.kind: f for f in looked_at.findings}
 
 
@@ -100,7 +101,7 @@ def test_the_points_that_warnings_name_are_known():
     plan = Passes(Z, 5e-3, 0.05e-3, 4e-3)
     surface = hollow(0.06)
     laid = lay_passes(surface, plan)
-    looked_at = inspect(surface, plan, laid, wheel(), 0.5e-3)
+    looked_at = inspect(surface, plan, laid, wheel(), 0.5e-3, np.zeros(len(laid.points)))
     assert looked_at.doubtful.all()
     assert looked_at.uncovered_fraction == pytest.approx(
         looked_at.uncovered.areas.sum() / surface.area_samples(1e-3).areas.sum(), rel=1e-2, abs=1e-3
@@ -119,3 +120,19 @@ def test_a_mesh_coarser_than_the_bow_height_is_told():
     assert "export a finer mesh" in findings["mesh"].message
     fine = MeshSurface(tessellated(cylinder().surface, 60, 20))
     assert "mesh" not in found(fine, Z, margin=2.5e-3)[1]
+
+
+@pytest.mark.parametrize(
+    ("above", "told"),
+    [
+        (0.09e-3, None),
+        (-0.09e-3, None),
+        (0.3e-3, "up to 0.3 mm above"),
+        (-0.3e-3, "up to 0.3 mm below"),
+        (-np.inf, "far below"),
+    ],
+)
+def test_a_solid_that_lies_off_the_surface_is_told(above, told):
+    _, findings = found(Patchwork((Face(cylinder_patch(0.05)),)), Z, margin=2.5e-3, above=above)
+    message = str(findings.get("solid"))
+    assert message == "None" if told is None else told in message

@@ -9,13 +9,40 @@ import trimesh
 from opl.geometry.mesh import TriangleMesh, winding_number
 from opl.geometry.mesh_surface import MeshSurface
 from opl.geometry.patchwork import Face, Patchwork
-from opl.geometry.surface_on_solid import facing_inward
+from opl.geometry.surface_on_solid import facing_inward, heights_of_solid
 from tests.support.jobs import opl, write_job
 from tests.support.solids import cylinder, sphere, tessellated
 
 
 def solid(mesh):
     return TriangleMesh(mesh.vertices, mesh.faces)
+
+
+def test_heights_are_those_of_the_nearest_faces_edges_and_corners():
+    box = solid(trimesh.creation.box([0.02, 0.02, 0.02]))
+    frames = np.tile(np.eye(4), (6, 1, 1))
+    frames[:, :3, 3] = 1e-3 * np.array(
+        [[3, 4, 10.5], [3, 4, 9.5], [10.3, 2, 10.4], [10.3, 10.4, 11.2], [3, 4, 10], [3, 4, 13]]
+    )
+    expected = [-0.5, 0.5, -0.5, -1.3, 0.0, -np.inf]
+    np.testing.assert_allclose(1e3 * heights_of_solid(frames, box), expected, atol=1e-9)
+    # the same points on a surface that faces down
+    frames[:, :3, :3] = np.diag([1.0, -1.0, -1.0])
+    expected = [0.5, -0.5, 0.5, 1.3, 0.0, -np.inf]
+    np.testing.assert_allclose(1e3 * heights_of_solid(frames, box), expected, atol=1e-9)
+
+
+def test_heights_of_a_mesh_are_how_far_its_chords_lie_below():
+    round_part = cylinder(radius=0.03)
+    frames = np.tile(np.eye(4), (200, 1, 1))
+    angle = np.linspace(0.4, 1.0, 200)
+    normals = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(200)])
+    frames[:, :3, 2], frames[:, :3, 3] = normals, 0.03 * normals
+    frames[:, 2, 3] = 0.0173
+    heights = heights_of_solid(frames, solid(tessellated(round_part.surface, 60, 40)))
+    sagitta = 0.03 * (1.0 - np.cos(np.pi / 120.0))
+    assert -2.0 * sagitta < heights.min() < -0.4 * sagitta
+    assert heights.max() < 1e-9
 
 
 def test_a_solid_winds_once_about_its_inside_only():
