@@ -201,8 +201,11 @@ class Beside:
         if self._process is None:
             return
         process, self._process = self._process, None
-        os.kill(process, signal.SIGKILL)  # its number is its own until it is waited for
-        os.waitpid(process, 0)
+        # where nobody wants to know of processes that ended, its number may be another's by now
+        with suppress(ChildProcessError, ProcessLookupError):
+            if os.waitpid(process, os.WNOHANG)[0] == 0:
+                os.kill(process, signal.SIGKILL)  # the number is its own until it is waited for
+                os.waitpid(process, 0)
         for one in (self._to, self._back, self._turns):
             one.close()
 

@@ -101,6 +101,19 @@ def test_what_a_process_does_not_answer_is_worked_out_here(how):
         assert after.value() == (HERE,)
 
 
+@pytest.mark.parametrize("how", ["answers", *ENDS])
+def test_a_copy_of_which_the_system_keeps_nothing_ends_like_any_other(how):
+    before = signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    try:
+        if how == "answers":
+            (pid,) = in_copy(Later(where))
+            assert pid != HERE and gone(pid)
+        else:
+            assert in_copy(Later(ends, how)) == HERE
+    finally:
+        signal.signal(signal.SIGCHLD, before)
+
+
 def test_what_cannot_be_passed_on_is_worked_out_here():
     assert in_copy(Later(lambda: 7)) == 7  # the question
     assert in_copy(Later(make_function))() == 7  # the answer
