@@ -60,6 +60,9 @@ def read_triangles(path: Path) -> tuple[Array, NDArray[np.int64]]:
         raise InputError(str(path), f"is not a mesh: {error}") from error
     if not len(triangles):
         raise InputError(str(path), "holds no triangles")
+    if len(triangles) > MOST_TRIANGLES:
+        count = f"{len(triangles)} triangles, at most {MOST_TRIANGLES} are taken"
+        raise InputError(str(path), f"has {count}; export a coarser mesh")
     used, triangles = np.unique(triangles, return_inverse=True)
     corners, triangles = corners[used], triangles.reshape(-1, 3)
     if not np.isfinite(corners).all():
@@ -95,8 +98,6 @@ def _require_triangles(corners: Array, triangles: NDArray[np.int64]) -> None:
     Raises:
         ValueError: If it is none.
     """
-    if len(triangles) > MOST_TRIANGLES:
-        raise ValueError(f"has {len(triangles)} triangles, at most {MOST_TRIANGLES} are taken")
     if triangles.shape[1:] != (3,) or corners.shape[1:] != (3,):
         raise ValueError("its triangles are none")
     if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(corners):

@@ -76,6 +76,13 @@ def test_what_is_not_a_mesh_is_refused(tmp_path, suffix, content):
         load_mesh(path, "mm")
 
 
+@pytest.mark.parametrize("suffix", [".stl", ".ply"])
+def test_a_mesh_of_too_many_triangles_is_refused_as_that(tmp_path, monkeypatch, suffix):
+    monkeypatch.setattr("opl.geometry.mesh_file.MOST_TRIANGLES", 3)
+    with pytest.raises(InputError, match=r"has 4 triangles, at most 3 are taken; export a coarser"):
+        read_triangles(write(tmp_path / f"part{suffix}"))
+
+
 def test_a_missing_file_and_an_unknown_format_are_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         load_mesh(tmp_path / "none.stl", "mm")
