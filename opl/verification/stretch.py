@@ -202,7 +202,7 @@ class Replaying:
             self._too_near(move, f"{PART} and {WHEEL}", gap, needed)
             return True
         if farthest < gap:
-            gap = min(self._world.gap(FARTHEST_GAP), FARTHEST_GAP)
+            gap = self._world.gap(FARTHEST_GAP)
             self._contact_lost(move, gap, "part and wheel do not touch")
         return False
 
@@ -229,10 +229,9 @@ class Replaying:
             self._contact_lost(move, error, "ground point")
 
     def _contact_lost(self, move: int, error: float, subject: str) -> None:
-        message = (
-            f"{1e3 * error:.3f} mm from the wheel's surface, "
-            f"{1e3 * self._allowed_error:g} mm allowed"
-        )
+        known = error < np.inf
+        away = f"{1e3 * error:.3f} mm" if known else f"more than {1e3 * FARTHEST_GAP:g} mm"
+        message = f"{away} from the wheel's surface, {1e3 * self._allowed_error:g} mm allowed"
         self._note("contact", move, subject, error, message)
 
     def _too_near(self, move: int, subject: str, distance: float, needed: float) -> None:

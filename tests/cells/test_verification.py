@@ -298,6 +298,8 @@ def test_a_configuration_that_leaves_the_wheel_is_caught():
     assert refuses(verification, "contact", "part and wheel", "do not touch")
     assert verification.collisions == 0
     assert verification.max_contact_error == pytest.approx(0.001, abs=2e-4)
+    farther = replay_tiny(moved_into_wheel(index, -0.008))
+    assert refuses(farther, "contact", "part and wheel", "more than 5 mm from the wheel")
 
 
 @pytest.mark.parametrize("kind", [MoveKind.HOME, MoveKind.LINK])
