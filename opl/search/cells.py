@@ -18,9 +18,9 @@ from opl.search.walls import Image, Piece, Wall
 COLUMNS = 26  # start 0:6, end 6:12, pad_low 12:18, pad_high 18:24, places 24 and 25
 WALL, KEY, SOURCE, FIRST, END = range(5)  # columns of a span
 # columns of a source: its piece, number of its image, whether the whole motion has the wrist
-# flipped, its cells, the first -1 where they are not in the table yet, number of its key, and which
-# flip of its piece the robot makes
-PIECE, IMAGE, MIRRORED, FIRST_CELL, N_CELLS, KEY_OF, FLIP = range(7)
+# flipped, its cells, the first -1 where they are not in the table yet, its kind (family, side and
+# image), and which flip of its piece the robot makes
+PIECE, IMAGE, MIRRORED, FIRST_CELL, N_CELLS, KIND, FLIP = range(7)
 Key = tuple[int, tuple[int, ...], int]  # a family, the key of its image, and the side
 FORBIDDEN = 1e3  # [rad] presses on every face of any box by more than is of interest
 
@@ -87,8 +87,10 @@ class Cells:
         self._n_sources = 0
         # of each family sign, shift and flip of its images
         self._moves: dict[int, tuple[Array, Array, np.ndarray]] = {}
-        # sources and boxes around them
-        self._of_wall: list[tuple[np.ndarray, Array, Array]] = []
+        self._first_kind: dict[tuple[int, int], int] = {}  # of a family and side
+        self._key_of_kind = np.empty(0, dtype=np.int64)  # number of its key, -1 where none has it
+        # sources, their kinds, and boxes around them
+        self._of_wall: list[tuple[np.ndarray, np.ndarray, Array, Array]] = []
         self._finer: dict[tuple[int, int], np.ndarray] = {}
         self._looks: dict[tuple[int, int], np.ndarray] = {}  # at the cells of a flip of a piece
         self.entered = self.changes = 0
@@ -111,7 +113,8 @@ class Cells:
             numbers = np.arange(len(sign))
             self._new_sources(piece, np.repeat(numbers, len(both)), np.tile(both, len(sign)))
         sources = np.arange(first, self._n_sources)
-        self._of_wall.append((sources, np.concatenate(low), np.concatenate(high)))
+        kinds = self._sources[sources, KIND]
+        self._of_wall.append((sources, kinds, np.concatenate(low), np.concatenate(high)))
         self.walls.append(wall)
         self.pass_index = np.append(self.pass_index, wall.pass_index)
 
@@ -129,18 +132,34 @@ class Cells:
         return bool(self._sources[spans[0, SOURCE], MIRRORED])
 
     def spans_of(
-        self, wall: int, low: Array, high: Array, closing: float, mirrored: bool
+        self,
+        wall: int,
+        low: Array,
+        high: Array,
+        closing: float,
+        mirrored: bool,
+        keys: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Return the spans of a wall that boxes below a size can hold, the core given."""
-        sources, least, most = self._of_wall[wall]
-        edges = np.maximum(least, high) - np.minimum(most, low)
-        kept = np.maximum(edges, 0.0).sum(axis=1) < closing
+        """Return the spans of a wall that boxes below a size can hold, the core given.
+
+        Of some keys, by their numbers; None for all.
+        """
+        sources, kinds, least, most = self._of_wall[wall]
+        if keys is not None:
+            some = np.flatnonzero(np.isin(self._key_of_kind, keys)[kinds])
+            sources, least, most = sources[some], least[some], most[some]
         if wall == 0:
             # the whole motion has images: of these the first is looked at, and its flip
-            kept &= self._sources[sources, IMAGE] == 0
+            kept = self._sources[sources, IMAGE] == 0
         else:
-            kept &= self._sources[sources, MIRRORED] == mirrored
+            kept = self._sources[sources, MIRRORED] == mirrored
+        edges = np.maximum(least, high) - np.minimum(most, low)
+        kept &= np.maximum(edges, 0.0).sum(axis=1) < closing
         return self._spans(wall, sources[kept])
+
+    def n_sources(self, wall: int) -> int:
+        """Return in how many images its pieces may cross a wall."""
+        return len(self._of_wall[wall][0])
 
     def finer(self, span: np.ndarray) -> np.ndarray:
         """Return the spans of a single cell cut into smaller ones."""
@@ -189,6 +208,14 @@ class Cells:
             self._moves[family] = sign, np.array(shift), np.array([one.flip for one in images])
         return self._moves[family]
 
+    def _kinds_of(self, family: int, side: int) -> int:
+        """Return the kind of the first image of a family on a side; those of others follow."""
+        if (family, side) not in self._first_kind:
+            self._first_kind[family, side] = len(self._key_of_kind)
+            more = np.full(len(self._images(family)), -1, dtype=np.int64)
+            self._key_of_kind = np.concatenate([self._key_of_kind, more])
+        return self._first_kind[family, side]
+
     def _new_sources(self, piece: Piece, numbers: np.ndarray, mirrored: np.ndarray) -> None:
         """Note a piece in some of its images."""
         first, end = self._n_sources, self._n_sources + len(numbers)
@@ -196,6 +223,7 @@ class Cells:
         new = self._sources[first:end]
         new[:, PIECE], new[:, IMAGE], new[:, MIRRORED] = len(self._pieces), numbers, mirrored
         new[:, FIRST_CELL], new[:, N_CELLS] = -1, len(piece.pad_low)
+        new[:, KIND] = self._kinds_of(piece.family, piece.side) + numbers
         # the one that the robot makes
         new[:, FLIP] = self._moves_of(piece.family)[2][numbers] ^ mirrored
         self._pieces.append(piece)
@@ -210,12 +238,7 @@ class Cells:
             self._sources[new, FIRST_CELL] = self._used + np.cumsum(n_cells) - n_cells
             self._used += int(n_cells.sum())
             self.table = _with_room(self.table, self._used)
-            for source, (number, image) in zip(
-                new.tolist(), self._sources[new, : IMAGE + 1].tolist(), strict=True
-            ):
-                piece = self._pieces[number]
-                key = piece.family, self._images(piece.family)[image].key, piece.side
-                self._sources[source, KEY_OF] = self._keys.setdefault(key, len(self._keys))
+            self._name(new)
             for number in np.unique(self._sources[new, PIECE]).tolist():
                 own = new[self._sources[new, PIECE] == number]
                 for flip in np.unique(self._sources[own, FLIP]).tolist():
@@ -223,7 +246,17 @@ class Cells:
         of = self._sources[sources]
         ends = of[:, FIRST_CELL] + of[:, N_CELLS]
         walls = np.full(len(sources), wall)
-        return np.stack([walls, of[:, KEY_OF], sources, of[:, FIRST_CELL], ends], axis=1)
+        return np.stack(
+            [walls, self._key_of_kind[of[:, KIND]], sources, of[:, FIRST_CELL], ends], axis=1
+        )
+
+    def _name(self, sources: np.ndarray) -> None:
+        """Give the keys of sources their numbers."""
+        nameless = sources[self._key_of_kind[self._sources[sources, KIND]] < 0]
+        for number, image, kind in self._sources[nameless][:, [PIECE, IMAGE, KIND]].tolist():
+            piece = self._pieces[number]
+            key = piece.family, self._images(piece.family)[image].key, piece.side
+            self._key_of_kind[kind] = self._keys.setdefault(key, len(self._keys))
 
     def _enter(self, sources: np.ndarray) -> None:
         """Enter the cells of sources into the table, as far as they are not forbidden.

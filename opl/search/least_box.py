@@ -16,7 +16,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.bounding import distances, tighten, trim
-from opl.search.cells import END, FIRST, WALL, Cells, Forbidden
+from opl.search.cells import END, FIRST, KEY, WALL, Cells, Forbidden
 from opl.search.relaxation import least_box
 from opl.search.subproblems import Candidate, Relaxation, Subproblem
 from opl.search.walls import Image, Piece, Wall
@@ -24,7 +24,8 @@ from opl.search.walls import Image, Piece, Wall
 SETTLED = 0.04  # of the gap wanted: what the bend of the spans may lose where none is split further
 MOST_TRIMS = 3  # of spans, before one is split
 NUMBERS_OF_A_CELL = 200  # worked on to cut off what no box can hold
-NUMBERS_OF_AN_ENTRY = 1000  # that entering a cell into the table is worth
+NUMBERS_OF_A_SOURCE = 6  # that it is worth to tell whether a box can hold a piece in one image
+NUMBERS_OF_AN_ENTRY = 2500  # that entering a cell into the table is worth
 MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 SMALLEST = 1e-6  # along a wall: a cell that is not cut further
@@ -189,10 +190,19 @@ class BoxProof:
         if len(node.spans) != 1 and node.n_walls <= 1:
             n_walls = 1  # one span of the first wall tells which images of the others matter
         mirrored = len(node.spans) > 0 and cells.mirrored(node.spans)
-        new = [
-            cells.spans_of(wall, node.low, node.high, closing, mirrored)
-            for wall in range(node.n_walls, n_walls)
-        ]
+        # a pass is left the keys that all of its walls have
+        keys: dict[int, np.ndarray] = {}
+        of_pass = cells.pass_index[node.spans[:, WALL]]
+        for index in np.unique(of_pass).tolist():
+            keys[index] = np.unique(node.spans[of_pass == index, KEY])
+        new = []
+        for wall in range(node.n_walls, n_walls):
+            index = int(cells.pass_index[wall])
+            self.work += NUMBERS_OF_A_SOURCE * cells.n_sources(wall)
+            new.append(
+                cells.spans_of(wall, node.low, node.high, closing, mirrored, keys.get(index))
+            )
+            keys[index] = np.unique(new[-1][:, KEY])
         self.work += NUMBERS_OF_AN_ENTRY * (cells.entered - entered)
         spans = np.concatenate([node.spans, *new])
         low, high, table = node.low.copy(), node.high.copy(), cells.table
