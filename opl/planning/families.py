@@ -25,7 +25,7 @@ FEW_COLUMNS = 40  # over which a box is grown at first
 STARTS = 8  # nodes from which one is grown
 MOST_PASSES = 8  # in which families are ruled out before the proof begins
 MOST_GROWN = 200  # times that a box is grown for a column
-NODES_OF_WORK = 6000  # that cost a unit of work to hold against a box
+NODES_OF_WORK = 15000  # that cost a unit of work to hold against a box
 MOST_KNOWN = 64  # passes in one image each that are kept at hand
 GROWN = 1e-7  # [rad] less need not be grown for
 

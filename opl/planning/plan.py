@@ -21,7 +21,7 @@ from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import no_path
 from opl.planning.track_check import Collides, Free, check_track
 
-WORK_OF_A_CHECK = 0.4  # units, for each of the places of a motion, beside what the scene is asked
+WORK_OF_A_CHECK = 0.1  # units, for each of the places of a motion, beside what the scene is asked
 
 
 @dataclass(frozen=True)

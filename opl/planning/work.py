@@ -13,9 +13,9 @@ from opl.planning.scene import QUERIES, PlanningScene
 from opl.search.least_box import BoxProof
 
 # what makes a unit, or how many units one makes
-NUMBERS = 1e6  # worked on in linear programs
-SUBPROBLEMS = 4
-WORK_OF_A_WALL = 50.0
+NUMBERS = 2.5e6  # worked on in linear programs
+SUBPROBLEMS = 8
+WORK_OF_A_WALL = 25.0
 
 
 def work_of_proof(proof: BoxProof) -> float:
