@@ -8,8 +8,10 @@ is what the written positions make of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 
 from opl.cell.workcell import WorkCell
 from opl.errors import UnsafeError
+from opl.files.beside import Beside
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import MM_PER_M, ContactWheel
@@ -43,6 +46,8 @@ HALVINGS = 3
 # Speeds of neighbouring lines may differ by three steps of `opl.motion.gradual`, and the faster one
 # is slowed then: a position for every step would cost more than the time it saves.
 STEPS_AT_ONCE = PLANNED_RATIO**3
+
+Rows = tuple[int, ...]  # indices of configurations: two of a line, three of a corner
 
 
 @dataclass(frozen=True)
@@ -88,8 +93,11 @@ def with_fewest_positions(
     motion: Motion,
     process: ProcessSettings,
     rule: PositionRule,
-) -> Motion:
+    beside: Beside | None = None,
+) -> tuple[Motion, list[Rows]]:
     """Return a motion with the fewest written positions on the wheel, the others on their lines.
+
+    And the corners that are too wide all the same, as no positions are left to put in.
 
     Args:
         scene: The cell.
@@ -97,43 +105,60 @@ def with_fewest_positions(
         motion: The motion, its configurations in the digits of the program.
         process: How fast it is ground.
         rule: What the positions have to keep.
+        beside: What may work beside this process, if anything.
 
     Raises:
         UnsafeError: If there are none on some pass: only where the motion itself breaks the rule.
     """
+    runs = list(on_wheel_runs(scene.cell, points, motion, process, rule))
+    chosen = (beside or Beside()).share(_choosing, (scene, motion, rule), runs)
+    thinned, screws = motion, screws_of(scene.cell.robot)
+    for (first, run), (kept, _) in zip(runs, chosen, strict=True):
+        thinned = _thinned(screws, thinned, first, run, kept)
+    return thinned, [corner for _, corners in chosen for corner in corners]
+
+
+@contextmanager
+def _choosing(
+    scene: PlanningScene, motion: Motion, rule: PositionRule
+) -> Iterator[Callable[[tuple[int, Run]], tuple[NDArray[np.intp], list[Rows]]]]:
+    """Open what chooses the positions of a pass, given as `on_wheel_runs` does."""
+    yield lambda of_pass: _chosen(scene, motion, rule, *of_pass)
+
+
+def _chosen(
+    scene: PlanningScene, motion: Motion, rule: PositionRule, first: int, run: Run
+) -> tuple[NDArray[np.intp], list[Rows]]:
+    """Return which configurations of a run are written, and the corners that are still too wide."""
     screws = screws_of(scene.cell.robot)
-    blocked: dict[int, frozenset[tuple[int, ...]]] = {}
-    chosen: dict[int, NDArray[np.intp]] = {}
-    runs = dict(on_wheel_runs(scene.cell, points, motion, process, rule))
-    lines = {first: Lines(screws, run) for first, run in runs.items()}
-    stale = list(runs)
-    while stale:
-        for first in dict.fromkeys(stale):
-            refused = blocked.get(first, frozenset())
-            found = fewest_of_long(screws, runs[first], rule.chain, refused, lines[first])
-            if found is None:
-                index = motion.pass_index[first] + 1
-                raise UnsafeError(f"pass {index}: no positions keep the contact error")
-            chosen[first] = first + found
-        written = np.array(motion.written)
-        for first, run in runs.items():
-            written[first : first + len(run.q)] = False
-            written[chosen[first]] = True
-        thinned = _on_lines(screws, runs, chosen, replace(motion, written=written))
-        stale = []
-        hitting = [line for line in _colliding_lines(scene, thinned) if line[1] - line[0] > 1]
+    # what the positions hit or cut off depends on no more than the configurations next to the run
+    start = max(first - 1, 0)
+    alone = motion.take(np.arange(start, min(first + len(run.q) + 1, len(motion))))
+    lines, blocked = Lines(screws, run), frozenset[Rows]()
+    while True:
+        kept = fewest_of_long(screws, run, rule.chain, blocked, lines)
+        if kept is None:
+            index = motion.pass_index[first] + 1
+            raise UnsafeError(f"pass {index}: no positions keep the contact error")
+        thinned = _thinned(screws, alone, first - start, run, kept)
+        corners = [_moved(turn, start) for turn in rule.too_wide(thinned)]
+        lines_hit = [_moved(line, start) for line in _colliding_lines(scene, thinned)]
         # of neighbouring configurations there are none to put in between
-        wide = [turn for turn in rule.too_wide(thinned) if turn[2] - turn[0] > 2]
-        for taken in (*hitting, *wide):
-            of = max(start for start in runs if start <= taken[0])
-            barred = tuple(row - of for row in taken)
-            if barred not in blocked.get(of, frozenset()):
-                blocked[of] = blocked.get(of, frozenset()) | {barred}
-                stale.append(of)
-    return thinned
+        barred = {
+            _moved(rows, -first)
+            for rows in (*lines_hit, *corners)
+            if rows[-1] - rows[0] > len(rows) - 1
+        }
+        if barred <= blocked:
+            return kept, corners
+        blocked |= barred
 
 
-def with_shorter_moves(motion: Motion, corners: Iterable[tuple[int, int, int]]) -> Motion:
+def _moved(rows: Rows, by: int) -> Rows:
+    return tuple(row + by for row in rows)
+
+
+def with_shorter_moves(motion: Motion, corners: Iterable[Rows]) -> Motion:
     """Return a motion with configurations in the middle of its moves on the wheel next to corners.
 
     They lie on the lines, so they move nothing; but no corner is cut off beyond half of a move.
@@ -143,19 +168,21 @@ def with_shorter_moves(motion: Motion, corners: Iterable[tuple[int, int, int]]) 
     return with_moves_cut(motion, {move: np.array([0.5]) for move in sorted(moves)})
 
 
-def _on_lines(
-    screws: Screws,
-    runs: Mapping[int, Run],
-    chosen: Mapping[int, NDArray[np.intp]],
-    motion: Motion,
+def _thinned(
+    screws: Screws, motion: Motion, first: int, run: Run, kept: NDArray[np.intp]
 ) -> Motion:
-    """Return a motion whose configurations between those chosen lie on the lines between them."""
-    q = motion.q.copy()
-    for first, run in runs.items():
-        for start, end in zip(chosen[first][:-1], chosen[first][1:], strict=True):
-            shares, _ = line_errors(screws, run, start - first, end - first)
-            q[start + 1 : end] = q[start] + shares[:, None] * (q[end] - q[start])
-    return replace(motion, q=q)
+    """Return a motion with some configurations of a run written, the others on their lines.
+
+    `first` is the index of the run in the motion, `kept` are those in the run.
+    """
+    q, written = motion.q.copy(), np.array(motion.written)
+    written[first : first + len(run.q)] = False
+    written[first + kept] = True
+    for start, end in pairwise(kept.tolist()):
+        shares, _ = line_errors(screws, run, start, end)
+        here, there = motion.q[first + start], motion.q[first + end]
+        q[first + start + 1 : first + end] = here + shares[:, None] * (there - here)
+    return replace(motion, q=q, written=written)
 
 
 def on_wheel_runs(

@@ -16,7 +16,7 @@ from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion
 from opl.program.played import Playback
-from opl.proof.roundings import DEPTHS, Rounding, roundings, zones_of
+from opl.proof.roundings import DEPTHS, Rounding, roundings, tool_points_of, zones_of
 from opl.verification.contact import contact_positions
 from opl.verification.triangles import Triangles
 from opl.verification.world import World
@@ -159,12 +159,6 @@ def _looking(
             )
 
         yield look
-
-
-def tool_points_of(job: Job) -> Callable[[Array], Array]:
-    """Return what gives the tool point, of which zones count, see `roundings`."""
-    robot, led = job.cell.robot, job.program.led
-    return lambda q: np.asarray(led.frames(forward_kinematics(robot, q))[..., :3, 3])
 
 
 def _place(motion: Motion, corner: Rounding) -> str:

@@ -26,9 +26,10 @@ from opl.planning.positions import PositionRule
 from opl.program.moves import Program
 from opl.program.played import Playback
 from opl.program.posts import find_post
-from opl.proof.corners import CornerProof, corner_proof, tool_points_of
+from opl.proof.corners import CornerProof, corner_proof
 from opl.proof.events import name_findings
 from opl.proof.prove import prove, rule_of
+from opl.proof.roundings import tool_points_of
 from opl.proof.too_wide import TooWide
 from opl.proof.written import written_findings
 from opl.verification.kinematic_checks import limit_findings, missing_points

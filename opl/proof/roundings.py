@@ -16,11 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import Array
+from opl.job.load import Job
 from opl.motion.motion import Motion, Phase
 from opl.program.played import ReadMove
 
@@ -179,6 +182,16 @@ def zones_of(moves: Sequence[ReadMove], q: Array, tool_points: Callable[[Array],
         )
         zones[k] *= max(1.0, float(np.tan(turn / 2.0)))
     return zones
+
+
+def tool_points_of(job: Job) -> Callable[[Array], Array]:
+    """Return what gives the tool point, of which zones count, see `roundings`."""
+    return partial(_tool_points, job)
+
+
+def _tool_points(job: Job, q: Array) -> Array:
+    Ts_base_flange = forward_kinematics(job.cell.robot, q)
+    return np.asarray(job.program.led.frames(Ts_base_flange)[..., :3, 3])
 
 
 def roundings(

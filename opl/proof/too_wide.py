@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,8 @@ from opl.geometry.frames import inverse
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job
 from opl.motion.motion import Motion
-from opl.proof.corners import contact_errors, looked_at, tool_points_of
-from opl.proof.roundings import Rounding, roundings
+from opl.proof.corners import contact_errors, looked_at
+from opl.proof.roundings import Rounding, roundings, tool_points_of
 
 
 class TooWide:
@@ -28,6 +29,9 @@ class TooWide:
         """Begin with nothing known; `zone` in [m], see `opl.planning.positions.PositionRule`."""
         self._job, self._points, self._part, self._zone = job, points, part, zone
         self._known: dict[bytes, bool] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return TooWide, (self._job, self._points, self._part, self._zone)
 
     def __call__(self, motion: Motion) -> Iterator[tuple[int, int, int]]:
         """Yield the corners, by the indices of three written configurations each."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from opl.errors import NoFreeMoveError, NoPathError
 from opl.files.beside import Beside, Later
 from opl.job.load import Job
@@ -100,9 +102,9 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
     prepared, job = prepare(surfaced, watch), surfaced.job
     problem, comparison = prepared.problem, (prepared.kept, prepared.paper_start)
     cell, points = job.cell, surfaced.points
-    beside.start(job, cell, surfaced, points, problem, problem.scene, prepared, *comparison)
-    for later in (*comparison, Later(load_pictures)):
-        beside.begin(later)
+    scene = problem.scene
+    beside.start(job, cell, surfaced, points, problem, scene, scene.part, prepared, *comparison)
+    _begin(beside, *comparison, Later(load_pictures))
     try:
         with watch.stage(Stage.SEARCH) as report:
             found = search_path(job.search, problem, _nameable(job), report)
@@ -110,12 +112,15 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
         return _without_path(prepared, error, watch)
     charted = Later(_charted, prepared, found.plan)
     compared = Later(compare, prepared, found)
-    beside.begin(charted)
-    beside.begin(compared)
+    one_pass = points.n_passes == 1
+    if one_pass:  # its positions are chosen here, those of several passes in turns with the copy
+        _begin(beside, charted, compared)
     with watch.stage(Stage.MOTION):
-        exact = with_speed_steps(found.plan.motion, surfaced.points, job.process, job.cell.robot)
-        exact, motion = _positions(prepared, exact)
-        timing, seen = recognised_times(job, surfaced.points, motion)
+        exact = with_speed_steps(found.plan.motion, points, job.process, job.cell.robot)
+        exact, motion = _positions(prepared, exact, beside)
+        if not one_pass:
+            _begin(beside, charted, compared)
+        timing, seen = recognised_times(job, points, motion)
         slow = slow_stretches(timing, job.process)
     timed = TimedMotion.passing(motion, timing.timed.duration)
     drawn = Later(_drawn, prepared, charted, timed, timing)
@@ -126,7 +131,12 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
     return planned if refusal is None else Refused(planned, refusal, (), watch.seconds)
 
 
-def _positions(prepared: Prepared, exact: Motion) -> tuple[Motion, Motion]:
+def _begin(beside: Beside, *all_of_them: Later[Any]) -> None:
+    for later in all_of_them:
+        beside.begin(later)
+
+
+def _positions(prepared: Prepared, exact: Motion, beside: Beside) -> tuple[Motion, Motion]:
     """Return a motion whose moves allow its corners, and what is written and passed of it."""
     surfaced = prepared.surfaced
     job, points = surfaced.job, surfaced.points
@@ -134,10 +144,10 @@ def _positions(prepared: Prepared, exact: Motion) -> tuple[Motion, Motion]:
     motion = in_file_digits(exact, job)
     if job.program.motion is not MotionForm.JOINT:
         return exact, motion
-    rule = position_rule(job, points, prepared.problem.scene.part)
+    scene = prepared.problem.scene
+    rule = position_rule(job, points, scene.part)
     for rounds_left in reversed(range(HALVINGS + 1)):
-        motion = with_fewest_positions(prepared.problem.scene, points, motion, job.process, rule)
-        corners = tuple(rule.too_wide(motion))
+        motion, corners = with_fewest_positions(scene, points, motion, job.process, rule, beside)
         if not corners or not rounds_left:
             break
         exact = with_shorter_moves(exact, corners)

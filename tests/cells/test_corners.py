@@ -12,14 +12,16 @@ from hypothesis import strategies as st
 
 import opl.proof.too_wide
 from opl.cell.robot import forward_kinematics, load_robot
+from opl.files.beside import Beside
 from opl.geometry.frames import inverse
 from opl.motion.fewest import ChainRule, fewest
 from opl.motion.line_error import line_errors, screws_of
 from opl.motion.motion import Motion, MoveKind
-from opl.planning.positions import PositionRule, on_wheel_runs
+from opl.planning.positions import PositionRule, on_wheel_runs, with_fewest_positions
 from opl.program.played import Corner, Playback, ReadMove, SpeedUnit, WrittenSpeed
-from opl.proof.corners import contact_errors, corner_proof, tool_points_of
-from opl.proof.roundings import MOST_CUT, roundings, zones_of
+from opl.proof.corners import contact_errors, corner_proof
+from opl.proof.read_back import position_rule
+from opl.proof.roundings import MOST_CUT, roundings, tool_points_of, zones_of
 from opl.verification.contact import contact_positions
 from opl.verification.triangles import FINEST, Triangles
 from opl.verification.world import World
@@ -193,6 +195,21 @@ def test_an_arc_touches_its_lines_no_farther_from_the_corner_than_is_taken(turn,
     np.testing.assert_allclose(found[1], 0.3 * factor)
     moves[2] = replace(moves[2], straight=False)  # next to a joint move nobody knows
     assert np.isinf(zones_of(moves, q, lambda configurations: configurations[..., :3])[1])
+
+
+def test_positions_are_the_same_whoever_chooses_them():
+    job, points, scene = small_job(), small_problem().points, small_problem().scene
+    rule = position_rule(job, points, scene.part)
+    given = scene, points, small_motion(), job.process, rule
+    alone, corners = with_fewest_positions(*given)
+    assert corners == list(rule.too_wide(alone))
+    assert 0 < alone.written.sum() < len(alone)
+    with Beside(True) as beside:
+        beside.start(job, points, scene, scene.part)
+        shared, same_corners = with_fewest_positions(*given, beside)
+    assert corners == same_corners
+    np.testing.assert_array_equal(alone.q, shared.q)
+    np.testing.assert_array_equal(alone.written, shared.written)
 
 
 def test_a_radius_too_wide_is_refused_with_the_error_and_the_radius_that_would_do():
