@@ -16,9 +16,10 @@ from opl.geometry.wheel import ContactWheel
 WHEEL = "wheel"
 PART = "part"
 # [m] how much nearer the second opinion may see two bodies than they are: PyBullet was seen to
-# differ by 0.05 mm, and it is held to rounding the edges of a link by a millimetre
+# differ by 0.05 mm; it blows links of meshes up by 0.1 mm, and is held to rounding the edges of any
+# link by as much
 SECOND_OPINION = 1e-4
-SECOND_OPINION_OF_A_LINK = 1e-3
+SECOND_OPINION_OF_A_LINK = 2e-4
 # [rad] configurations are rounded to what a program can express before they are proven; pulses and
 # digits are finer than this, for each joint in the sum
 ROUNDING = np.deg2rad(0.01)

@@ -22,9 +22,10 @@ from opl.verification.engine import SCALE, pybullet
 from opl.verification.meshes import concave_shape, is_inside, triangle_body
 from opl.verification.patches import Drum, Patches
 
-# Bullet rounds the edges of a link's boxes, so that they seem farther away than they are: by less
-# than a tenth of this, 0.085 mm was seen. It is added to what is needed
-LINK_ROUNDING = 1e-3  # [m]
+# Bullet rounds the edges of a link's boxes and cylinders by its own margin, a thousandth of its
+# lengths, so that they seem farther away than they are: 0.085 mm was seen. It is added to what is
+# needed. Links of meshes are blown up by that margin: they seem nearer
+LINK_ROUNDING = 1e-4  # [m]
 # Bullet rounds the edges of cylinders by their margin and blows up meshes by it: the default of
 # 1 mm is as much as the contact itself
 MARGIN = 1e-5  # [m]

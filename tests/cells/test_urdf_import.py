@@ -177,6 +177,7 @@ def test_planner_and_replay_take_a_mesh_of_a_link_alike(tmp_path):
     assert np.ptp(drawn[:, 1]) == pytest.approx(0.181)
     cell = replace(load_job(V_JOB).cell, robot=made.robot)
     scene = CollisionScene(cell)
+    planner = scene.for_second_opinion()
     q = np.random.default_rng(0).uniform(MH24.lower, MH24.upper, (150, 6))
     seen = set()
     with World(cell) as world:
@@ -184,11 +185,14 @@ def test_planner_and_replay_take_a_mesh_of_a_link_alike(tmp_path):
         for row in q:
             world.move_to(row)
             hits = {hit for hit in scene.colliding_pairs(row) if "R_link" in hit}
+            kept = planner.colliding_pairs(row)
             for pair in pairs:
                 name = (pair.first.name, pair.second.name)
                 apart = world.distance(pair.first, pair.second, 0.1) - pair.clearance
                 hit = name in hits or name[::-1] in hits
-                assert hit == (apart < 0.0) or abs(apart) < 2e-3, (name, apart)
+                assert hit == (apart < 0.0) or abs(apart) < 3e-4, (name, apart)
+                # what the planner calls free the replay calls free
+                assert apart > pair.rounding or name in kept or name[::-1] in kept
                 seen.add((name, hit))
     assert (("R_link", "T_link"), True) in seen and len({name for name, hit in seen if hit}) > 3
 
