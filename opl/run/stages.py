@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from opl.errors import NoFreeMoveError, NoPathError
 from opl.files.beside import Beside, Later
 from opl.job.load import Job
@@ -104,7 +102,8 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
     cell, points = job.cell, surfaced.points
     scene = problem.scene
     beside.start(job, cell, surfaced, points, problem, scene, scene.part, prepared, *comparison)
-    _begin(beside, *comparison, Later(load_pictures))
+    for later in (*comparison, Later(load_pictures)):
+        beside.begin(later)
     try:
         with watch.stage(Stage.SEARCH) as report:
             found = search_path(job.search, problem, _nameable(job), report)
@@ -114,12 +113,12 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
     compared = Later(compare, prepared, found)
     one_pass = points.n_passes == 1
     if one_pass:  # its positions are chosen here, those of several passes in turns with the copy
-        _begin(beside, charted, compared)
+        beside.begin(charted)
     with watch.stage(Stage.MOTION):
         exact = with_speed_steps(found.plan.motion, points, job.process, job.cell.robot)
         exact, motion = _positions(prepared, exact, beside)
         if not one_pass:
-            _begin(beside, charted, compared)
+            beside.begin(charted)
         timing, seen = recognised_times(job, points, motion)
         slow = slow_stretches(timing, job.process)
     timed = TimedMotion.passing(motion, timing.timed.duration)
@@ -129,11 +128,6 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
     )
     refusal = dwell_refusal(slow, job.process)
     return planned if refusal is None else Refused(planned, refusal, (), watch.seconds)
-
-
-def _begin(beside: Beside, *all_of_them: Later[Any]) -> None:
-    for later in all_of_them:
-        beside.begin(later)
 
 
 def _positions(prepared: Prepared, exact: Motion, beside: Beside) -> tuple[Motion, Motion]:
@@ -215,6 +209,8 @@ def verify_motion(
             progress,
             beside,
         )
+    # not before: while the program is written there is nothing to take turns with
+    beside.begin(planned.comparison)
     beside.begin(planned.drawn)
     if verification.verified is None:
         return Refused(planned, verification, (), watch.seconds)
