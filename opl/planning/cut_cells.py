@@ -22,7 +22,7 @@ CELL = 1.0  # belt units that a cell covers at first
 MOST_HALVINGS = 12  # of a cell where something begins
 # of one that is deep in the wheel, but hardly deeper than allowed: along the flat it may be so all
 # over, and each halving is twice the work
-MOST_WITHIN = 7
+MOST_WITHIN = 9
 
 
 def whole_cells(wheel: ContactWheel) -> Array:
