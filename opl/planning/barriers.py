@@ -13,19 +13,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from opl.cell.wheel_distance import signed_wheel_distance
-from opl.cell.wheel_triangle import TOLERANCE
-from opl.geometry import frames
 from opl.geometry.frames import Array
-from opl.planning.cut_cells import halved
+from opl.planning.cut_cells import MOST_WITHIN, halved, surely_cuts_along
 from opl.planning.problem import GrindingProblem
 from opl.search.walls import Piece
-
-LARGEST_TURN = 0.3  # [rad] of a cutter frame from one point to the next; about
-# Turn of a cutter frame for each of what its z and x move by from one cutter point to the next, at
-# the most: both are blended, normalized, and x made perpendicular to z, which none of it doubles
-TURN = 4.0
-MOST_WITHIN = 9  # halvings of the way between two cutter points
 
 
 def barriers(problem: GrindingProblem) -> list[Array]:
@@ -62,30 +53,13 @@ def on_sides(piece: Piece, barriers: Array) -> Iterator[Piece]:
 
 def _is_shut(problem: GrindingProblem, columns: np.ndarray, contact_position: float) -> bool:
     """Return whether the part surely cuts into the wheel there all along a pass."""
-    cell, points, part = problem.cell, problem.points, problem.scene.part
-    wheel, allowed = cell.wheel, -cell.planned_penetration
     if len(columns) < 2:
         return False
-    Ts = points.Ts_workpiece_cutter[columns]
-    x, z, p = (np.linalg.norm(np.diff(Ts[:, :3, k], axis=0), axis=1) for k in (0, 2, 3))
-    if max(x.max(), z.max()) > LARGEST_TURN:
-        return False
-    T_contact0_contact = wheel.T_contact0_contact(np.array([contact_position]))[0]
 
     def surely(_: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
-        middle, half = (low + high) / 2.0, (high - low) / 2.0
-        Ts_cutter_workpiece = frames.inverse(points.frames_at(middle))
-        cx, _, cz = np.moveaxis(frames.transform(Ts_cutter_workpiece, part.spheres[0, :3]), -1, 0)
-        # a point in the wheel is not farther from the contact than the wheel is large
-        lever = np.minimum(
-            np.hypot(cx, cz) + part.spheres[0, 3], np.hypot(wheel.width, 2.0 * wheel.radius)
-        )
-        k = middle.astype(int) - columns[0]
-        moved = half * (TURN * (x[k] + z[k]) * lever + p[k])
-        distance = signed_wheel_distance(
-            part, wheel, T_contact0_contact @ Ts_cutter_workpiece, allowed
-        )
-        return distance + moved + TOLERANCE < allowed, distance < allowed
+        t = np.full(len(low), contact_position)
+        part = problem.scene.part
+        return surely_cuts_along(problem.cell, part, problem.points, t, low, high)
 
     low = columns[:-1].astype(float)
     _, _, _, shut = halved(np.zeros(len(low), int), low, low + 1.0, surely, MOST_WITHIN)

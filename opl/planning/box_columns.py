@@ -9,6 +9,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
+from opl.planning.cut_cells import MOST_WITHIN, halved, surely_cuts_along
 from opl.planning.families import GROWN
 from opl.planning.images import Seams, wrist_flips
 from opl.planning.nodes import inverse_solutions
@@ -205,6 +206,22 @@ class ColumnSampler:
         """
         sign, shift = self.flips[self.mirrored]
         return self._problem.scene.collision.wider(SPARE).collides(q * sign + shift)
+
+    def shut_along(self, first: Array, last: Array, t: Array) -> np.ndarray:
+        """Return between which places the part surely cuts into the wheel all the way, (n,).
+
+        Each on one contact position, between two neighbouring cutter points.
+        """
+        problem = self._problem
+
+        def surely(run: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
+            part = problem.scene.part
+            return surely_cuts_along(problem.cell, part, problem.points, t[run], low, high)
+
+        run, _, _, shut = halved(np.arange(len(t)), first, last, surely, MOST_WITHIN)
+        found = np.ones(len(t), dtype=bool)
+        found[run[~shut]] = False
+        return found
 
     def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m).

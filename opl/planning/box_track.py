@@ -19,9 +19,10 @@ from opl.planning.costs import track_cost
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.nodes import NodeField, NodeMatrix
 from opl.planning.open_matrix import Track, open_matrices
+from opl.planning.passages import NO_PASSAGES, Passages
 from opl.planning.plan import Found, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem
-from opl.planning.rows import Bulge, Row, levels, shut_edges
+from opl.planning.rows import SMALLEST_EDGE, Bulge, Row, bars, crossed, levels, shut_edges
 from opl.planning.settings import CostWeights
 from opl.planning.symmetry import twins
 from opl.planning.turned import Kept
@@ -36,7 +37,6 @@ ROUNDS = 3  # of sampling closer around a track
 MOST_PARTS = 8  # into which an edge that bulges is cut at once
 BULGE = 1.75  # times the room of a motion: how far it may leave its box between two places
 FINE_SHARE = 3e-5  # of the box: what an edge may bulge
-SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
 EDGES_OF_WORK = 3e5  # that cost a unit of work to search, all rounds
 MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
@@ -84,7 +84,7 @@ class BoxTracks:
     def plan(
         self,
         columns: Columns,
-        rows: Sequence[Row],
+        passages: Passages,
         box: JointBox,
         room: float,
         learn: Callable[[Sequence[Bulge]], bool],
@@ -93,42 +93,45 @@ class BoxTracks:
 
         Args:
             columns: Places, all with postures in the box.
-            rows: Contact positions that are passed only where they lie in the box.
+            passages: Contact positions that are passed only where they lie in the box, and ways.
             box: The box.
             room: By how much the motion may leave it, in [rad] of its size.
-            learn: Given where the track leaves the box on its way between places; returns whether
-                that was not known before.
+            learn: Given where tracks leave the box, or end; whether that is new.
 
         Returns:
             The motion; None if nothing is free, or if something was learnt instead.
         """
         inner = box.widened(room / 2.0)
         t, spacing = samples_in(columns.t, columns.q, columns.free, inner, SAMPLES)
-        t = np.concatenate([t, levels(columns.places, rows, inner, t[:, :1])], axis=1)
+        places, rows, one = columns.places, passages.rows, t[:, :1]
+        known = levels(places, rows, inner, one), crossed(places, passages.crossings, one)
+        t = np.concatenate([t, *known], axis=1)
         self.sampler.work += len(t) * t.shape[1] ** 2 / EDGES_OF_WORK
-        at = self.sampler.at(columns.places, columns.points, columns.placements, t)
+        at = self.sampler.at(places, columns.points, columns.placements, t)
         coarse = sampled = _Sampled(self, at, rows, inner)
         track = sampled.smoothest()
         if track is None:
-            return self.plan(columns, (), box, room, learn) if rows else None
+            free, now = [matrix.free for matrix in sampled.matrices], sampled.problem
+            if learn(bars(places, free, now.sides, now.off_wheel)):
+                return None
+            return self.plan(columns, NO_PASSAGES, box, room, learn) if rows else None
         bulges = sampled.bulges(track, box.widened(BULGE * room))
         if any(bulge.steep for bulge in bulges) and learn(bulges):
             return None
         for _ in range(ROUNDS):
             closer = sampled.closer(track, spacing)
-            finer = closer.smoothest()
-            if finer is None:
+            if (finer := closer.smoothest()) is None:
                 break
             sampled, track, spacing = closer, finer, spacing * 2.0 / (SAMPLES - 1)
         bulges = sampled.bulges(track, box.widened(BULGE * room))
         if bulges and learn(bulges):
             return None
         plan = sampled.check(track)
-        if plan is None:
-            coarse.sweep()
-            around = coarse.smoothest()
-            plan = None if around is None else coarse.check(around)
-        return plan
+        if plan is not None:
+            return plan
+        coarse.sweep()
+        around = coarse.smoothest()
+        return None if around is None else coarse.check(around)
 
 
 class _Sampled:

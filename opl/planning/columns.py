@@ -26,7 +26,7 @@ from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.barriers import on_sides
-from opl.planning.cut_cells import cells_of, cut_finer
+from opl.planning.cut_cells import cells_of, cut_finer, rows_of
 from opl.planning.enclosed import ROUND_OFF, EnclosedCells, enclosing
 from opl.planning.images import Images
 from opl.search.walls import Chain, Image, Line, Piece, Wall
@@ -113,17 +113,18 @@ class ColumnWalls:
             inside = np.arange(np.floor(first) + 1.0, np.ceil(last))
             ends = np.concatenate([[first], inside, [last]])
             grids.append(cut_finer(ends, np.ceil(np.diff(ends) * ROW_PARTS).astype(int)))
-        return self._rows(grids, [edge[2] for edge in edges])
+        t = [edge[2] for edge in edges]
+        return self._rows(*rows_of(self._cell, self._part, self._points, grids, t), t)
 
     def finer(self, piece: Piece, cell: int) -> tuple[Piece, ...]:
         """Return one cell of a wall as pieces with smaller cells."""
         self.made += PART_OF_A_WALL
         grid = np.linspace(piece.at[cell], piece.at[cell + 1], FINER + 1)
+        none = np.zeros(FINER, dtype=bool)
         T_workpiece_cutter = piece.line.T_workpiece_cutter
         if T_workpiece_cutter is None:
-            pieces = self._rows([grid], [piece.line.contact_position])[0]
+            pieces = self._rows([grid], [none], [piece.line.contact_position])[0]
         else:
-            none = np.zeros(FINER, dtype=bool)
             pieces = list(self._pieces(self._cells(T_workpiece_cutter[None], [grid], [none]), 0))
         own = (found for found in pieces if found.family == piece.family)
         return tuple(replace(found, side=piece.side) for found in own)
@@ -147,10 +148,11 @@ class ColumnWalls:
         chords = np.stack([np.interp(at, piece.at, joint) for joint in piece.corners.T], axis=1)
         return np.asarray(q + 2.0 * np.pi * np.round((chords - q) / (2.0 * np.pi)))
 
-    def _rows(self, grids: list[Array], contact_positions: list[float]) -> list[list[Piece]]:
+    def _rows(
+        self, grids: list[Array], cuts: list[np.ndarray], contact_positions: list[float]
+    ) -> list[list[Piece]]:
         """Return the pieces along places, each at one contact position."""
-        none = [np.zeros(len(grid) - 1, dtype=bool) for grid in grids]
-        cells = _cut_as_needed(partial(self._cells_along, contact_positions), grids, none)
+        cells = _cut_as_needed(partial(self._cells_along, contact_positions), grids, cuts)
         return [list(self._pieces(cells, k, t)) for k, t in enumerate(contact_positions)]
 
     def _cells_along(

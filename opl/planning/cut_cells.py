@@ -16,10 +16,15 @@ from opl.cell.wheel_triangle import TOLERANCE
 from opl.cell.workcell import WorkCell
 from opl.geometry import frames
 from opl.geometry.frames import Array
+from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import MM_PER_M, ContactWheel
 
 CELL = 1.0  # belt units that a cell covers at first
 MOST_HALVINGS = 12  # of a cell where something begins
+LARGEST_TURN = 0.3  # [rad] of a cutter frame from one point to the next; about
+# Turn of a cutter frame for each of what its z and x move by from one cutter point to the next, at
+# the most: both are blended, normalized, and x made perpendicular to z, which none of it doubles
+TURN = 4.0
 # of one that is deep in the wheel, but hardly deeper than allowed: along the flat it may be so all
 # over, and each halving is twice the work
 MOST_WITHIN = 9
@@ -58,6 +63,34 @@ def cells_of(
     ends = np.searchsorted(place, np.arange(k + 1))
     runs = [slice(a, b) for a, b in pairwise(ends)]
     return [np.append(low[run], high[run][-1:]) for run in runs], [cuts[run] for run in runs]
+
+
+def rows_of(
+    cell: WorkCell,
+    part: PartTree,
+    points: CutterPoints,
+    grids: list[Array],
+    contact_positions: list[float],
+) -> tuple[list[Array], list[np.ndarray]]:
+    """Return runs of places cut where the part begins to cut into the wheel, and where it does.
+
+    Args:
+        cell: The cell.
+        part: The triangles of the part.
+        points: The cutter points.
+        grids: Ends of the cells of each run, fractional cutter points.
+        contact_positions: Where each run is ground, in belt units.
+    """
+    t = np.array(contact_positions)
+    run = np.repeat(np.arange(len(grids)), [len(grid) - 1 for grid in grids])
+    low, high = (np.concatenate([grid[k] for grid in grids]) for k in (slice(-1), slice(1, None)))
+
+    def surely(run: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
+        return surely_cuts_along(cell, part, points, t[run], low, high)
+
+    run, low, high, cuts = halved(run, low, high, surely, MOST_WITHIN)
+    own = [np.flatnonzero(run == k) for k in range(len(grids))]
+    return [np.append(low[k], high[k[-1]]) for k in own], [cuts[k] for k in own]
 
 
 def halved(
@@ -137,6 +170,42 @@ def surely_nearer(
     Ts_contact0_workpiece = wheel.T_contact0_contact(middle) @ Ts_cutter_workpiece
     clearance = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, distance)
     return (clearance + moved + TOLERANCE < distance), clearance < distance
+
+
+def surely_cuts_along(
+    cell: WorkCell,
+    part: PartTree,
+    points: CutterPoints,
+    contact_positions: Array,
+    low: Array,
+    high: Array,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return in which cells of places the part cuts into the wheel all over, and at the middle.
+
+    Args:
+        cell: The cell.
+        part: The triangles of the part.
+        points: The cutter points.
+        contact_positions: Where each is ground, in belt units, shape (n,).
+        low: First place of each, a fractional cutter point, shape (n,).
+        high: Last place, between the same two cutter points of a pass.
+    """
+    wheel, allowed = cell.wheel, -cell.planned_penetration
+    middle, half = (low + high) / 2.0, (high - low) / 2.0
+    before = middle.astype(int)
+    Ts = points.Ts_workpiece_cutter
+    x, z, p = (np.linalg.norm(Ts[before + 1, :3, k] - Ts[before, :3, k], axis=1) for k in (0, 2, 3))
+    Ts_cutter_workpiece = frames.inverse(points.frames_at(middle))
+    cx, _, cz = np.moveaxis(frames.transform(Ts_cutter_workpiece, part.spheres[0, :3]), -1, 0)
+    # a point in the wheel is not farther from the contact than the wheel is large
+    lever = np.minimum(
+        np.hypot(cx, cz) + part.spheres[0, 3], np.hypot(wheel.width, 2.0 * wheel.radius)
+    )
+    moved = half * (TURN * (x + z) * lever + p)
+    Ts_contact0_workpiece = wheel.T_contact0_contact(contact_positions) @ Ts_cutter_workpiece
+    distance = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, allowed)
+    surely = distance + moved + TOLERANCE < allowed
+    return surely & (np.maximum(x, z) <= LARGEST_TURN), distance < allowed
 
 
 def cut_finer(t: Array, parts: np.ndarray) -> Array:

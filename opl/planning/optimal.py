@@ -20,7 +20,7 @@ from opl.planning.families import Families, few_columns, grown
 from opl.planning.holders import Holder, holders
 from opl.planning.images import Images, seams_of
 from opl.planning.obstructed import Obstructions
-from opl.planning.passages import Passages, Rectangles
+from opl.planning.passages import NO_PASSAGES, Passages, Rectangles
 from opl.planning.placement import Placement, alike
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
@@ -213,7 +213,7 @@ class OptimalSearch:
             columns, _, inner = self._look(larger, placements)
             if inner is not None:
                 room, checks = self._room(inner), self._tracks.checks
-                found = self._tracks.plan(columns, (), inner, room, lambda _: False)
+                found = self._tracks.plan(columns, NO_PASSAGES, inner, room, lambda _: False)
                 self.keep(found)
                 self._in_vain += int(found is None and self._tracks.checks > checks)
             self._early += self._work.done - before
@@ -282,7 +282,7 @@ class OptimalSearch:
             learnt = self._refined < MOST_REFINED and self._rectangles.refine(bulges)
             return learnt
 
-        self.keep(self._tracks.plan(columns, passages.rows, box, self._room(box), learn))
+        self.keep(self._tracks.plan(columns, passages, box, self._room(box), learn))
         return learnt
 
     def _room(self, box: JointBox) -> float:

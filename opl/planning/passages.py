@@ -17,17 +17,16 @@ from opl.geometry.toolpath import CutterPoints
 from opl.planning.box_columns import ColumnSampler
 from opl.planning.families import grown
 from opl.planning.placement import Placement
+from opl.planning.rectangle import Rectangle
 from opl.planning.rows import Bulge, Row
 from opl.search.box import JointBox
-from opl.search.in_box import missing
-from opl.search.passage import Corner, barred, chain, edges_missed, passage
+from opl.search.passage import Corner, barred, chain, passage
 from opl.search.walls import Chain
 
 PARTS = 8  # into which a stretch between two places is cut
 SHORTEST = 1.0 / 500.0  # of the stretch between cutter points that is still cut
 AROUND = 12  # cutter points on either side of what is cut
 LESS = 0.5  # of what all ways miss a box by: what each edge of a wall should miss it by
-NEAR = 0.01  # [rad] from a box within which postures are looked at for collisions
 
 
 @dataclass(frozen=True)
@@ -38,11 +37,13 @@ class Passages:
         walls: Chains that a motion in the box cannot pass, the hardest to pass first.
         rows: Contact positions that it passes only where they lie in the box.
         edges: Ends of the edges that its way crosses in [rad], both free, shape (n, 2, 6).
+        crossings: Places, and the contact positions at which its way crosses them, shape (k, 2).
     """
 
     walls: list[Chain]
     rows: list[Row]
     edges: Array
+    crossings: Array
 
     def grown(self, box: JointBox) -> JointBox:
         """Return a box grown until it holds a posture of each edge crossed."""
@@ -51,14 +52,7 @@ class Passages:
         return grown(self.edges, np.ones(self.edges.shape[:2], dtype=bool), box) or box
 
 
-@dataclass
-class _Nodes:
-    """The postures of a rectangle: places (n,), postures (n, m, 6) and which may be used (n, m)."""
-
-    places: Array
-    q: Array
-    free: np.ndarray
-    looked_at: np.ndarray
+NO_PASSAGES = Passages([], [], np.empty((0, 2, 6)), np.empty((0, 2)))
 
 
 class Rectangles:
@@ -81,7 +75,7 @@ class Rectangles:
         self._t = contact_positions
         self._between = np.empty(0)  # places of rectangles that are no cutter points
         self._walls: set[Chain] = set()
-        self._nodes: dict[tuple[float, ...], _Nodes] = {}
+        self._known: dict[tuple[float, ...], Rectangle] = {}
         self.places = np.arange(len(points), dtype=float)
 
     def refine(self, bulges: Sequence[Bulge]) -> bool:
@@ -117,24 +111,35 @@ class Rectangles:
         """
         walls: list[tuple[float, Chain]] = []
         rows: list[Row] = []
-        edges = [np.empty((0, 2, 6))]
+        edges, crossings = [np.empty((0, 2, 6))], [np.empty((0, 2))]
         for places in self._windows():
-            nodes = self._sampled(places, box, placements)
-            up, along = edges_missed(nodes.q, nodes.free, box)
+            rectangle = self._rectangle(places, placements)
+            rectangle.leave_out_collisions(box)
+            up, along = rectangle.missed(box)
             most = barred(up, along)
-            if most > allowed:
+            corners = None
+            while most > allowed:
                 missed = max(allowed, LESS * (most if np.isfinite(most) else 1.0))
-                found = chain(up, along, missed)
-                wall = () if found is None else self._chain(places, found)
+                corners = chain(up, along, missed)
+                if corners is None or not rectangle.doubts(corners):
+                    break
+                up, along = rectangle.missed(box)
+                most = barred(up, along)
+            if most > allowed:
+                wall = () if corners is None else self._chain(places, corners)
                 if wall and wall not in self._walls:
                     walls.append((most, wall))
-                continue  # a wall that the proof has says less than these nodes: they are too few
-            ends = np.array(passage(up, along, allowed))
-            ends = ends[nodes.free[ends[..., 0], ends[..., 1]].all(axis=1)]
-            edges.append(nodes.q[ends[..., 0], ends[..., 1]])
-            rows += self._rows(nodes, box, room)
+                # a wall that the proof has says less than these nodes: they are too few, unless it
+                # is by a hair
+                if walls or most > room:
+                    continue
+            ends = np.array(passage(up, along, max(most, allowed)))
+            edges.append(rectangle.ends_of(ends))
+            crossings.append(rectangle.crossings(ends, box))
+            rows += rectangle.rows(box, room)
         walls.sort(key=lambda one: -one[0])
-        return Passages([wall for _, wall in walls], rows, np.concatenate(edges))
+        hardest = [wall for _, wall in walls]
+        return Passages(hardest, rows, np.concatenate(edges), np.concatenate(crossings))
 
     def take_in(self, walls: Sequence[Chain]) -> None:
         """Note chains that are walls of the proof now."""
@@ -158,39 +163,16 @@ class Rectangles:
             windows.append(np.union1d(np.arange(first, last + 1.0), inside))
         return windows
 
-    def _sampled(self, places: Array, box: JointBox, placements: Sequence[Placement]) -> _Nodes:
-        """Return the postures of a rectangle; near a box only those that do not collide count."""
+    def _rectangle(self, places: Array, placements: Sequence[Placement]) -> Rectangle:
+        """Return the rectangle of some places of a pass."""
         index = self._points.pass_index[int(places[0])]
         image = placements[index]
         turned = *image.shift, *(image.center * image.loose)
         which = image.family, image.number, *image.between, *turned
         left_out = self._sampler.collisions, self._sampler.mirrored
         key = places[0], places[-1], len(places), index, *map(float, (*left_out, *which))
-        nodes = self._nodes.get(key)
-        if nodes is None:
-            for old in [old for old in self._nodes if old[3] == index and old[:3] != key[:3]]:
-                del self._nodes[old]
-            t = np.broadcast_to(self._t, (len(places), len(self._t)))
-            columns = self._sampler.at(places, self._sampler.there(places), [image], t)
-            nodes = _Nodes(places, np.nan_to_num(columns.q), columns.free, ~columns.free)
-            self._nodes[key] = nodes
-        if self._sampler.collisions:
-            near = ~nodes.looked_at & (missing(nodes.q, box) <= NEAR)
-            nodes.looked_at |= near
-            nodes.free[near] = ~self._sampler.collides(nodes.q[near])
-        return nodes
-
-    def _rows(self, nodes: _Nodes, box: JointBox, room: float) -> list[Row]:
-        """Return the contact positions that motions in a box pass between finer places."""
-        places, rows = nodes.places, []
-        inside = nodes.free & (missing(nodes.q, box) <= room)
-        fine = np.diff(places) < 1.0
-        ends = np.flatnonzero(np.diff(np.concatenate([[False], fine, [False]]).astype(int)))
-        for first, last in ends.reshape(-1, 2).tolist():
-            levels = np.flatnonzero(inside[first : last + 1].any(axis=0))
-            if not len(levels):
-                continue
-            for j in range(max(levels[0] - 1, 0), min(levels[-1] + 2, len(self._t))):
-                zone = slice(first, last + 1)
-                rows.append(Row(places[zone], float(self._t[j]), nodes.q[zone, j]))
-        return rows
+        if key not in self._known:
+            for old in [old for old in self._known if old[3] == index and old[:3] != key[:3]]:
+                del self._known[old]
+            self._known[key] = Rectangle(self._sampler, places, self._t, image)
+        return self._known[key]

@@ -11,6 +11,7 @@ from opl.geometry.frames import Array
 from opl.search.box import JointBox
 from opl.search.in_box import clipped
 
+SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 SAME = 1e-5  # cutter points that two places are apart at the least
 
 
@@ -74,6 +75,18 @@ def levels(places: Array, rows: Sequence[Row], box: JointBox, otherwise: Array) 
     return levels
 
 
+def crossed(places: Array, crossings: Array, otherwise: Array) -> Array:
+    """Return at which contact position a way crosses each place, shape (n, 1).
+
+    ``otherwise``, shape (n, 1), where it does not; crossings of shape (k, 2) as of `Passages`.
+    """
+    t: Array = otherwise.copy()
+    at = np.minimum(np.searchsorted(places, crossings[:, 0] - SAME), len(places) - 1)
+    there = np.abs(places[at] - crossings[:, 0]) < SAME
+    t[at[there], 0] = crossings[there, 1]
+    return t
+
+
 def shut_edges(places: Array, t: Array, rows: Sequence[Row], box: JointBox) -> np.ndarray:
     """Return the sorted keys of the edges that pass a row where it lies outside of a box.
 
@@ -91,3 +104,28 @@ def shut_edges(places: Array, t: Array, rows: Sequence[Row], box: JointBox) -> n
         below = t < row.contact_position
         shut[edge] |= below[edge][:, :, None] != below[edge + 1][:, None, :]
     return np.flatnonzero(shut)
+
+
+def bars(
+    places: Array, free: Sequence[np.ndarray], sides: np.ndarray | None, off_wheel: np.ndarray
+) -> list[Bulge]:
+    """Return after which places no track gets past what is shut, the first in each matrix.
+
+    Args:
+        places: Fractional cutter points, shape (n,).
+        free: Which nodes of each matrix may be used, each of shape (n, m).
+        sides: As of `opl.search.ladder.Ladder`, shape (n - 1, 2, m).
+        off_wheel: Which edges leave the wheel, shape (n - 1,).
+    """
+    found: list[Bulge] = []
+    if sides is None:
+        return found
+    for nodes in free:
+        reached = nodes[0]
+        for k, (here, there) in enumerate(sides):
+            reached = nodes[k + 1] & (np.isin(there, here[reached]) | off_wheel[k])
+            if not reached.any():
+                if places[k + 1] - places[k] > SMALLEST_EDGE:
+                    found.append(Bulge(float(places[k]), float(places[k + 1]), 2, True))
+                break
+    return found

@@ -3,9 +3,11 @@
 import numpy as np
 
 from benchmarks.stranger_jobs import draw_job
+from opl.cell.wheel_distance import signed_wheel_distance
 from opl.geometry.frames import inverse, transform
 from opl.job.load import load_job
 from opl.planning.barriers import barriers, on_sides
+from opl.planning.cut_cells import rows_of
 from opl.search.walls import Line, Piece
 from tests.support.planned import problem_of, small_problem
 
@@ -24,6 +26,29 @@ def test_a_concave_part_is_too_deep_in_the_wheel_all_along_each_barrier(tmp_path
             T = wheel.T_contact0_contact(t) @ inverse(points.frames_at(np.array([place]))[0])
             deepest = wheel.signed_distance(transform(T, corners)).min()
             assert deepest < -job.cell.planned_penetration
+
+
+def test_what_is_left_out_along_a_row_is_too_deep_in_the_wheel(tmp_path):
+    draw_job(20261125, 31, 0, tmp_path)
+    problem = problem_of(load_job(tmp_path / "job.yaml"))
+    points, cell = problem.points, problem.cell
+    own = np.flatnonzero(points.pass_index == 0)
+    t = problem.field.contact_positions[:: len(problem.field.contact_positions) // 12].tolist()
+    grids = [np.arange(own[0], own[-1] + 1.0)] * len(t)
+    runs, cuts = rows_of(cell, problem.scene.part, points, grids, t)
+    shut = 0
+    for contact_position, ends, cut in zip(t, runs, cuts, strict=True):
+        for k in np.flatnonzero(cut)[::4]:
+            shut += 1
+            places = np.linspace(ends[k], ends[k + 1], 6)
+            T_contact0_contact = cell.wheel.T_contact0_contact(contact_position)
+            Ts = T_contact0_contact @ inverse(points.frames_at(places))
+            allowed = -cell.planned_penetration
+            assert (
+                signed_wheel_distance(problem.scene.part, cell.wheel, Ts, allowed) < allowed
+            ).all()
+    assert shut > 20
+    assert not all(cut.all() for cut in cuts)
 
 
 def test_a_part_that_touches_the_wheel_everywhere_has_no_barrier():
