@@ -101,7 +101,8 @@ def page(seed: int, outcomes: Sequence[Outcome]) -> str:
     searched = [one for one in outcomes if one.status in SEARCHED]
     closed = [one for one in searched if one.closed]
     quick = [one for one in closed if one.search_s <= QUICK]
-    unproven = [one for one in searched if one.gap is None]
+    without_path = [one for one in searched if one.sum_rad is None]
+    unproven = [one for one in searched if one.bound_rad is None]
     again = Counter(one.status for one in outcomes if one.status not in SEARCHED)
     slowest = max((one.search_s for one in outcomes), default=0.0)
     revision = subprocess.run(
@@ -120,8 +121,8 @@ def page(seed: int, outcomes: Sequence[Outcome]) -> str:
             "",
             f"{len(searched)} jobs searched: {len(closed)} with a gap of at most "
             f"{100.0 * CLOSED:g} %, {len(quick)} of them within {QUICK:g} s of processor; "
-            f"{len(unproven)} without a bound; slowest {slowest:.1f} s of all drawn. "
-            f"Drawn again: {drawn_again or 'none'}.",
+            f"{len(without_path)} without a path, {len(unproven)} without a bound; slowest "
+            f"{slowest:.1f} s of all drawn. Drawn again: {drawn_again or 'none'}.",
             "",
             f"opl {opl.__version__} at {revision}, Python {platform.python_version()}, {versions}; "
             f"{os.cpu_count()} processors. Search: processor time of search and clearance; total: "

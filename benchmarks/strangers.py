@@ -72,7 +72,7 @@ def _path(job: opl.Job, watch: opl.Watch) -> Facts:
     except opl.NoPathError as error:
         shut = error.message.startswith("no path:") or error.message.startswith("no path beyond")
         status = "no_path" if shut else "not found"
-        return {**facts, "status": status, "cause": str(error)}
+        return {**facts, "status": status, "cause": str(error), "bound_rad": error.lower_bound}
     facts.update(sum_rad=plan.path.joint_range_sum, bound_rad=plan.lower_bound)
     return {**facts, "status": "ok", "cause": plan.open_because or ""}
 

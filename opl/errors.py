@@ -46,14 +46,18 @@ class NoPathError(OplError):
     Args:
         message: What stops the path, and where.
         reasons: One line for each run of cutter points that cannot be passed.
+        lower_bound: Where none was found: no motion has a smaller joint range sum, in [rad].
     """
 
     exit_status = 3
 
-    def __init__(self, message: str, reasons: Sequence[str] = ()) -> None:
+    def __init__(
+        self, message: str, reasons: Sequence[str] = (), lower_bound: float | None = None
+    ) -> None:
         super().__init__("\n".join([message, *reasons]))
         self.message = message
         self.reasons = tuple(reasons)
+        self.lower_bound = lower_bound
 
 
 class NoFreeMoveError(NoPathError):

@@ -13,13 +13,25 @@ from opl.planning.settings import OptimalSettings
 OTHERWISE_SHARE = 0.3  # of the work: a motion sought in another way, where the proof found none
 
 
+class NoMotionError(Exception):
+    """No motion was found in the work allowed.
+
+    Args:
+        lower_bound: No motion has a smaller joint range sum, in [rad].
+    """
+
+    def __init__(self, lower_bound: float) -> None:
+        super().__init__(f"no motion found; none is below {lower_bound:.4f} rad")
+        self.lower_bound = lower_bound
+
+
 def plan_optimal(
     problem: GrindingProblem,
     settings: OptimalSettings,
     fallback: Plan | None,
     report: Callable[[float], None] = lambda _: None,
     otherwise: Callable[[float], Plan | None] | None = None,
-) -> Plan | None:
+) -> Plan:
     """Find the collision-free motion with the least joint range sum, the smoothest of these.
 
     Args:
@@ -31,7 +43,10 @@ def plan_optimal(
             units of work are left for that.
 
     Returns:
-        The plan with its lower bound; None only if no motion was known and none was found.
+        The plan with its lower bound.
+
+    Raises:
+        NoMotionError: If no motion was known and none was found.
     """
     search = OptimalSearch(problem, settings, fallback)
     share = 1.0 if otherwise is None else 1.0 - OTHERWISE_SHARE
@@ -46,6 +61,6 @@ def plan_optimal(
         search.keep(otherwise(OTHERWISE_SHARE * settings.max_subproblems))
         go_on(1.0)
     if search.plan is None:
-        return None
+        raise NoMotionError(search.lower_bound)
     bound, why, held = search.lower_bound, search.open_because, search.holders()
     return replace(search.plan, lower_bound=bound, open_because=why, holders=held)

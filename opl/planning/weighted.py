@@ -57,7 +57,7 @@ def plan_weighted(
     matrices = open_matrices(problem)
     smallest = fallback
     if weights.joint_range > 0.0:
-        smallest = plan_optimal(problem, settings, fallback, report) or fallback
+        smallest = plan_optimal(problem, settings, fallback, report)
     least_range = smallest.lower_bound or 0.0
     box = JointBox(smallest.path.q.min(axis=0), smallest.path.q.max(axis=0))
     lower_bound = weights.joint_range * least_range

@@ -13,7 +13,7 @@ from opl.planning.borders import Nameable, clear_of_borders
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.equals import quickest_of_equals
 from opl.planning.least_cost import least_cost
-from opl.planning.least_range import plan_optimal
+from opl.planning.least_range import NoMotionError, plan_optimal
 from opl.planning.multi_start import plan_recursive, try_recursive
 from opl.planning.plan import Exhausted, Found, ObjectiveValue, OutOfBudget, Plan
 from opl.planning.problem import GrindingProblem
@@ -84,16 +84,20 @@ def _search_range(
         return last.plan if isinstance(last, Found) else None
 
     # where all that is proposed collides, the proof knows better where not to look
-    best = plan_optimal(problem, search.optimal, known, report, otherwise)
-    if best is not None:
+    try:
+        best = plan_optimal(problem, search.optimal, known, report, otherwise)
+    except NoMotionError as error:
+        least = error.lower_bound
+    else:
         return best, last.plan if isinstance(last, Found) else best
     if isinstance(last, Exhausted):
         raise no_path(problem, last.matrices)
     assert isinstance(last, OutOfBudget), "what was found is a plan"
     raise NoPathError(
         f"no path found: the {last.checks} best motions of the recursive search are not free, and "
-        "the proof found none that is in the work allowed; more work, or more room around the "
-        "robot, may help"
+        "the proof found none in the work allowed, only that none along these passes has a joint "
+        f"range sum below {least:.4f} rad; more work, or more room around the robot, may help",
+        lower_bound=least,
     )
 
 

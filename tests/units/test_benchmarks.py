@@ -52,10 +52,16 @@ def test_a_page_of_strangers_counts_what_is_closed_and_what_has_no_bound():
         stranger(1, "ok", sum_rad=1.0, bound_rad=0.999, search_s=12.0),
         stranger(2, "ok", sum_rad=1.0, bound_rad=0.99, search_s=2.0, cause="a wall | too few"),
         stranger(3, "not found", search_s=25.0, cause="no path found"),
+        stranger(
+            5, "not found", search_s=9.0, bound_rad=0.5, cause="no path found, none below 0.5"
+        ),
         stranger(4, "no_path", search_s=31.0, cause="no path: shut\nat cutter point 3"),
     ]
     text = page(7, outcomes)
-    assert "4 jobs searched: 2 with a gap of at most 0.2 %, 1 of them within 10 s" in text
-    assert "1 without a bound; slowest 31.0 s of all drawn. Drawn again: 1 no_path." in text
+    assert "5 jobs searched: 2 with a gap of at most 0.2 %, 1 of them within 10 s" in text
+    assert (
+        "2 without a path, 1 without a bound; slowest 31.0 s of all drawn. Drawn again: 1 no_path."
+        in text
+    )
     assert "| 2.0 | cone | mh12 | upright | 0 in 0 | ok | no | 1.000 % |" in text
     assert "a wall / too few |" in text and "cutter point 3" not in text
