@@ -9,7 +9,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.cut_cells import MOST_WITHIN, halved, surely_cuts_along
+from opl.planning.cut_cells import halved, surely_cuts_along
 from opl.planning.families import GROWN
 from opl.planning.images import Seams, wrist_flips
 from opl.planning.nodes import inverse_solutions
@@ -22,6 +22,7 @@ from opl.search.in_box import missing_chords, nearest_points, sampled
 
 FINE = 33  # contact positions of a place at which a box is held against it
 POSTURES_OF_WORK = 400  # that cost a unit of work
+WITHIN = 6  # halvings of the way between places that is too deep in the wheel, but hardly
 CLOSER = 2  # times that places are sampled closer where collisions begin
 SPARE = 3e-4  # [m] of clearance: a motion may come nearer between two places than at both
 BORDER = 1e-2  # belt units to look beyond what lies in the box
@@ -218,7 +219,7 @@ class ColumnSampler:
             part = problem.scene.part
             return surely_cuts_along(problem.cell, part, problem.points, t[run], low, high)
 
-        run, _, _, shut = halved(np.arange(len(t)), first, last, surely, MOST_WITHIN)
+        run, _, _, shut = halved(np.arange(len(t)), first, last, surely, WITHIN)
         found = np.ones(len(t), dtype=bool)
         found[run[~shut]] = False
         return found

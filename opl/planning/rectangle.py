@@ -90,11 +90,16 @@ class Rectangle:
         That is where the part cuts into the wheel at two places, but not surely between them.
         """
         k, j = _steps(corners).T
-        new = self._cuts[k, j] & self._cuts[k + 1, j] & ~self._sure[k, j]
-        k, j = k[new], j[new]
-        shut = self._sampler.shut_along(self._places[k], self._places[k + 1], self._t[j])
-        self._sure[k, j], self._doubted[k, j] = shut, ~shut
-        return not bool(shut.all())
+        new = self._cuts[:-1] & self._cuts[1:] & ~self._sure & ~self._doubted
+        asked = new[k, j]
+        # all along the lines: the next chain would only go around what is doubted
+        lines = np.zeros(len(self._t), dtype=bool)
+        lines[j[asked]] = True
+        place, line = np.nonzero(new & lines)
+        ends = self._places[place], self._places[place + 1]
+        shut = self._sampler.shut_along(*ends, self._t[line])
+        self._sure[place, line], self._doubted[place, line] = shut, ~shut
+        return bool(self._doubted[k, j][asked].any())
 
     def ends_of(self, edges: np.ndarray) -> Array:
         """Return the ends in [rad] of those edges of which two are known that may be used.
