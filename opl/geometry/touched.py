@@ -93,7 +93,8 @@ def fit_touched(
     scale = np.array([radius] * 3 + [1.0] * 3)
     _, strength, directions = np.linalg.svd(jacobian / scale)
     if strength[-1] < _FEEBLE:
-        free = _MOTIONS[int(np.abs(directions[-1]).argmax())]
+        # about the axle it is both turned and moved by as much: told is the turn
+        free = _MOTIONS[int(np.round(np.abs(directions[-1]), 6).argmax())]
         raise TouchedError(f"the points leave open how far the wheel is {free} of contact frame 0")
     worst = int(np.round(residuals, 9).argmax())  # of equal ones the first
     if residuals[worst] > largest_residual:
