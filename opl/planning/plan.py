@@ -100,6 +100,7 @@ class OutOfBudget:
     checks: int
 
 
+Same = tuple[int, bytes]  # IK branch and contact positions of a track
 SearchOutcome = Found | Exhausted | OutOfBudget
 
 
@@ -110,6 +111,7 @@ def propose_and_check(
     checks: int = 0,
     most_checks: int | None = None,
     most_work: float = np.inf,
+    collided: dict[Same, Collides] | None = None,
 ) -> SearchOutcome:
     """Check proposed tracks in turn until the motion of one is free; block what is not.
 
@@ -120,10 +122,11 @@ def propose_and_check(
         checks: How many motions were checked before.
         most_checks: How many to check at the most, those before included; None for no limit.
         most_work: In units, after which no other is checked.
+        collided: What is known to collide of such tracks; grows.
     """
     first, begun = checks, problem.scene.work
     of_a_check = WORK_OF_A_CHECK * len(problem.points)
-    collided: dict[tuple[int, bytes], Collides] = {}
+    collided = {} if collided is None else collided
     for track in proposals:
         matrix = matrices[track.matrix]
         # full turns bring the same bodies to the same places

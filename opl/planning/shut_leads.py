@@ -25,6 +25,8 @@ from opl.planning.problem import GrindingProblem
 from opl.search.walls import Piece
 
 AT_ONCE = 4  # configurations of a lead that are looked at together
+CELLS_OF_WORK = 15  # enclosed along a lead, that cost a unit of work
+NODES_OF_WORK = 100  # looked at along a lead, likewise
 HALVINGS = 10  # of the way between two contact positions of the field
 SPARE = 3e-4  # [m] of clearance, where samples are looked at
 # places of the part that each lead goes through as if they were ground, shape (k, 4, 4)
@@ -36,9 +38,13 @@ class ShutLeads:
 
     Args:
         problem: What is planned.
+
+    Attributes:
+        work: What was looked at so far, in units of work.
     """
 
     def __init__(self, problem: GrindingProblem) -> None:
+        self.work = 0.0
         self._problem = problem
         self._flips = wrist_flips(problem.cell.robot.arm)
         self._leads: dict[bytes, list[Leads]] = {}  # by the place
@@ -113,6 +119,7 @@ class ShutLeads:
             left = np.flatnonzero(~shut)
             for lead in leads:
                 cells = _Cells(self._problem, family, self._flips[flip], low[left], high[left])
+                self.work += len(left) / (CELLS_OF_WORK if (low < high).any() else NODES_OF_WORK)
                 left = left[cells.shut(T, lead)]
             shut[left] = True
         return shut

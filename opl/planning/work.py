@@ -59,4 +59,5 @@ class Work:
         asked = self._scene.work + self._tracks.queries / QUERIES
         made = self._walls.made * WORK_OF_A_WALL
         checked = self._tracks.places_checked * WORK_OF_A_CHECK
-        return asked + made + checked + self._families.work + self._tracks.sampler.work
+        sampler = self._tracks.sampler
+        return asked + made + checked + self._families.work + sampler.work + sampler.leads.work

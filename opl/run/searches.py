@@ -14,7 +14,7 @@ from opl.planning.cheapest import plan_cheapest
 from opl.planning.equals import quickest_of_equals
 from opl.planning.least_cost import least_cost
 from opl.planning.least_range import NoMotionError, plan_optimal
-from opl.planning.multi_start import plan_recursive, try_recursive
+from opl.planning.multi_start import RecursiveSearch, plan_recursive, try_recursive
 from opl.planning.plan import Exhausted, Found, ObjectiveValue, OutOfBudget, Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import no_path
@@ -73,14 +73,15 @@ def _search_range(
     search: Search, problem: GrindingProblem, report: Callable[[float], None]
 ) -> tuple[Plan, Plan]:
     """Return the plan of least joint range sum, and the recursive one where that was needed."""
-    last = try_recursive(problem, search.start, MOST_FIRST_CHECKS, MOST_FIRST_WORK)
+    in_turns = RecursiveSearch(problem, search.start)
+    last = in_turns.go_on(MOST_FIRST_CHECKS, MOST_FIRST_WORK)
     known = last.plan if isinstance(last, Found) else None
     if isinstance(last, Exhausted):
         raise no_path(problem, last.matrices)
 
     def otherwise(work: float) -> Plan | None:
         nonlocal last
-        last = try_recursive(problem, search.start, None, work)
+        last = in_turns.go_on(None, work)
         return last.plan if isinstance(last, Found) else None
 
     # where all that is proposed collides, the proof knows better where not to look

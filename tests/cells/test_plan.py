@@ -209,7 +209,7 @@ def test_a_search_that_finds_nothing_in_its_work_says_so_and_ends(monkeypatch):
     job = small_job()
     optimal = replace(job.search.optimal, max_subproblems=1)
     shut = with_scene(one_row_problem(), collision=Ghosts(np.zeros(6), radius=100.0))
-    with pytest.raises(NoPathError, match="the 1 best motions of the recursive search") as caught:
+    with pytest.raises(NoPathError, match="the 2 best motions of the recursive search") as caught:
         searches.search_path(replace(job.search, optimal=optimal), shut)
     least = caught.value.lower_bound
     assert 0.0 <= least <= plan_recursive(one_row_problem()).path.joint_range_sum
