@@ -190,7 +190,7 @@ class Adversary:
             knots = np.union1d(self._first, known.cutter_point)
             t = np.interp(knots, known.cutter_point, known.contact_position)
             self._look_at(knots)
-            best = self._followed(best, t, slots + known.ik_branch, tries)
+            best = self._followed(best, t, known.ik_branches, tries)
         turn = 0
         while known is None and self.tries < DRAWN * tries:
             turn += 1

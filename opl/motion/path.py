@@ -34,14 +34,14 @@ class GrindingPath:
     """Configurations on the wheel, joined by linear joint interpolation within a pass.
 
     Attributes:
-        ik_branch: Slot of the inverse kinematics that all configurations share.
+        ik_branches: Slot of the inverse kinematics of each pass, shape (n_passes,).
         q: Joint positions in [rad], shape (n, 6).
         contact_position: t of each configuration, shape (n,).
         cutter_point: Index of the cutter point, fractional at intermediate nodes, shape (n,).
         pass_index: The pass of each configuration, shape (n,).
     """
 
-    ik_branch: int
+    ik_branches: np.ndarray
     q: Array
     contact_position: Array
     cutter_point: Array
@@ -79,7 +79,7 @@ class GrindingPath:
             on_pass = np.flatnonzero(self.pass_index == index)
             first, last = (
                 PassEnd(
-                    kind, self.ik_branch, int(self.cutter_point[k]),
+                    kind, int(self.ik_branches[index]), int(self.cutter_point[k]),
                     float(self.contact_position[k]), self.q[k],
                 )
                 for kind, k in ((MoveKind.APPROACH, on_pass[0]), (MoveKind.RETRACT, on_pass[-1]))

@@ -136,7 +136,7 @@ def _away(
     """Return where approach or retract of a node is farthest off, None if it cannot be made."""
     nodes, leads = matrix.nodes, problem.scene.free_leads
     t = float(nodes.contact_position[column, row])
-    end = PassEnd(kind, nodes.ik_branch, column, t, nodes.at(column, row))
+    end = PassEnd(kind, int(nodes.ik_branch[column]), column, t, nodes.at(column, row))
     try:
         away = leads.find(problem.points, problem.process, end)
     except UnreachableApproachError:

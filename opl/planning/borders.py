@@ -59,7 +59,7 @@ def _moved(problem: GrindingProblem, path: GrindingPath, nameable: Nameable) -> 
         places = t[k] + offsets
         frame = problem.points.frames_at(path.cutter_point[[k]])
         found = inverse_solutions(cell, frame[:, None], places)[0]
-        turned = nearest_turn(found[:, path.ik_branch], q[k])
+        turned = nearest_turn(found[:, path.ik_branches[path.pass_index[k]]], q[k])
         usable = (np.abs(places) <= last) & ~np.isnan(turned).any(axis=1)
         usable[usable] = cell.within_limits(turned[usable]) & nameable(turned[usable], MARGIN)
         for near in (k - 1, k + 1):

@@ -164,11 +164,11 @@ class _Sampled:
     def sweep(self) -> None:
         """Close every node that collides."""
         self._swept = True
-        hits: dict[int, np.ndarray] = {}
-        asked: dict[int, np.ndarray] = {}
+        hits: dict[bytes, np.ndarray] = {}
+        asked: dict[bytes, np.ndarray] = {}
         for matrix in self.matrices:
             # full turns bring the same bodies to the same places
-            branch = matrix.nodes.ik_branch
+            branch = matrix.nodes.ik_branch.tobytes()
             hit = hits.setdefault(branch, np.zeros_like(matrix.free))
             known = asked.setdefault(branch, np.zeros_like(matrix.free))
             now = matrix.free & ~known
@@ -273,13 +273,13 @@ class _Sampled:
         problem = self._search._problem
         robot = problem.cell.robot
         sampler = self._search.sampler
-        flips = [(4 * k, *flip) for k, flip in enumerate(sampler.flips)]
+        flips = list(enumerate(sampler.flips))
         if sampler.collisions:
             flips = [flips[sampler.mirrored]]
         found: list[tuple[float, int, NodeMatrix]] = []
-        family = self._columns.placements[0].family
-        index = np.arange(q.shape[1])
-        for slot, sign, shift in flips:
+        pass_index, index = self._columns.points.pass_index, np.arange(q.shape[1])
+        for flip, (sign, shift) in flips:
+            slots = np.array([one.slot(flip) for one in self._columns.placements])[pass_index]
             moved = q * sign + shift
             low, high = np.nanmin(moved, axis=(0, 1)), np.nanmax(moved, axis=(0, 1))
             first = np.ceil((robot.lower - high) / (2.0 * np.pi))
@@ -293,8 +293,6 @@ class _Sampled:
                 at = np.where(within[..., None], turned, np.nan)
                 margin = np.minimum(turned - robot.lower, robot.upper - turned)
                 near = float((1.0 / np.maximum(np.nanmin(margin, axis=(0, 1)), 1e-3)).sum())
-                nodes = NodeMatrix(
-                    family + slot, Kept(np.ascontiguousarray(at)), self._columns.t, index
-                )
+                nodes = NodeMatrix(slots, Kept(np.ascontiguousarray(at)), self._columns.t, index)
                 found.append((near, len(found), nodes))
         return [nodes for _, _, nodes in sorted(found, key=lambda entry: entry[:2])]

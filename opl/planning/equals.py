@@ -99,7 +99,7 @@ def _image(problem: GrindingProblem, path: GrindingPath, choice: _Choice) -> Gri
     sign, shift = wrist_flips(problem.cell.robot.arm)[choice.flip]
     q = path.q * sign + shift + 2.0 * np.pi * choice.turns[path.pass_index]
     # with the wrist flipped, the slot of the inverse kinematics is one of the other four
-    return replace(path, ik_branch=path.ik_branch ^ (4 * choice.flip), q=q)
+    return replace(path, ik_branches=path.ik_branches ^ (4 * choice.flip), q=q)
 
 
 def _choices(problem: GrindingProblem, plan: Plan, keeps_ranges: bool) -> Iterator[_Choice]:

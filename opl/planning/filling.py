@@ -58,27 +58,36 @@ def fill_in(
     place = np.concatenate([*places, columns[-1:].astype(float)])
     for _ in range(MOST_HALVINGS):
         t = np.interp(place, columns, t_node)
-        q = _solve(cell, points, nodes.ik_branch, q_node, t, place)
+        ik_branch = nodes.ik_branch[place.astype(int)]
+        q = _solve(cell, points, ik_branch, q_node, t, place)
         pass_index = points.pass_index[place.astype(int)]
         on_wheel = np.diff(pass_index) == 0
         jumps = on_wheel & (np.abs(np.diff(q, axis=0)).max(axis=1) > rule.max_joint_step)
         error = _contact_error_between(cell, points, t_node, place, q, on_wheel)
         coarse = np.flatnonzero((error > rule.max_contact_error) | jumps)
         if not len(coarse):
-            return GrindingPath(nodes.ik_branch, q, t, place, pass_index)
+            first = np.unique(points.pass_index, return_index=True)[1]
+            return GrindingPath(nodes.ik_branch[first], q, t, place, pass_index)
         halves = (place[coarse] + place[coarse + 1]) / 2.0
         place = np.insert(place, coarse + 1, halves)
     raise BrokenEdgeError(int(place[coarse[0]]), "continuity")
 
 
 def _solve(
-    cell: WorkCell, points: CutterPoints, ik_branch: int, q_node: Array, t: Array, place: Array
+    cell: WorkCell,
+    points: CutterPoints,
+    ik_branch: np.ndarray,
+    q_node: Array,
+    t: Array,
+    place: Array,
 ) -> Array:
     """Return the configuration at each place, (n, 6); those of the nodes are kept to the bit."""
     columns = np.arange(len(q_node))
     q_guess = np.stack([np.interp(place, columns, joint) for joint in q_node.T], axis=-1)
     Ts_base_flange = cell.Ts_base_flange(t, points.frames_at(place))
-    q = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_guess)[:, ik_branch]
+    q = inverse_kinematics(cell.robot.arm, Ts_base_flange, q_guess)[
+        np.arange(len(place)), ik_branch
+    ]
     q = nearest_turn(q, q_guess)
     at_node = place == np.floor(place)
     q[at_node] = q_node[place[at_node].astype(int)]

@@ -1,12 +1,12 @@
 """The node matrix: every configuration that can grind each cutter point.
 
 A column is a cutter point, a row a contact position: a ladder graph whose rungs are the columns.
-Each IK branch has its own matrices, because a track never changes it (a change passes a
-singularity). Joints that turn more than once give a configuration several counts of
-full turns; where the angles of an IK branch leave a gap that no edge could cross, each count is a
-matrix of its own, elsewhere the counts are more rows of one matrix. Where nearly every joint turns
-twice, that would be hundreds of matrices that make the same motions: then the one in the middle of
-the limits stands for all.
+Each IK branch has its own matrices, because a track never changes it on the wheel (a change passes
+a singularity); from pass to pass it may. Joints that turn more than once give a configuration
+several counts of full turns; where the angles of an IK branch leave a gap that no edge could cross,
+each count is a matrix of its own, elsewhere the counts are more rows of one matrix. Where nearly
+every joint turns twice, that would be hundreds of matrices that make the same motions: then the one
+in the middle of the limits stands for all.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from opl.planning.turned import Configurations, Turned, blocks_of, unroll
 
 @dataclass(frozen=True)
 class NodeMatrix:
-    """The nodes of one IK branch, or of one count of full turns in it.
+    """The nodes of one IK branch in each pass, or of one count of full turns in it.
 
     Attributes:
-        ik_branch: Slot of the inverse kinematics, 0 to 7.
+        ik_branch: Slot of the inverse kinematics of each column, 0 to 7, shape (n_columns,).
         configurations: Joint positions of the nodes.
         contact_position: t of each node, shape (n_columns, n_rows).
         position_index: Which contact position of its column each row stands for, shape (n_rows,).
     """
 
-    ik_branch: int
+    ik_branch: np.ndarray
     configurations: Configurations
     contact_position: Array
     position_index: np.ndarray
@@ -141,7 +141,8 @@ def _matrices(
         exists = np.ascontiguousarray(within[:, copy, position_index])
         turned = Turned(by_joint, start, turns[copy], position_index, exists)
         t = np.broadcast_to(contact_positions[position_index], exists.shape)
-        found.append(NodeMatrix(ik_branch, turned, t, position_index))
+        branch = np.full(len(q), ik_branch)
+        found.append(NodeMatrix(branch, turned, t, position_index))
     return found
 
 

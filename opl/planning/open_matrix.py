@@ -113,7 +113,7 @@ class OpenMatrix:
         rows = np.flatnonzero(self.free[column])
         positions = self.nodes.position_index[rows]
         # full turns bring the same bodies to the same places, in this matrix and in others
-        key = self.nodes.ik_branch, column
+        key = int(self.nodes.ik_branch[column]), column
         known = self._collides.get(key, np.empty(0, dtype=np.int8))
         more = int(self.nodes.position_index.max()) + 1 - len(known)
         if more > 0:

@@ -37,6 +37,10 @@ class Placement:
         """The same for those that place alike, but for loose joints."""
         return self.family, self.number, self.shift.tobytes(), self.between
 
+    def slot(self, flip: int) -> int:
+        """Return the slot of the inverse kinematics, with a flip of the whole motion."""
+        return self.family + 4 * (self.number ^ flip)
+
     def holds(self, contact_position: Array) -> np.ndarray:
         """Return which contact positions in belt units the pass may use."""
         low, high = self.between

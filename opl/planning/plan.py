@@ -100,7 +100,7 @@ class OutOfBudget:
     checks: int
 
 
-Same = tuple[int, bytes]  # IK branch and contact positions of a track
+Same = tuple[bytes, bytes]  # IK branches and contact positions of a track
 SearchOutcome = Found | Exhausted | OutOfBudget
 
 
@@ -130,7 +130,7 @@ def propose_and_check(
     for track in proposals:
         matrix = matrices[track.matrix]
         # full turns bring the same bodies to the same places
-        same = matrix.nodes.ik_branch, matrix.nodes.t_along(track.rows).tobytes()
+        same = matrix.nodes.ik_branch.tobytes(), matrix.nodes.t_along(track.rows).tobytes()
         if same in collided:
             block(problem, matrix, track.rows, collided[same])
             continue

@@ -1,4 +1,4 @@
-"""Every node of one IK branch looked at: what it is, what it hits, and how it is reached.
+"""Every node of the passes, each on one IK branch: what it is, what it hits, how it is reached.
 
 For pictures: the search looks only at what it proposes.
 """
@@ -40,10 +40,9 @@ CODES = {state: code for code, state in enumerate(NodeState)}
 
 @dataclass(frozen=True, eq=False)
 class NodeSurvey:
-    """What each of N x M nodes of one IK branch is.
+    """What each of N x M nodes is, of one IK branch at each cutter point.
 
     Attributes:
-        ik_branch: The slot of the inverse kinematics.
         states: Code of each node, shape (N, M) of uint8.
         q: The configuration of each in [rad], within the limits where there is such a one; NaN out
             of reach; shape (N, M, 6).
@@ -56,7 +55,6 @@ class NodeSurvey:
         measured: Which nodes of both these are, shape (columns, positions).
     """
 
-    ik_branch: int
     states: np.ndarray
     q: Array
     hit: np.ndarray
@@ -68,20 +66,20 @@ class NodeSurvey:
     measured: np.ndarray
 
 
-def survey_nodes(problem: GrindingProblem, ik_branch: int, near: Array) -> NodeSurvey:
-    """Look at every node of an IK branch.
+def survey_nodes(problem: GrindingProblem, ik_branch: np.ndarray | int, near: Array) -> NodeSurvey:
+    """Look at every node of an IK branch, of that at each cutter point, shape (N,), or of one.
 
     Of configurations that differ by full turns, the one is taken that is nearest to `near` in
     [rad], shape (N, 6) or (6,), joint by joint.
     """
     robot, collision = problem.cell.robot, problem.scene.collision
-    q = _turned(problem.angles(ik_branch, np.arange(len(problem.points))), near, robot)
+    branches = np.broadcast_to(ik_branch, len(problem.points))
+    q = _turned(_angles(problem, branches), near, robot)
     reached = ~np.isnan(q[..., 0])
     states: np.ndarray = np.full(problem.cuts.shape, CODES[NodeState.LIMITS], dtype=np.uint8)
     for nodes in problem.field.matrices:
-        if nodes.ik_branch == ik_branch:
-            column, row = np.nonzero(nodes.exists)
-            states[column, nodes.position_index[row]] = CODES[NodeState.FREE]
+        column, row = np.nonzero(nodes.exists & (nodes.ik_branch == branches)[:, None])
+        states[column, nodes.position_index[row]] = CODES[NodeState.FREE]
     hit, pairs = np.full(states.shape, -1), dict[BodyPair, int]()
     states[problem.cuts] = CODES[NodeState.WHEEL]
     states[~reached] = CODES[NodeState.REACH]
@@ -98,7 +96,6 @@ def survey_nodes(problem: GrindingProblem, ik_branch: int, near: Array) -> NodeS
     grid = np.ix_(columns, positions)
     measured = states[grid] == CODES[NodeState.FREE]
     return NodeSurvey(
-        ik_branch,
         states,
         q,
         hit,
@@ -119,13 +116,22 @@ def widest_branch(problem: GrindingProblem) -> int:
     free = np.zeros((N_IK_BRANCHES, *problem.cuts.shape), dtype=bool)
     for nodes in problem.field.matrices:
         column, row = np.nonzero(problem.free_nodes(nodes))
-        free[nodes.ik_branch, column, nodes.position_index[row]] = True
+        free[nodes.ik_branch[column], column, nodes.position_index[row]] = True
     reached = problem.field.reached.sum(axis=0)
     ranks = [
         (int(free[k].any(axis=1).sum()), int(free[k].sum()), int(reached[k]))
         for k in range(N_IK_BRANCHES)
     ]
     return ranks.index(max(ranks))
+
+
+def _angles(problem: GrindingProblem, ik_branch: np.ndarray) -> Array:
+    """Return principal angles of the IK branch at each cutter point, shape (N, M, 6)."""
+    angles = np.empty((*problem.cuts.shape, 6))
+    for branch in np.unique(ik_branch).tolist():
+        own = np.flatnonzero(ik_branch == branch)
+        angles[own] = problem.angles(branch, own)
+    return angles
 
 
 def _turned(q: Array, near: Array, robot: Robot) -> Array:

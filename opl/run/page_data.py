@@ -93,7 +93,7 @@ def drawn_run(
 
     Args:
         prepared: What the search was given.
-        survey: Every node of the IK branch that is shown.
+        survey: Every node of the IK branch that is shown of each pass.
         moved: The motion as it is passed, and what is written of it; None without one.
     """
     packer, surfaced = Packer(), prepared.surfaced

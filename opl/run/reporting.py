@@ -11,6 +11,7 @@ from opl.cell.robot import Robot
 from opl.files.digests import digest
 from opl.job.search import Objective
 from opl.motion.feed import SlowStretch
+from opl.planning.fixed_contact import runs_of
 from opl.program.moves import CycleTime
 from opl.proof.corners import CornerProof
 from opl.proof.read_back import FileProof
@@ -112,7 +113,7 @@ def _path(planned: Planned) -> result.PathReport:
     return result.PathReport(
         method=search.method.value,
         objective=search.objective.value,
-        branch=ik_branch_name(path.ik_branch),
+        branch=_branch(path.ik_branches),
         joint_ranges_rad=_rounded(path.joint_ranges),
         joint_range_sum_rad=_rounded(path.joint_range_sum),
         joint_travel_rad=_rounded(path.joint_travel),
@@ -125,6 +126,17 @@ def _path(planned: Planned) -> result.PathReport:
         open_because=plan.open_because,
         weighted=objective if search.objective is Objective.WEIGHTED else None,
         objective_value=objective,
+    )
+
+
+def _branch(ik_branches: np.ndarray) -> str:
+    """Return the IK branch of all passes in words; where they differ, of each pass."""
+    slots = dict.fromkeys(ik_branches.tolist())
+    if len(slots) == 1:
+        return ik_branch_name(*slots)
+    return "; ".join(
+        f"{ik_branch_name(slot)} on pass {runs_of(np.flatnonzero(ik_branches == slot) + 1)}"
+        for slot in slots
     )
 
 

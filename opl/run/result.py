@@ -76,7 +76,7 @@ class PathReport:
 
     method: str
     objective: str
-    branch: str  # of the inverse kinematics, in words
+    branch: str  # of the inverse kinematics, in words; with its passes where these differ in it
     joint_ranges_rad: Sequence[float]
     joint_range_sum_rad: float
     joint_travel_rad: float

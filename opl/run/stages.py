@@ -151,8 +151,9 @@ def _positions(prepared: Prepared, exact: Motion, beside: Beside) -> tuple[Motio
 
 def _charted(prepared: Prepared, plan: Plan) -> Charted:
     path = plan.path
-    at_points = path.q[path.cutter_point % 1.0 == 0.0]
-    survey = survey_nodes(prepared.problem, path.ik_branch, at_points)
+    at_points = path.cutter_point % 1.0 == 0.0
+    branches = path.ik_branches[path.pass_index[at_points]]
+    survey = survey_nodes(prepared.problem, branches, path.q[at_points])
     return Charted(survey, draw_charts(prepared, plan, survey))
 
 

@@ -99,7 +99,7 @@ class Charted:
     """What charts show of a path, and those that are files of their own.
 
     Attributes:
-        survey: Every node of the path's IK branch.
+        survey: Every node of the IK branch that the path has in each pass.
         charts: Pictures as SVG texts by file name.
     """
 
@@ -159,7 +159,7 @@ class Planned:
 
     @property
     def survey(self) -> NodeSurvey:
-        """Every node of the path's IK branch, for pictures."""
+        """Every node of the IK branch that the path has in each pass, for pictures."""
         return self.charted.value().survey
 
     @property

@@ -38,7 +38,8 @@ def every_image(problem, path):
     """Yield every path that is the same on the wheel: flips by the inverse kinematics itself."""
     robot = problem.cell.robot
     Ts = forward_kinematics(robot, path.q)
-    for slot in (path.ik_branch, path.ik_branch ^ 4):
+    (branch,) = set(path.ik_branches.tolist())
+    for slot in (branch, branch ^ 4):
         first = inverse_kinematics(robot.arm, Ts)[:, slot]
         unrolled = np.unwrap(first, axis=0)
         for counts in product(range(-2, 3), repeat=6):
@@ -46,7 +47,7 @@ def every_image(problem, path):
                 continue  # these joints of the MH24 turn less than once
             q = unrolled + TURN * np.array(counts)
             if ((q > robot.lower) & (q < robot.upper)).all():
-                yield replace(path, ik_branch=slot, q=q)
+                yield replace(path, ik_branches=np.full_like(path.ik_branches, slot), q=q)
 
 
 def test_no_image_that_is_clear_of_the_limits_is_quicker():

@@ -122,7 +122,7 @@ def test_a_step_and_an_approach_beyond_a_limit_are_refused_by_name():
         whole_motion(cell, problem.points, path, problem.process)
     assert refused.value.cause == "limits of U only"
 
-    nodes = next(n for n in problem.field.matrices if n.ik_branch == path.ik_branch)
+    nodes = next(n for n in problem.field.matrices if n.ik_branch[0] == path.ik_branches[0])
     at_points = np.flatnonzero(path.cutter_point % 1.0 == 0.0)
     wanted = np.interp(path.contact_position[at_points], nodes.contact_position[0], np.arange(30))
     rows = np.round(wanted).astype(int)

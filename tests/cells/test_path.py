@@ -47,7 +47,7 @@ def rows_of(problem, plan):
     path = plan.path
     at_node = path.cutter_point % 1.0 == 0.0
     for nodes in problem.field.matrices:
-        if nodes.ik_branch != path.ik_branch:
+        if nodes.ik_branch[0] != path.ik_branches[0]:
             continue
         rows = []
         for column, q in enumerate(path.q[at_node]):
@@ -149,7 +149,9 @@ def test_figures_are_those_of_the_configurations():
 def test_figures_leave_out_the_way_from_pass_to_pass():
     q = np.zeros((4, 6))
     q[2:] = 1.0
-    path = GrindingPath(0, q, np.array([0.0, 1, 9, 9]), np.arange(4.0), np.array([0, 0, 1, 1]))
+    path = GrindingPath(
+        np.zeros(2, dtype=int), q, np.array([0.0, 1, 9, 9]), np.arange(4.0), np.array([0, 0, 1, 1])
+    )
     assert path.joint_travel == 0.0
     assert path.contact_travel == 1.0
     assert path.joint_range_sum == 6.0  # but the box holds both
@@ -163,13 +165,13 @@ def two_points(p_first=None, p_second=None, t=(0.0, 3.0)):
     problem = small_problem()
     frames = problem.points.Ts_workpiece_cutter[30:32].copy()
     q = problem.cell.Ts_base_flange(np.array(t), frames)
-    q = inverse_kinematics(problem.cell.robot.arm, q)[:, small_plan().path.ik_branch]
+    q = inverse_kinematics(problem.cell.robot.arm, q)[:, small_plan().path.ik_branches[0]]
     for k, p in enumerate((p_first, p_second)):
         if p is not None:
             frames[k, :3, 3] = p
     points = CutterPoints(frames, np.zeros(2, dtype=int), np.array([0.0, 0.004]))
     nodes = NodeMatrix(
-        small_plan().path.ik_branch,
+        small_plan().path.ik_branches[[0, 0]],
         Kept(np.repeat(q[:, None], 2, axis=1)),
         np.tile(t, (2, 1)),
         np.arange(2),

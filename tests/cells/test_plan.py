@@ -385,13 +385,13 @@ def test_runs_are_written_short(numbers, told):
 def test_states_say_what_rules_a_node_out():
     problem = one_row_problem()
     codes = {state: code for code, state in enumerate(NodeState)}
-    branch = small_plan().path.ik_branch
+    branch = small_plan().path.ik_branches[0]
     layer = problem.wheel_distance.copy()
     layer[5, 3] = -0.1
     angles = problem.field.angles[branch].copy()
     angles[6, 4] = np.nan
     angles = {**problem.field.angles, branch: angles}
-    nodes = next(n for n in problem.field.matrices if n.ik_branch == branch and n.exists.any())
+    nodes = next(n for n in problem.field.matrices if n.ik_branch[0] == branch and n.exists.any())
     column, row = np.argwhere(nodes.exists)[len(np.argwhere(nodes.exists)) // 2]
     ghost = Ghosts(nodes.q[column, row], 1e-3, haunted=problem.scene.collision)
     haunted = with_scene(problem, collision=ghost)

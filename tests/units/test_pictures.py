@@ -34,7 +34,7 @@ def contact_arguments(n_passes=5, n_points=60, n_positions=140, state=3):
         "pass_index": pass_index,
         "flat_end": 25.0,
         "path": GrindingPath(
-            0,
+            np.zeros(n_passes, dtype=int),
             np.zeros((len(place), 6)),
             40.0 + 5.0 * np.sin(place),
             place,
@@ -51,7 +51,7 @@ def joint_arguments(n_passes=5, n_points=60, fixed=True):
         "title": "v_shape: joint angles along the path",
         "robot": replace(load_robot("mh24"), lower=LOWER, upper=UPPER),
         "path": GrindingPath(
-            0,
+            np.zeros(n_passes, dtype=int),
             np.sin(place)[:, None] * swing,
             np.zeros(len(place)),
             place,
