@@ -21,7 +21,7 @@ from opl.planning.holders import Holder, holders
 from opl.planning.images import Images, seams_of
 from opl.planning.obstructed import Obstructions
 from opl.planning.passages import NO_PASSAGES, Passages, Rectangles
-from opl.planning.placement import Placement, alike
+from opl.planning.placement import Placement
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulge
@@ -165,7 +165,7 @@ class OptimalSearch:
                 self.proof.split()
             return
         looked_at = None
-        if alike(placements):
+        if placements:
             columns, passages, inner = looked_at = self._look(box, placements)
             self._hope(inner)
             allowed = MISSED * self._settings.widen * self.proof.threshold
@@ -207,7 +207,7 @@ class OptimalSearch:
             self.proof.show_soon()
         before = self._work.done
         least = self._value * (1.0 - CLEARLY_LESS)
-        if larger is None or larger.size > least or not alike(placements):
+        if larger is None or larger.size > least:
             return
         if self._early < FIRST_WORK + EARLY_SHARE * before:
             columns, _, inner = self._look(larger, placements)

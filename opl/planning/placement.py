@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,8 +51,3 @@ class Placement:
         placed = q * sign + shift + self.shift
         turns = 2.0 * np.pi * np.round((self.center - placed) / (2.0 * np.pi))
         return np.asarray(np.where(self.loose, placed + turns, placed))
-
-
-def alike(placements: Sequence[Placement]) -> bool:
-    """Return whether all passes are ground in one family with the wrist to one side."""
-    return len({(one.family, one.number) for one in placements}) == 1

@@ -11,8 +11,11 @@ import numpy as np
 import trimesh
 import yaml
 
+from opl.cell.robot import forward_kinematics, load_robot
 from opl.cli.commands import main
 from opl.files.resources import folder
+from opl.geometry.frames import pose
+from tests.support.surfaces import sphere_patch
 
 V_SHAPE = folder("workpieces") / "v_shape"
 V_JOB = V_SHAPE / "job.yaml"
@@ -152,3 +155,56 @@ def write_trough(home, width_mm=30.0, depth_mm=15.0):
     }
     (home / "surface.json").write_text(json.dumps(surface), encoding="utf-8")
     return job
+
+
+def write_ball(home):
+    """Write a job of two passes over the top of a ball, one on either side of it.
+
+    Where the top is ground in the middle of the wheel, the wrist is straight: it bends to one side
+    on one pass and to the other on the other. The axle is parallel to the axis of that bend.
+    """
+    radius, away = 0.04, 0.09  # in m; the middle of the ball from the flange
+    upright = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    T_flange_workpiece = pose(upright, np.array([0.0, 0.0, away]))
+    outward = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+    T_workpiece_cutter = pose(outward, np.array([radius, 0.0, 0.0]))
+    straight = np.deg2rad([15, 0, -40, 0, 0, 0])
+    T_base_flange = forward_kinematics(load_robot("mh24"), straight)
+    job = write_job(
+        home,
+        {
+            "name": "BALL",
+            "wheel.T_base_contact0_mm": _in_mm(
+                T_base_flange @ T_flange_workpiece @ T_workpiece_cutter
+            ),
+            "obstacles": [],
+            "fixture": {
+                "T_flange_workpiece_mm": _in_mm(T_flange_workpiece),
+                "bodies": [{"name": "stem", "cylinder_mm": [16, 60], "at_mm": [0, 0, 30]}],
+            },
+            "workpiece.mesh": "ball.stl",
+            "passes.plane_normal": [0, 1, 0],
+            "passes.pitch_mm": 10,
+            "passes.rows": 2,
+            "passes.max_step_mm": 2,
+            "process.approach_mm": 20,
+            "process.home_deg": [15, -30, -40, 0, 0, 0],
+        },
+        quick=False,
+    )
+    trimesh.creation.icosphere(4, 1000.0 * radius).export(home / "ball.stl")
+    patch = sphere_patch(1000.0 * radius, (-0.35, 0.35), (-0.35, 0.35))
+    write_surface(
+        home / "surface.json",
+        degree_u=2,
+        degree_v=2,
+        knots_u=patch.knots_u.tolist(),
+        knots_v=patch.knots_v.tolist(),
+        control_points_mm=patch.control_points.tolist(),
+        weights=patch.weights.tolist(),
+    )
+    return job
+
+
+def _in_mm(T):
+    return np.vstack([T[:3] * [1.0, 1.0, 1.0, 1000.0], T[3]]).round(6).tolist()
