@@ -120,7 +120,7 @@ def search(part: str, rows: int) -> None:
     with clock("search"):
         found = search_path(job.search, problem)
     plan = found.plan
-    assert plan.lower_bound is not None
+    assert plan.lower_bound is not None and found.recursive is not None
     path, other = plan.path, found.recursive.path
     assert plan.gap is not None
     print(

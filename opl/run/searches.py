@@ -14,7 +14,7 @@ from opl.planning.cheapest import plan_cheapest
 from opl.planning.equals import quickest_of_equals
 from opl.planning.least_cost import least_cost
 from opl.planning.least_range import NoMotionError, plan_optimal
-from opl.planning.multi_start import RecursiveSearch, plan_recursive, try_recursive
+from opl.planning.multi_start import RecursiveSearch, only_apart, plan_recursive, try_recursive
 from opl.planning.plan import Exhausted, Found, ObjectiveValue, OutOfBudget, Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import no_path
@@ -36,11 +36,12 @@ class FoundPaths:
     Attributes:
         plan: The path by the method and for the objective of the job, the quickest of its equals.
             Its approaches and retracts are no longer than they need be.
-        recursive: That of the paper's search; the same if the job wants nothing better.
+        recursive: That of the paper's search; the same if the job wants nothing better, None where
+            only the proof found one.
     """
 
     plan: Plan
-    recursive: Plan
+    recursive: Plan | None
 
 
 def search_path(
@@ -71,12 +72,12 @@ def search_path(
 
 def _search_range(
     search: Search, problem: GrindingProblem, report: Callable[[float], None]
-) -> tuple[Plan, Plan]:
-    """Return the plan of least joint range sum, and the recursive one where that was needed."""
+) -> tuple[Plan, Plan | None]:
+    """Return the plan of least joint range sum, and the recursive one where there is one."""
     in_turns = RecursiveSearch(problem, search.start)
     last = in_turns.go_on(MOST_FIRST_CHECKS, MOST_FIRST_WORK)
     known = last.plan if isinstance(last, Found) else None
-    if isinstance(last, Exhausted):
+    if isinstance(last, Exhausted) and not only_apart(problem, last.matrices):
         raise no_path(problem, last.matrices)
 
     def otherwise(work: float) -> Plan | None:
@@ -84,13 +85,15 @@ def _search_range(
         last = in_turns.go_on(None, work)
         return last.plan if isinstance(last, Found) else None
 
-    # where all that is proposed collides, the proof knows better where not to look
+    # where all that is proposed collides, the proof knows better where not to look; where passes
+    # cannot be ground on one IK branch, it gives each its own
+    others = None if isinstance(last, Exhausted) else otherwise
     try:
-        best = plan_optimal(problem, search.optimal, known, report, otherwise)
+        best = plan_optimal(problem, search.optimal, known, report, others)
     except NoMotionError as error:
         least = error.lower_bound
     else:
-        return best, last.plan if isinstance(last, Found) else best
+        return best, last.plan if isinstance(last, Found) else None
     if isinstance(last, Exhausted):
         raise no_path(problem, last.matrices)
     assert isinstance(last, OutOfBudget), "what was found is a plan"
@@ -158,7 +161,8 @@ def compare(prepared: Prepared, found: FoundPaths) -> Mapping[str, Figures]:
     paper_start = prepared.paper_start.value()
     if paper_start is not None:
         compared["paper_start"] = paper_start
-    compared["recursive"] = _figures(problem, found.recursive)
+    if found.recursive is not None:
+        compared["recursive"] = _figures(problem, found.recursive)
     if prepared.surfaced.job.search.method is Method.OPTIMAL:
         compared["optimal"] = _figures(problem, found.plan)
     return compared

@@ -1,11 +1,14 @@
-"""Where no track leads through a ladder: the shortest runs of columns that cannot be passed."""
+"""Where a track leads through a ladder, and the shortest runs of columns that cannot be passed."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from opl.files.kernels import kernel
 from opl.search.ladder import Ladder, allowed
+from opl.search.recursive import add_dead_ends
 
 
 def impasses(ladder: Ladder, blocked: np.ndarray) -> list[tuple[int, int]]:
@@ -38,6 +41,28 @@ def impasses(ladder: Ladder, blocked: np.ndarray) -> list[tuple[int, int]]:
         found.append((first, last))
         start = first + 1
     return found
+
+
+def passable(ladder: Ladder, blocked: np.ndarray, first: int, last: int) -> bool:
+    """Return whether a track leads from one column to another, by the others between them.
+
+    `blocked` as for `impasses`.
+    """
+    columns, edges = slice(first, last + 1), slice(first, last)
+    part = replace(
+        ladder,
+        q=ladder.q[columns],
+        free=np.ascontiguousarray(ladder.free[columns]),
+        contact_position=ladder.t_of_nodes[columns],
+        off_wheel=ladder.off_wheel[edges],
+        max_contact_change=ladder.contact_changes[edges],
+        sides=None if ladder.sides is None else ladder.sides[edges],
+    )
+    least, end = ladder.edge_key(first, 0, 0), ladder.edge_key(last, 0, 0)
+    own = blocked[(least <= blocked) & (blocked < end)] - least
+    dead = np.zeros_like(part.free)
+    add_dead_ends(part, own, dead)
+    return bool((part.free & ~dead)[0].any())
 
 
 @kernel(

@@ -8,16 +8,18 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+import yaml
 
 from opl.cell.full_turns import principal
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.job.load import load_job
 from opl.planning.least_range import plan_optimal
-from opl.planning.multi_start import plan_recursive
+from opl.planning.multi_start import only_apart, plan_recursive
+from opl.planning.open_matrix import open_matrices
 from opl.planning.survey import survey_nodes
 from opl.run.searches import search_path
-from tests.support.jobs import opl, write_ball
+from tests.support.jobs import opl, write_ball, write_robot
 from tests.support.planned import problem_of
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
@@ -76,6 +78,38 @@ def test_no_motion_with_the_wrist_to_one_side_comes_near(limit):
     plan = plan_optimal(problem, job.search.optimal, plan_recursive(problem))
     assert len(set(plan.path.ik_branches.tolist())) == 1
     assert plan.lower_bound > 1.5 * ball_plan().path.joint_range_sum
+
+
+NARROW = {"R": (-15, 15), "T": (-20, 20)}  # the wrist cannot turn half around between the passes
+
+
+def test_passes_that_no_branch_grinds_together_have_a_path(tmp_path):
+    job = write_ball(tmp_path)
+    write_robot(tmp_path / "arm", NARROW)
+    content = yaml.safe_load(job.read_text())
+    job.write_text(yaml.safe_dump({**content, "robot": "arm"}))
+    ended = opl("run", job, "--out", tmp_path / "out")
+    assert ended.status == 0, ended.err
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert "on pass 1; " in result["path"]["branch"]
+    assert result["path"]["gap"] <= 1e-3
+    assert "recursive" not in result["compared"]
+    recursive = opl("run", job, "--method", "recursive", "--out", tmp_path / "other")
+    assert "no path" in recursive.err
+
+
+def test_a_pass_that_no_branch_grinds_has_none():
+    problem = ball()
+    matrices = open_matrices(problem)
+    assert not only_apart(problem, matrices)  # one grinds both
+    for matrix in matrices:
+        matrix.free[16:] &= matrix.nodes.q[16:, :, B] > 0.0
+        matrix.free[:16] &= matrix.nodes.q[:16, :, B] < 0.0
+    assert only_apart(problem, matrices)
+    for matrix in matrices:
+        matrix.free[20] = False
+    assert not only_apart(problem, matrices)
+    assert not only_apart(problem, [])
 
 
 def test_the_survey_is_of_the_branch_of_each_pass():

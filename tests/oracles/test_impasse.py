@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from opl.search.impasse import impasses
+from opl.search.impasse import impasses, passable
 from opl.search.ladder import Ladder
 from tests.support.brute_force import all_tracks, keys_of, random_field
 
@@ -21,7 +21,7 @@ def part(ladder, blocked, first, last):
     return inner, {(c - first, a, b) for c, a, b in blocked if first <= c < last}
 
 
-def passable(ladder, blocked, first, last):
+def enumerated(ladder, blocked, first, last):
     return next(all_tracks(*part(ladder, blocked, first, last)), None) is not None
 
 
@@ -34,14 +34,27 @@ def test_impasses_are_the_smallest_runs_that_no_track_passes():
             (first, last)
             for first in range(n)
             for last in range(first, n)
-            if not passable(ladder, blocked, first, last)
-            and (first == last or passable(ladder, blocked, first + 1, last))
-            and (first == last or passable(ladder, blocked, first, last - 1))
+            if not enumerated(ladder, blocked, first, last)
+            and (first == last or enumerated(ladder, blocked, first + 1, last))
+            and (first == last or enumerated(ladder, blocked, first, last - 1))
         ]
         found = impasses(ladder, keys_of(ladder, blocked))
         assert found == expected
         told += len(found)
     assert told > 20
+
+
+def test_what_is_passable_is_what_some_track_passes():
+    told = 0
+    for seed in range(150):
+        ladder, blocked = random_field(seed)
+        keys = keys_of(ladder, blocked)
+        for last in range(len(ladder.q)):
+            for first in range(last + 1):
+                expected = enumerated(ladder, blocked, first, last)
+                assert passable(ladder, keys, first, last) == expected
+                told += not expected
+    assert told > 100
 
 
 def test_a_jump_of_all_configurations_is_the_impasse():
