@@ -103,8 +103,8 @@ def _certified(report: Report) -> Iterator[str]:
         yield (
             f"lower bound {path.lower_bound_rad:.6f} rad, gap {100.0 * path.gap:.4f} %: no motion "
             "along these passes has a smaller joint range sum, at any contact positions, on along "
-            "each pass and never back, each on one IK branch and count of full turns (approach, "
-            "links and retract not counted)"
+            "each pass and never back, each on an IK branch and count of full turns of its own "
+            "(approach, links and retract not counted)"
         )
     if not report.fixed.feasible:
         yield f"contact fixed at t = 0 is not feasible: {report.fixed.reason}"
