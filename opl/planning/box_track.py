@@ -22,7 +22,16 @@ from opl.planning.open_matrix import Track, open_matrices
 from opl.planning.passages import NO_PASSAGES, Passages
 from opl.planning.plan import Found, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem
-from opl.planning.rows import SMALLEST_EDGE, Bulge, Row, bars, crossed, levels, shut_edges
+from opl.planning.rows import (
+    MOST_PARTS,
+    SMALLEST_EDGE,
+    Bulge,
+    Row,
+    bars,
+    crossed,
+    levels,
+    shut_edges,
+)
 from opl.planning.settings import CostWeights
 from opl.planning.symmetry import twins
 from opl.planning.turned import Kept
@@ -34,7 +43,6 @@ from opl.search.smooth import Travel, smoothest_within
 
 SAMPLES = 17  # contact positions of a place
 ROUNDS = 3  # of sampling closer around a track
-MOST_PARTS = 8  # into which an edge that bulges is cut at once
 BULGE = 1.75  # times the room of a motion: how far it may leave its box between two places
 FINE_SHARE = 3e-5  # of the box: what an edge may bulge
 SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
@@ -111,8 +119,10 @@ class BoxTracks:
         coarse = sampled = _Sampled(self, at, rows, inner)
         track = sampled.smoothest()
         if track is None:
-            free, now = [matrix.free for matrix in sampled.matrices], sampled.problem
-            if learn(bars(places, free, now.sides, now.off_wheel)):
+            ladders = [
+                matrix.ladder_within(self._max_contact_change) for matrix in sampled.matrices
+            ]
+            if learn(bars(places, ladders)):
                 return None
             return self.plan(columns, NO_PASSAGES, box, room, learn) if rows else None
         bulges = sampled.bulges(track, box.widened(BULGE * room))

@@ -10,8 +10,10 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
 from opl.search.in_box import clipped
+from opl.search.ladder import Ladder
 
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
+MOST_PARTS = 8  # into which an edge that bulges is cut at once
 SAME = 1e-5  # cutter points that two places are apart at the least
 
 
@@ -106,26 +108,41 @@ def shut_edges(places: Array, t: Array, rows: Sequence[Row], box: JointBox) -> n
     return np.flatnonzero(shut)
 
 
-def bars(
-    places: Array, free: Sequence[np.ndarray], sides: np.ndarray | None, off_wheel: np.ndarray
-) -> list[Bulge]:
-    """Return after which places no track gets past what is shut, the first in each matrix.
+def bars(places: Array, ladders: Sequence[Ladder]) -> list[Bulge]:
+    """Return after which places no track gets further, the first in each ladder.
 
-    Args:
-        places: Fractional cutter points, shape (n,).
-        free: Which nodes of each matrix may be used, each of shape (n, m).
-        sides: As of `opl.search.ladder.Ladder`, shape (n - 1, 2, m).
-        off_wheel: Which edges leave the wheel, shape (n - 1,).
+    It would get past what is shut, or joints would turn further than an edge may.
     """
     found: list[Bulge] = []
-    if sides is None:
-        return found
-    for nodes in free:
-        reached = nodes[0]
-        for k, (here, there) in enumerate(sides):
-            reached = nodes[k + 1] & (np.isin(there, here[reached]) | off_wheel[k])
+    for ladder in ladders:
+        reached = ladder.free[0]
+        for k, there in enumerate(ladder.free[1:]):
+            if ladder.off_wheel[k]:
+                reached = there
+                continue
+            turned = _turned(ladder, k, reached, there)
+            reached = there.copy()
+            reached[there] = (turned <= 1.0).any(axis=0)
             if not reached.any():
                 if places[k + 1] - places[k] > SMALLEST_EDGE:
-                    found.append(Bulge(float(places[k]), float(places[k + 1]), 2, True))
+                    shut, least = not np.isfinite(turned).any(), turned.min(initial=np.inf)
+                    parts = 2 if shut else int(np.clip(np.ceil(least), 2, MOST_PARTS))
+                    found.append(Bulge(float(places[k]), float(places[k + 1]), parts, shut))
                 break
     return found
+
+
+def _turned(ladder: Ladder, k: int, here: np.ndarray, there: np.ndarray) -> Array:
+    """Return how far joints turn over edges from a place, in what they may, shape (a, b).
+
+    From some rows of the place to some of the next, flags of shape (m,); infinite where something
+    is shut in between.
+    """
+    t, q = ladder.t_of_nodes, ladder.q
+    change = np.abs(t[k + 1, there] - t[k, here][:, None])
+    steps = np.maximum(np.ceil(change / ladder.max_contact_step - 1e-9), 1.0)
+    largest = np.abs(q[k + 1, there] - q[k, here][:, None]).max(axis=-1)
+    turned = largest / (steps * ladder.max_joint_step)
+    if ladder.sides is not None:
+        turned[ladder.sides[k, 0, here][:, None] != ladder.sides[k, 1, there]] = np.inf
+    return np.asarray(np.where(change <= ladder.contact_changes[k] + 1e-9, turned, np.inf))
