@@ -16,8 +16,9 @@ from opl.files.kernels import kernel
 
 ROUND_OFF = 1e-9  # [rad] of the sums that make a bound
 MOST_PIVOTS = 400  # for one set of points
-MOST_ROUNDS = 24  # of adding points
-MOST_POINTS = 96  # added in all
+MOST_ROUNDS = 60  # of adding points
+POINTS = 96  # added in all, and
+POINTS_OF_A_WALL = 2  # for each more
 ENTERS = 1e-10  # [rad] gain below which a price is not raised
 PIVOT = 1e-9  # smallest that is divided by
 ENOUGH = 0.1  # of what is left to be closed: how near to the best prices are good enough
@@ -152,9 +153,10 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
                 n += 1
     # variables: a price for each of these, how much less than its first point a wall presses,
     # and slacks; rows: the objective, the faces, and points that press less than the first
+    most_points = POINTS + POINTS_OF_A_WALL * n_walls
     faces, points = 1 + n + n_walls, 13 + n + n_walls  # first slack of either
-    table = np.zeros((13 + MOST_POINTS, points + MOST_POINTS))
-    basis = np.empty(12 + MOST_POINTS, dtype=np.int64)
+    table = np.zeros((13 + most_points, points + most_points))
+    basis = np.empty(12 + most_points, dtype=np.int64)
     for i in range(n):
         table[0, 1 + i] = first[wall_of[i], face_of[i]]
         table[1 + face_of[i], 1 + i] = 1.0
@@ -164,8 +166,8 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
         table[1 + f, faces + f] = 1.0
         table[1 + f, 0] = 1.0 + 1e-9 * f  # no step is for nothing
         basis[f] = faces + f
-    point_wall = np.empty(MOST_POINTS, dtype=np.int64)
-    point_place = np.empty(MOST_POINTS)
+    point_wall = np.empty(most_points, dtype=np.int64)
+    point_place = np.empty(most_points)
     now = np.empty((n_walls, 12))
     press, press_cell = np.zeros(n_walls), np.zeros(n_walls, dtype=np.int64)
     n_points, bound = 0, -np.inf
@@ -210,7 +212,7 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
                             best, at, at_side = out, cell, side
             press[w], press_cell[w] = best, at
             least += best
-            if best < known - CLOSE / n_walls and n_points < MOST_POINTS:
+            if best < known - CLOSE / n_walls and n_points < most_points:
                 # this point presses less than those known: z >= y (first - this)
                 row = 13 + n_points
                 for i in range(n):
