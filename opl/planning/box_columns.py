@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.cut_cells import halved, surely_cuts_along
 from opl.planning.families import GROWN
-from opl.planning.images import Seams, wrist_flips
+from opl.planning.images import Seams, image_within_limits, wrist_flips
 from opl.planning.nodes import inverse_solutions
 from opl.planning.placement import Placement
 from opl.planning.problem import GrindingProblem, wheel_distances
@@ -19,6 +19,7 @@ from opl.planning.shut_leads import ShutLeads
 from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
 from opl.search.in_box import missing_chords, nearest_points, sampled
+from opl.search.joint_limits import about
 
 FINE = 33  # contact positions of a place at which a box is held against it
 POSTURES_OF_WORK = 400  # that cost a unit of work
@@ -38,8 +39,8 @@ class Columns:
         placements: The image that each pass uses.
         t: Contact positions, shape (n, m).
         q: Placed postures in [rad], NaN where there are none, shape (n, m, 6).
-        free: Which are within reach and do not cut into the wheel, as far as the field tells,
-            shape (n, m).
+        free: Which are within reach and limits and do not cut into the wheel, as far as the field
+            tells, shape (n, m).
     """
 
     places: Array
@@ -66,14 +67,16 @@ class ColumnSampler:
     Args:
         problem: What is to be planned.
         seams: Where angles are cut open.
+        limits: What boxes are within after full turns, infinite for joints without.
     """
 
-    def __init__(self, problem: GrindingProblem, seams: Seams) -> None:
+    def __init__(self, problem: GrindingProblem, seams: Seams, limits: JointBox) -> None:
         self._problem = problem
         self._seams = seams
         self.collisions = False  # whether postures that collide are left out
         self.mirrored = False  # whether they are those with the wrist flipped that may not collide
         self.leads = ShutLeads(problem)
+        self.limits = limits
         self.flips = wrist_flips(problem.cell.robot.arm)
         self.work = 0.0  # what was sampled so far, in units of work
 
@@ -99,7 +102,7 @@ class ColumnSampler:
         # where the part begins to cut is known to a hair only
         last = problem.cell.wheel.last_position
         t = np.clip(np.concatenate([t[:, :1] - BORDER, t, t[:, -1:] + BORDER], axis=1), -last, last)
-        columns = self._closer(self.at(places, there, placements, t), box)
+        columns = self._closer(self._within(box, self.at(places, there, placements, t)), box)
         if self.collisions:
             self._leave_out_collisions(columns, box)
             # where collisions begin is seen at the samples only
@@ -122,9 +125,14 @@ class ColumnSampler:
             high = t[own, np.minimum(np.ceil(row[own]).astype(int) + 1, last)]
             finer = np.linspace(low, high, last + 1, axis=1)
             places = columns.places[own]
-            found = self.at(places, self.there(places), [placement], finer)
+            found = self._within(box, self.at(places, self.there(places), [placement], finer))
             t[own], columns.q[own], columns.free[own] = finer, found.q, found.free
         return columns
+
+    def _within(self, box: JointBox, columns: Columns) -> Columns:
+        """Return columns without the postures beyond the limits where a box is within them."""
+        free = columns.free & about(box, self.limits).holds(columns.q)
+        return replace(columns, free=free)
 
     def _coarse(self, places: Array, placements: Sequence[Placement]) -> Array:
         """Return postures of places at the field's contact positions, shape (n, M, 6).
@@ -175,6 +183,7 @@ class ColumnSampler:
                 q[block][own] = self._placed(angles, placement)
         free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
         free &= _allowed(there.pass_index, placements, t)
+        free[free] = image_within_limits(problem.cell.robot, self.flips, q[free])
         if self.collisions:
             self._leave_out_leads(there, placements, t, free)
         return Columns(places, there, tuple(placements), t, q, free)

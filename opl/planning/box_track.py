@@ -39,6 +39,7 @@ from opl.search.box import JointBox
 from opl.search.in_box import missing as missing_of
 from opl.search.in_box import nearest
 from opl.search.in_box import sampled as samples_in
+from opl.search.joint_limits import cut_at
 from opl.search.smooth import Travel, smoothest_within
 
 SAMPLES = 17  # contact positions of a place
@@ -109,7 +110,7 @@ class BoxTracks:
         Returns:
             The motion; None if nothing is free, or if something was learnt instead.
         """
-        inner = box.widened(room / 2.0)
+        inner = cut_at(box.widened(room / 2.0), self.sampler.limits)
         t, spacing = samples_in(columns.t, columns.q, columns.free, inner, SAMPLES)
         places, rows, one = columns.places, passages.rows, t[:, :1]
         known = levels(places, rows, inner, one), crossed(places, passages.crossings, one)

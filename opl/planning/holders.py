@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
+from opl.search.box import JointBox
 from opl.search.cells import Forbidden
+from opl.search.joint_limits import UNLIMITED
 from opl.search.least_box import BoxProof
 from opl.search.walls import Image, Piece, Wall
 
@@ -49,6 +51,7 @@ def holders(
     cut: Callable[[Piece, int], Sequence[Piece]],
     value: float,
     forbidden: Forbidden | None = None,
+    limits: JointBox = UNLIMITED,
 ) -> tuple[Holder, ...]:
     """Return what holds the least box over some walls up, what could gain most first.
 
@@ -58,8 +61,9 @@ def holders(
         cut: Cuts a cell of a wall into smaller ones.
         value: Size of a box that is large enough, in [rad].
         forbidden: Tells which parts of cells are forbidden.
+        limits: What a box is within, as of `BoxProof`.
     """
-    _, prices = _least(walls, images, cut, value, forbidden)
+    _, prices = _least(walls, images, cut, value, forbidden, limits)
     pressing = np.argsort(-prices.sum(axis=1), kind="stable")[:MOST_HOLDERS].tolist()
     found = []
     for k in pressing:
@@ -68,7 +72,7 @@ def holders(
         if not held:
             continue
         others = [wall for index, wall in enumerate(walls) if index != k]
-        without, _ = _least(others, images, cut, value, forbidden)
+        without, _ = _least(others, images, cut, value, forbidden, limits)
         found.append(Holder(walls[k].place, walls[k].pass_index, held, without))
     return tuple(sorted(found, key=lambda one: one.bound_without))
 
@@ -79,12 +83,13 @@ def _least(
     cut: Callable[[Piece, int], Sequence[Piece]],
     value: float,
     forbidden: Forbidden | None = None,
+    limits: JointBox = UNLIMITED,
 ) -> tuple[float, Array]:
     """Return what no box over walls is smaller than, and how hard each presses on the least one.
 
     On the two faces of each joint, shape (n_walls, 6); 0 where the least box was not found.
     """
-    proof = BoxProof(images, cut, value * (1.0 + GAP), GAP / 2.0, forbidden)
+    proof = BoxProof(images, cut, value * (1.0 + GAP), GAP / 2.0, forbidden, limits)
     for wall in walls:
         proof.add(wall)
     while not proof.closed:

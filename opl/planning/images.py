@@ -16,6 +16,7 @@ from opl.cell.robot import Robot
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.geometry.frames import Array
 from opl.planning.nodes import SEAM_GAP
+from opl.search.box import JointBox
 from opl.search.walls import Image
 
 TOUCHING = 1e-9  # [turns] a limit that is only touched counts
@@ -110,6 +111,13 @@ class Images:
         """Sign and shift that make a posture with the wrist flipped of one without."""
         return wrist_flips(self._robot.arm)
 
+    @cached_property
+    def limits(self) -> JointBox:
+        """Limits of the joints that a flip of the wrist leaves as they are, else infinite."""
+        same = np.all([(sign == 1.0) & (shift == 0.0) for sign, shift in self.flips], axis=0)
+        lower, upper = self._robot.lower, self._robot.upper
+        return JointBox(np.where(same, lower, -np.inf), np.where(same, upper, np.inf))
+
     def of(self, family: int) -> list[Image]:
         """Return the images of a posture, the posture itself first."""
         if family not in self._images:
@@ -164,10 +172,17 @@ class Images:
 
     def within_limits(self, q: Array) -> np.ndarray:
         """Return which of some postures of a family have an image within the limits, shape (n,)."""
-        robot = self._robot
-        allowed = np.zeros(len(q), dtype=bool)
-        for sign, shift in self.flips:
-            moved = q * sign + shift
-            up = 2.0 * np.pi * np.ceil((robot.lower - moved) / (2.0 * np.pi))
-            allowed |= (moved + up <= robot.upper).all(axis=1)
-        return allowed
+        return image_within_limits(self._robot, self.flips, q)
+
+
+def image_within_limits(robot: Robot, flips: list[tuple[Array, Array]], q: Array) -> np.ndarray:
+    """Return which postures in [rad] full turns or a flip can bring within the limits, shape (n,).
+
+    The flips are as of `wrist_flips`.
+    """
+    allowed = np.zeros(len(q), dtype=bool)
+    for sign, shift in flips:
+        moved = q * sign + shift
+        up = 2.0 * np.pi * np.ceil((robot.lower - moved) / (2.0 * np.pi))
+        allowed |= (moved + up <= robot.upper).all(axis=1)
+    return allowed

@@ -75,7 +75,7 @@ class OptimalSearch:
         sides, t = barriers(problem), problem.field.contact_positions
         self._walls = ColumnWalls(problem.cell, part, points, images, sides)
         self._families = Families(images, q, problem.cuts, points.pass_index, t, sides)
-        self._sampler = ColumnSampler(problem, seams)
+        self._sampler = ColumnSampler(problem, seams, images.limits)
         costs, most_change = settings.costs, settings.max_contact_change
         self._tracks = BoxTracks(problem, self._sampler, costs, most_change, most)
         self.plan = fallback
@@ -87,7 +87,7 @@ class OptimalSearch:
         self._forbidden: Forbidden | None = None  # of collisions, once they are known to matter
         self._early = 0.0  # work on early motions
         self._in_vain = 0  # boxes in which none of these was free
-        self.proof = BoxProof(images.of, self._walls.finer, largest, PROOF_SHARE * settings.widen)
+        self.proof = self._new_proof(largest)
         self._places: set[float] = set()
         self._work = Work(problem.scene, self._walls, self._families, self._tracks)
         self._work.begin_again(self.proof)
@@ -134,8 +134,8 @@ class OptimalSearch:
 
     def holders(self) -> tuple[Holder, ...]:
         """Return what holds the least box over the walls up."""
-        walls, images = self.proof.walls, self._walls.images.of
-        return holders(walls, images, self._walls.finer, self._value, self._forbidden)
+        walls, images, cut = self.proof.walls, self._walls.images, self._walls.finer
+        return holders(walls, images.of, cut, self._value, self._forbidden, images.limits)
 
     def step(self) -> None:
         """Work on one subproblem."""
@@ -233,11 +233,16 @@ class OptimalSearch:
         self._places.clear()
         self.proof.put_back()  # before what is proven is noted
         self._told = self.plan is not None
-        made, gap = self._walls, PROOF_SHARE * self._settings.widen
-        minding = BoxProof(made.images.of, made.finer, self._value, gap, self._forbidden)
+        minding = self._new_proof(self._value)
         for wall in self.proof.walls:
             minding.add(wall)
         self._begin_again(minding, self._guess, 0.0)
+
+    def _new_proof(self, threshold: float) -> BoxProof:
+        """Return a proof without walls, for boxes below a size."""
+        images, gap = self._walls.images, PROOF_SHARE * self._settings.widen
+        kept = self._forbidden, images.limits
+        return BoxProof(images.of, self._walls.finer, threshold, gap, *kept)
 
     @property
     def _guess(self) -> float:

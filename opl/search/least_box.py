@@ -16,7 +16,9 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.bounding import distances, tighten, trim
+from opl.search.box import JointBox
 from opl.search.cells import END, FIRST, KEY, WALL, Cells, Forbidden
+from opl.search.joint_limits import UNLIMITED, beyond
 from opl.search.relaxation import least_box
 from opl.search.subproblems import Candidate, Relaxation, Subproblem
 from opl.search.walls import Image, Piece, Wall
@@ -44,6 +46,8 @@ class BoxProof:
         gap: Fraction by which the bound may stay below the threshold.
         forbidden: Tells which parts of cells are forbidden: asked only of what is left of a
             subproblem when nothing is gained by splitting it further.
+        limits: What boxes are within after full turns, the same of all they hold; infinite for
+            joints of which that is not known. None without limits.
     """
 
     def __init__(
@@ -53,9 +57,11 @@ class BoxProof:
         threshold: float,
         gap: float,
         forbidden: Forbidden | None = None,
+        limits: JointBox = UNLIMITED,
     ) -> None:
         self._cells = Cells(images, cut, forbidden)
         self._gap = gap
+        self._limits = limits
         self._begin(threshold)
 
     def _begin(self, threshold: float) -> None:
@@ -211,7 +217,8 @@ class BoxProof:
         for _ in range(MOST_TRIMS):
             self.work += NUMBERS_OF_A_CELL * float((spans[:, END] - spans[:, FIRST]).sum())
             passes = cells.pass_index[:n_walls], cells.n_keys
-            spans = spans[: tighten(table, spans, *passes, low, high, closing, sizes)]
+            limits = self._limits.lower, self._limits.upper
+            spans = spans[: tighten(table, spans, *passes, *limits, low, high, closing, sizes)]
             if not len(spans):
                 return False
             few = spans[self._few_cells(spans)]
@@ -243,14 +250,17 @@ class BoxProof:
         assert found is not None
         if np.count_nonzero(walls == 0) > 1:
             return 0, float(found.place[0])
-        missed, lost = np.full(node.n_walls, np.inf), found.lost.copy()
+        settled = SETTLED * self._gap * self.threshold
+        missed = np.full(node.n_walls, np.inf)
         np.minimum.at(missed, walls, distances(table, node.spans, found.low, found.high))
         first, end = node.spans[:, FIRST], node.spans[:, END]
         tiny = walls[(end == first + 1) & (table[first, 25] - table[first, 24] < SMALLEST)]
-        missed[tiny] = lost[tiny] = 0.0
-        score = np.maximum(missed, lost)
+        score = np.maximum(missed, found.lost)
+        box = JointBox(found.low, found.high)
+        np.maximum.at(score, walls, beyond(table, node.spans, box, self._limits, settled))
+        score[tiny] = 0.0
         wall = int(np.argmax(score))
-        if score[wall] > SETTLED * self._gap * self.threshold:
+        if score[wall] > settled:
             return wall, float(found.place[wall])
         return None
 

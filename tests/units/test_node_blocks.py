@@ -15,6 +15,7 @@ from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
 from opl.planning.problem import wheel_distances
 from opl.planning.symmetry import twins
 from opl.planning.turned import Kept
+from opl.search.joint_limits import UNLIMITED
 from tests.support.planned import small_problem
 
 
@@ -119,9 +120,9 @@ def test_places_near_a_box_are_sampled_alike_in_blocks(monkeypatch):
     whole = np.arange(len(points), dtype=float)
     between = whole[:-1][np.diff(points.pass_index) == 0] + 0.3
     places = np.union1d(whole, between)
-    at_once = ColumnSampler(problem, seams).columns(box, placements, places)
+    at_once = ColumnSampler(problem, seams, UNLIMITED).columns(box, placements, places)
     monkeypatch.setattr(turned, "AT_ONCE", 1)
-    in_blocks = ColumnSampler(problem, seams).columns(box, placements, places)
+    in_blocks = ColumnSampler(problem, seams, UNLIMITED).columns(box, placements, places)
     assert np.isfinite(at_once.q[..., 0]).any(axis=1).all()
     np.testing.assert_array_equal(in_blocks.t, at_once.t)
     np.testing.assert_array_equal(in_blocks.q, at_once.q)
