@@ -22,16 +22,7 @@ from opl.planning.open_matrix import Track, open_matrices
 from opl.planning.passages import NO_PASSAGES, Passages
 from opl.planning.plan import Found, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem
-from opl.planning.rows import (
-    MOST_PARTS,
-    SMALLEST_EDGE,
-    Bulge,
-    Row,
-    bars,
-    crossed,
-    levels,
-    shut_edges,
-)
+from opl.planning.rows import Bulge, Row, bars, bulging, crossed, levels, shut_edges
 from opl.planning.settings import CostWeights
 from opl.planning.symmetry import twins
 from opl.planning.turned import Kept
@@ -45,8 +36,6 @@ from opl.search.smooth import Travel, smoothest_within
 SAMPLES = 17  # contact positions of a place
 ROUNDS = 3  # of sampling closer around a track
 BULGE = 1.75  # times the room of a motion: how far it may leave its box between two places
-FINE_SHARE = 3e-5  # of the box: what an edge may bulge
-SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
 EDGES_OF_WORK = 3e5  # that cost a unit of work to search, all rounds
 MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
 MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
@@ -241,17 +230,8 @@ class _Sampled:
         spanned = nodes.along(track.rows)
         outer = JointBox(spanned.min(axis=0), spanned.max(axis=0))
         excess = missing_of(path.q, outer.widened(max(box.size - outer.size, 0.0)))
-        edge, t = path.cutter_point.astype(int), nodes.t_along(track.rows)
-        places, found = self._columns.places, []
-        for column in np.unique(edge[excess > 0.0]).tolist():
-            first, last = places[column : column + 2].tolist()
-            if last - first > SMALLEST_EDGE:
-                over = excess[edge == column].max() / (box.size * FINE_SHARE)
-                # falls with the square
-                parts = int(np.clip(np.ceil(np.sqrt(1.0 + over)), 2, MOST_PARTS))
-                steep = bool(abs(t[column + 1] - t[column]) > SWEEP * (last - first))
-                found.append(Bulge(first, last, parts, steep))
-        return found
+        where = path.cutter_point.astype(int), excess / box.size
+        return bulging(self._columns.places, nodes.t_along(track.rows), *where)
 
     def check(self, track: Track) -> Plan | None:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free."""

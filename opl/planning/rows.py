@@ -14,6 +14,8 @@ from opl.search.ladder import Ladder
 
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
 MOST_PARTS = 8  # into which an edge that bulges is cut at once
+FINE_SHARE = 3e-5  # of the box: what an edge may bulge
+SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
 SAME = 1e-5  # cutter points that two places are apart at the least
 
 
@@ -106,6 +108,27 @@ def shut_edges(places: Array, t: Array, rows: Sequence[Row], box: JointBox) -> n
         below = t < row.contact_position
         shut[edge] |= below[edge][:, :, None] != below[edge + 1][:, None, :]
     return np.flatnonzero(shut)
+
+
+def bulging(places: Array, t: Array, edge: np.ndarray, excess: Array) -> list[Bulge]:
+    """Return where a motion leaves its box between two places that are cut further.
+
+    Args:
+        places: Fractional cutter points, shape (n,).
+        t: Contact position at each, shape (n,).
+        edge: After which place each configuration of the motion is, shape (k,).
+        excess: By how much it is outside, in sizes of the box, shape (k,).
+    """
+    found = []
+    for column in np.unique(edge[excess > 0.0]).tolist():
+        first, last = places[column : column + 2].tolist()
+        if last - first > SMALLEST_EDGE:
+            over = excess[edge == column].max() / FINE_SHARE
+            # falls with the square
+            parts = int(np.clip(np.ceil(np.sqrt(1.0 + over)), 2, MOST_PARTS))
+            steep = bool(abs(t[column + 1] - t[column]) > SWEEP * (last - first))
+            found.append(Bulge(first, last, parts, steep))
+    return found
 
 
 def bars(places: Array, ladders: Sequence[Ladder]) -> list[Bulge]:
