@@ -32,6 +32,7 @@ Jobs
 
 Runs
     `run_job`           `Job` -> `Run`, which is `Written` or `Refused`
+    `job_ahead`         job file -> `Job`, its surface cut meanwhile in a process of its own
     `cut_surface`       `Job` -> `Surfaced`: cutter points, with warnings
     `plan_path`         `Surfaced` -> `Planned`; `Prepared` is what its search is given
     `verify_motion`     `Planned` -> `Proven`
@@ -135,6 +136,7 @@ if TYPE_CHECKING:
     from opl.program.ratios import import_pulse_ratios as import_pulse_ratios
     from opl.program.ratios import with_ratios as with_ratios
     from opl.report.arm_view import arm_view as arm_view
+    from opl.run.ahead import job_ahead as job_ahead
     from opl.run.batch import BatchRow as BatchRow
     from opl.run.batch import find_jobs as find_jobs
     from opl.run.delivery import deliver as deliver
@@ -209,6 +211,7 @@ _HOMES = {
     "opl.program.posts": "find_post known_posts",
     "opl.program.ratios": "import_pulse_ratios with_ratios",
     "opl.report.arm_view": "arm_view",
+    "opl.run.ahead": "job_ahead",
     "opl.run.batch": "BatchRow find_jobs",
     "opl.run.delivery": "deliver",
     "opl.run.job_folder": "claim_folder",

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import coal
 import numpy as np
 import pinocchio as pin
-from scipy.spatial import ConvexHull
 
 from opl.cell.robot import Robot, link_names
 from opl.cell.robot_file import N_JOINTS
@@ -128,6 +127,8 @@ def _ball() -> Array:
 
 def _hull(points: Array) -> TriangleMesh:
     """Return the convex hull of points, shape (n, 3)."""
+    from scipy.spatial import ConvexHull  # longer to load than to draw with
+
     hull = ConvexHull(points)
     corners = points[hull.simplices]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

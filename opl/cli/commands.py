@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,8 @@ def main() -> None:
 
     Example: opl run workpieces/v_shape/job.yaml
     """
+    # its threads wait for each other by spinning, on a core that other work of opl has
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 @main.command("run")
@@ -89,11 +92,13 @@ def run_job(
     Example: opl run workpieces/v_shape/job.yaml --out programs
     """
     gc.set_threshold(BETWEEN_COLLECTIONS)
-    loaded = opl.load_job(job, method=method)
-    folder = out or Path("out") / loaded.name
-    with opl.claim_folder(folder, loaded.name) as claim:
+    workers = workers or os.cpu_count() or 1
+    with ExitStack() as stack:
+        loaded, surfaced = stack.enter_context(opl.job_ahead(job, method, workers))
+        folder = out or Path("out") / loaded.name
+        claim = stack.enter_context(opl.claim_folder(folder, loaded.name))
         with progress_bar(quiet or as_json) as watch:
-            run = opl.run_job(loaded, watch, workers or os.cpu_count() or 1)
+            run = opl.run_job(loaded, watch, workers, surfaced)
         written = opl.deliver(opl.with_png(run) if png else run, claim)
     report = opl.make_report(run)
     if as_json:

@@ -81,19 +81,20 @@ class Beside:
     def __exit__(self, *_: object) -> None:
         self._end()
 
-    def start(self, *known: object) -> None:
-        """Make the copy, if there may be one.
+    def start(self, *known: object) -> bool:
+        """Make the copy, if there may be one; return whether there is one.
 
         Args:
             known: What there is now and will be handed over: the copy has it.
         """
         if not self._allowed or not hasattr(os, "fork") or threading.active_count() > 1:
-            return
+            return False
         for one in (self, *known):
             self._known.add(one)
         with suppress(OSError):  # no memory, no room, or too many processes
             self._to, self._back, self._turns = Line(), Line(), Turns()
             self._fork()
+        return self._process is not None
 
     def begin(self, later: Later[Any]) -> None:
         """Let the copy work out a value, after all that was begun before."""

@@ -7,7 +7,9 @@ Python calls are loaded.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache, cached_property
 from pathlib import Path
 from threading import Event
@@ -15,6 +17,9 @@ from types import FunctionType
 from typing import Any
 
 from opl.files.kernel_cache import settle_kernel_cache
+
+# numba looks for it when it is loaded, and needs it where a kernel multiplies matrices: none does
+_LINEAR_ALGEBRA = "scipy.linalg"
 
 prange = range  # numba's own in a kernel with threads
 
@@ -94,6 +99,11 @@ def kernel(
     return make
 
 
+def load_numba() -> None:
+    """Load numba, with what its first kernel needs."""
+    _numba()
+
+
 def load_kernels() -> None:
     """Load all kernels of the modules that are loaded, so that no job waits for them."""
     for made in _made:
@@ -120,10 +130,28 @@ def _numba() -> Any:
     """Return numba, to which a kernel is the compiled function."""
     settle_kernel_cache(Path(__file__).parents[1])  # before numba looks for it
     import numba
+    from numba.core.registry import cpu_target
     from numba.extending import typeof_impl
+
+    with _without(_LINEAR_ALGEBRA):
+        cpu_target.typing_context.refresh()
+        cpu_target.target_context.refresh()
 
     @typeof_impl.register(Kernel)
     def type_of(made: Kernel, _context: Any) -> Any:
         return numba.typeof(made.compiled)  # type: ignore[no-untyped-call]
 
     return numba
+
+
+@contextmanager
+def _without(library: str) -> Iterator[None]:
+    """Let a library seem not to be there, unless it is loaded."""
+    absent = library not in sys.modules
+    if absent:
+        sys.modules[library] = None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        if absent:
+            del sys.modules[library]

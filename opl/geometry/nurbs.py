@@ -6,6 +6,7 @@ Equation numbers are those of Piegl and Tiller, The NURBS Book, 2nd edition.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import comb
 from typing import TYPE_CHECKING
 
@@ -59,7 +60,6 @@ class NurbsSurface:
     knots_v: Array
     control_points: Array
     weights: Array
-    _homogeneous: NdBSpline = field(init=False, repr=False)
     _smallest_area: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -81,19 +81,26 @@ class NurbsSurface:
         _check_knots("u", self.degree_u, self.knots_u, points.shape[0])
         _check_knots("v", self.degree_v, self.knots_v, points.shape[1])
 
-        from scipy.interpolate import NdBSpline  # longer to load than to read most files
-
-        homogeneous = np.concatenate([weights[..., None] * points, weights[..., None]], axis=-1)
-        spline = NdBSpline(
-            (self.knots_u, self.knots_v),
-            homogeneous,
-            (self.degree_u, self.degree_v),
-            extrapolate=False,
-        )
-        object.__setattr__(self, "_homogeneous", spline)
         diagonal = np.ptp(points.reshape(-1, 3), axis=0)
         area = float(diagonal @ diagonal / np.ptp(self.domain, axis=0).prod())
         object.__setattr__(self, "_smallest_area", _DEGENERATE_AREA * area)
+
+    @cached_property
+    def _homogeneous(self) -> NdBSpline:
+        """The control points times their weights, with the weights, as a spline."""
+        from scipy.interpolate import NdBSpline  # longer to load than to read most files
+
+        weights = self.weights[..., None]
+        return NdBSpline(
+            (self.knots_u, self.knots_v),
+            np.concatenate([weights * self.control_points, weights], axis=-1),
+            (self.degree_u, self.degree_v),
+            extrapolate=False,
+        )
+
+    def __getstate__(self) -> dict[str, object]:
+        # where the surface is taken to it may be known, but not evaluated again
+        return {name: value for name, value in vars(self).items() if name != "_homogeneous"}
 
     @property
     def domain(self) -> Array:

@@ -1,9 +1,13 @@
 """Rotations as vectors and quaternions.
 
-SciPy's; it is loaded when one is first asked for, since that takes longer than short commands do.
+Most are SciPy's, which is loaded when one is first asked for: that takes longer than short commands
+do.
 """
 
 from __future__ import annotations
+
+import math
+from operator import itemgetter
 
 import numpy as np
 
@@ -49,9 +53,18 @@ def turn_of_change(turn: Array) -> Array:
 
 def quaternion(R: Array) -> Array:
     """Return the quaternion (x, y, z, w), w not negative, of a rotation of shape (3, 3)."""
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_matrix(R).as_quat(canonical=True))
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()
+    # four times the products of x, y, z, w with the largest of them: its sign is that of the whole
+    trace = xx + yy + zz
+    rows = (
+        (xx, 1.0 - trace + 2.0 * xx, yx + xy, zx + xz, zy - yz),
+        (yy, yx + xy, 1.0 - trace + 2.0 * yy, zy + yz, xz - zx),
+        (zz, zx + xz, zy + yz, 1.0 - trace + 2.0 * zz, yx - xy),
+        (trace, zy - yz, xz - zx, yx - xy, 1.0 + trace),
+    )
+    _, x, y, z, w = max(rows, key=itemgetter(0))
+    length = math.copysign(math.sqrt(x * x + y * y + z * z + w * w), w)
+    return np.array([x, y, z, w]) / length
 
 
 def from_quaternion(xyzw: Array) -> Array:

@@ -5,7 +5,7 @@ Its sections, and the cell file that many jobs share, are the other modules of t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -86,6 +86,42 @@ def load_job(
         InputError: If anything in it is unusable; names file and key path. Messages on a mapping
             begin with ``job``.
     """
+    given = {key for key, value in (("surface", surface), ("part", part)) if value is not None}
+    checked = check_job(source, folder, changes, given)
+    if isinstance(surface, NurbsSurface):
+        surface = Patchwork((Face(surface),))
+    return job_in_si(checked, method, surface, part)
+
+
+@dataclass(frozen=True)
+class CheckedJob:
+    """What a job says, before any file that it names is read.
+
+    Attributes:
+        source: The file or mapping.
+        content: Its keys and values.
+        file: The same, validated.
+    """
+
+    source: Source
+    content: object
+    file: JobFile
+
+
+def check_job(
+    source: Path | str | Mapping[str, Any],
+    folder: Path | None = None,
+    changes: Mapping[str, Any] | None = None,
+    given: Set[str] = frozenset(),
+) -> CheckedJob:
+    """Read and validate a job alone; arguments and errors are those of `load_job`.
+
+    Args:
+        source: A job file, or a mapping of the same keys.
+        folder: Where the relative file names in it are looked up.
+        changes: Values by key path that stand instead of the job's own.
+        given: What a program gives beside it, of ``surface`` and ``part``.
+    """
     content: object
     if isinstance(source, Mapping):
         origin, content = Source("job", folder or Path()), dict(source)
@@ -94,15 +130,22 @@ def load_job(
         origin = replace(origin, folder=folder or origin.folder)
     for path, value in (changes or {}).items():
         content = with_value(content, path, value)
-    given = {key for key, value in (("surface", surface), ("part", part)) if value is not None}
     if len(given) == 2 and isinstance(content, dict):
         content = {"workpiece": {}, **content}  # nothing is left for it to say
-    file = check(content, JobFile, origin.label, {GIVEN: given})
-    if isinstance(surface, NurbsSurface):
-        surface = Patchwork((Face(surface),))
-    job = _in_si(file, origin, method, surface, part)
+    return CheckedJob(origin, content, check(content, JobFile, origin.label, {GIVEN: given}))
+
+
+def job_in_si(
+    checked: CheckedJob,
+    method: str | None = None,
+    surface: MachinedSurface | None = None,
+    part: TriangleMesh | None = None,
+) -> Job:
+    """Return a job that is validated, with the files that it names; see `load_job`."""
+    job = _in_si(checked.file, checked.source, method, surface, part)
     values = {"surface": surface, "part": part}
-    return replace(job, inputs=input_digests(origin, content, job.cell.robot, values))
+    inputs = input_digests(checked.source, checked.content, job.cell.robot, values)
+    return replace(job, inputs=inputs)
 
 
 def _in_si(file: JobFile, source: Source, method: str | None,

@@ -1,10 +1,11 @@
-"""The highest path speeds by TOPP-RA, without the half second that loading its plots takes."""
+"""The highest path speeds by TOPP-RA, without the second that its plots and splines load for."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -13,18 +14,16 @@ import numpy as np
 
 from opl.geometry.frames import Array
 
-_PACKAGE, _PLOTS = "matplotlib", "matplotlib.pyplot"
+_LIBRARIES = ("matplotlib", "matplotlib.pyplot", "scipy.interpolate", "scipy.sparse")
 
 
 @contextmanager
-def _plots_on_demand() -> Iterator[None]:
-    """Hand out a stand-in for ``matplotlib.pyplot``, which loads that when it is first used."""
-    package, plots = ModuleType(_PACKAGE), ModuleType(_PLOTS)
-    package.__dict__["pyplot"] = plots
-    plots.__dict__["__getattr__"] = _plot
-    stand_ins = {_PACKAGE: package, _PLOTS: plots}
-    new = {name: one for name, one in stand_ins.items() if name not in sys.modules}
-    sys.modules.update(new)
+def _libraries_on_demand() -> Iterator[None]:
+    """Hand out stand-ins for libraries, whose functions load them when they are first called."""
+    new = [name for name in _LIBRARIES if name not in sys.modules]
+    for name in new:
+        stand_in = sys.modules[name] = ModuleType(name)
+        stand_in.__dict__["__getattr__"] = partial(_function, name)
     try:
         yield
     finally:
@@ -32,11 +31,11 @@ def _plots_on_demand() -> Iterator[None]:
             del sys.modules[name]
 
 
-def _plot(name: str) -> Any:
-    return getattr(import_module(_PLOTS), name)
+def _function(library: str, name: str) -> Callable[..., Any]:
+    return lambda *given, **named: getattr(import_module(library), name)(*given, **named)
 
 
-with _plots_on_demand():
+with _libraries_on_demand():
     from toppra.algorithm import TOPPRA
     from toppra.constraint import LinearConstraint
     from toppra.interpolator import AbstractGeometricPath

@@ -39,7 +39,12 @@ from opl.run.watch import Stage, Watch
 from opl.verification.replay import replay
 
 
-def run_job(job: Job, watch: Watch | None = None, workers: int = 1) -> Run:
+def run_job(
+    job: Job,
+    watch: Watch | None = None,
+    workers: int = 1,
+    surfaced: Later[Surfaced] | None = None,
+) -> Run:
     """Take a job through all stages: cut, plan, verify, write.
 
     Args:
@@ -47,6 +52,7 @@ def run_job(job: Job, watch: Watch | None = None, workers: int = 1) -> Run:
         watch: Follows the run, and can cancel it; one for each run, here and in each stage.
         workers: How many processes may work at a time; the same bytes come of any number. With two
             a copy of the process works beside it from the search on, unless it has threads.
+        surfaced: Its cutter points, where they are worked out elsewhere; see `job_ahead`.
 
     Returns:
         `Written` with a proven program, or `Refused` with the reason why there is none.
@@ -60,7 +66,11 @@ def run_job(job: Job, watch: Watch | None = None, workers: int = 1) -> Run:
     job_date()  # refused before the work, not after it
     watch = watch or Watch()
     with Beside(workers > 1) as beside:
-        run = _all_stages(cut_surface(job, watch), watch, beside)
+        if surfaced is None:
+            surfaced = Later(cut_surface, job)
+        with watch.stage(Stage.CUTTER_POINTS):
+            cut = surfaced.value()
+        run = _all_stages(cut, watch, beside)
         if isinstance(run, Refused):
             _work_out(run.reached)
         return run
