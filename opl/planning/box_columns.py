@@ -188,6 +188,15 @@ class ColumnSampler:
             self._leave_out_leads(there, placements, t, free)
         return Columns(places, there, tuple(placements), t, q, free)
 
+    def spared(self, columns: Columns, spare: Array) -> Columns:
+        """Leave out postures that leave less than some depth of that allowed, by place in [m]."""
+        asked = columns.free & (spare > 0.0)[:, None]
+        if not asked.any():
+            return columns
+        scene, needed = self._problem.scene, spare[:, None] - self._problem.cell.planned_penetration
+        distance = wheel_distances(scene, columns.points, columns.t, asked, needed)
+        return replace(columns, free=columns.free & (~asked | (distance >= needed)))
+
     def _leave_out_leads(
         self, there: CutterPoints, placements: Sequence[Placement], t: Array, free: np.ndarray
     ) -> None:

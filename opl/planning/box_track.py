@@ -18,13 +18,15 @@ from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.costs import track_cost
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.nodes import NodeField, NodeMatrix
-from opl.planning.open_matrix import Track, open_matrices
+from opl.planning.open_matrix import Track, close_collisions, open_matrices
 from opl.planning.passages import NO_PASSAGES, Passages
-from opl.planning.plan import Found, Plan, propose_and_check
+from opl.planning.plan import Found, Plan, Same, propose_and_check
 from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulge, Row, bars, bulging, crossed, levels, shut_edges
 from opl.planning.settings import CostWeights
+from opl.planning.sinking import first_sunk, places_for, shallower, spare_for, until_sunk
 from opl.planning.symmetry import twins
+from opl.planning.track_check import Collides
 from opl.planning.turned import Kept
 from opl.search.box import JointBox
 from opl.search.in_box import missing as missing_of
@@ -38,6 +40,7 @@ ROUNDS = 3  # of sampling closer around a track
 BULGE = 1.75  # times the room of a motion: how far it may leave its box between two places
 EDGES_OF_WORK = 3e5  # that cost a unit of work to search, all rounds
 MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
+MOST_SPARED = 4  # times that depth is spared in one box for what sinks between places
 MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
 
 
@@ -106,44 +109,50 @@ class BoxTracks:
         t = np.concatenate([t, *known], axis=1)
         self.sampler.work += len(t) * t.shape[1] ** 2 / EDGES_OF_WORK
         at = self.sampler.at(places, columns.points, columns.placements, t)
-        coarse = sampled = _Sampled(self, at, rows, inner)
-        track = sampled.smoothest()
+        coarse = sampled = _Sampled(self, at, rows, inner, np.zeros(len(t)))
+        track: Track | None = coarse.smoothest()
         if track is None:
-            ladders = [
-                matrix.ladder_within(self._max_contact_change) for matrix in sampled.matrices
-            ]
+            ladders = [matrix.ladder_within(self._max_contact_change) for matrix in coarse.matrices]
             if learn(bars(places, ladders)):
                 return None
             return self.plan(columns, NO_PASSAGES, box, room, learn) if rows else None
-        bulges = sampled.bulges(track, box.widened(BULGE * room))
+        bulges = coarse.bulges(track, box.widened(BULGE * room))
         if any(bulge.steep for bulge in bulges) and learn(bulges):
             return None
-        for _ in range(ROUNDS):
-            closer = sampled.closer(track, spacing)
-            if (finer := closer.smoothest()) is None:
+        sunk = before = None
+        for _ in range(MOST_SPARED + 1):
+            if track is None:
                 break
-            sampled, track, spacing = closer, finer, spacing * 2.0 / (SAMPLES - 1)
-        bulges = sampled.bulges(track, box.widened(BULGE * room))
-        if bulges and learn(bulges):
+            closest, track = sampled.closest(track, spacing)
+            if (bulges := closest.bulges(track, box.widened(BULGE * room))) and learn(bulges):
+                return None
+            plan, sunk = closest.check(track)
+            if plan is not None:
+                return plan
+            if sunk is None or not shallower(sunk, before):
+                break
+            before = sunk
+            sampled = _Sampled(self, at, rows, inner, spare_for(sampled.spare, sunk))
+            track = sampled.smoothest()
+        if sunk is not None and learn(places_for(places, sunk)):
             return None
-        plan = sampled.check(track)
-        if plan is not None:
-            return plan
         coarse.sweep()
         around = coarse.smoothest()
-        return None if around is None else coarse.check(around)
+        return None if around is None else coarse.check(around)[0]
 
 
 class _Sampled:
     """The nodes of some places at contact positions of their own."""
 
     def __init__(
-        self, search: BoxTracks, columns: Columns, rows: Sequence[Row], box: JointBox
+        self, search: BoxTracks, columns: Columns, rows: Sequence[Row], box: JointBox, spare: Array
     ) -> None:
+        columns = search.sampler.spared(columns, spare)
         self._search = search
         self._columns = columns
         self._rows = rows
         self._box = box
+        self.spare = spare  # depth in [m] that nodes leave of what is allowed, by column
         problem = search._problem
         q = np.where(
             (columns.free & nearest(columns.q, columns.free, box))[..., None], columns.q, np.nan
@@ -164,17 +173,7 @@ class _Sampled:
     def sweep(self) -> None:
         """Close every node that collides."""
         self._swept = True
-        hits: dict[bytes, np.ndarray] = {}
-        asked: dict[bytes, np.ndarray] = {}
-        for matrix in self.matrices:
-            # full turns bring the same bodies to the same places
-            branch = matrix.nodes.ik_branch.tobytes()
-            hit = hits.setdefault(branch, np.zeros_like(matrix.free))
-            known = asked.setdefault(branch, np.zeros_like(matrix.free))
-            now = matrix.free & ~known
-            hit[now] = self.problem.scene.collision.collides(matrix.nodes.q[now])
-            known |= now
-            matrix.free &= ~hit
+        close_collisions(self.matrices, self.problem.scene.collision)
 
     def smoothest(self) -> Track | None:
         """Return the smoothest track in the matrix that is farthest from the limits."""
@@ -216,7 +215,17 @@ class _Sampled:
         last = search._problem.cell.wheel.last_position
         t = np.clip(own[:, None] + about * spacing[:, None], -last, last)
         around = search.sampler.at(columns.places, columns.points, columns.placements, t)
-        return _Sampled(search, around, self._rows, self._box)
+        return _Sampled(search, around, self._rows, self._box, self.spare)
+
+    def closest(self, track: Track, spacing: Array) -> tuple[_Sampled, Track]:
+        """Return samples closer and closer around a track, and the smoothest track in them."""
+        sampled: _Sampled = self
+        for _ in range(ROUNDS):
+            closer = sampled.closer(track, spacing)
+            if (finer := closer.smoothest()) is None:
+                break
+            sampled, track, spacing = closer, finer, spacing * 2.0 / (SAMPLES - 1)
+        return sampled, track
 
     def bulges(self, track: Track, box: JointBox) -> list[Bulge]:
         """Return where a track leaves the box on its way from place to place."""
@@ -233,31 +242,32 @@ class _Sampled:
         where = path.cutter_point.astype(int), excess / box.size
         return bulging(self._columns.places, nodes.t_along(track.rows), *where)
 
-    def check(self, track: Track) -> Plan | None:
-        """Return the plan of a track, or of the next smoothest, if its whole motion is free."""
+    def check(self, track: Track) -> tuple[Plan | None, Array | None]:
+        """Return the plan of a track, or of the next smoothest, if its whole motion is free.
+
+        One that sinks is the last: others do so as well. `sunk_between` of it, if it does.
+        """
         search, places = self._search, self._columns.places
         most = search.checks + MOST_CHECKS
         while search.checks < most:
-            proposals = twins(self.matrices, track, self.problem.cell.robot)
-            before = search.checks
-            outcome = propose_and_check(self.problem, self.matrices, proposals, before)
+            tracks = twins(self.matrices, track, self.problem.cell.robot)
+            before, hits = search.checks, dict[Same, Collides]()
+            tries = until_sunk(self.problem, tracks, hits)
+            outcome = propose_and_check(self.problem, self.matrices, tries, before, collided=hits)
             now = outcome.plan if isinstance(outcome, Found) else outcome
             search.checks = now.checks
             search.places_checked += (search.checks - before) * len(places)
             if isinstance(outcome, Found):
-                plan = outcome.plan
-                path, motion = plan.path, plan.motion
-                columns = np.arange(len(places))
-                original = np.interp(path.cutter_point, columns, places)
-                motion = motion.renumbered(np.interp(motion.cutter_point, columns, places))
-                return replace(plan, path=replace(path, cutter_point=original), motion=motion)
+                return outcome.plan.at_places(places), None
+            if (sunk := first_sunk(self.problem, hits)) is not None:
+                return None, sunk
             if not self._swept:
                 self.sweep()
             following = self.smoothest()
             if following is None:
                 break
             track = following
-        return None
+        return None, None
 
     def _images(self, q: Array) -> list[NodeMatrix]:
         """Return the matrices that make these postures elsewhere in joint space, best first."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Any
@@ -173,3 +174,18 @@ def open_matrices(problem: GrindingProblem) -> list[OpenMatrix]:
         free = problem.free_nodes(nodes)
         matrices.append(OpenMatrix(nodes, free, ladders, _collides=collides))
     return matrices
+
+
+def close_collisions(matrices: Sequence[OpenMatrix], scene: CollisionScene) -> None:
+    """Close every node that collides in matrices of the same places and contact positions."""
+    hits: dict[bytes, np.ndarray] = {}
+    asked: dict[bytes, np.ndarray] = {}
+    for matrix in matrices:
+        # full turns bring the same bodies to the same places
+        branch = matrix.nodes.ik_branch.tobytes()
+        hit = hits.setdefault(branch, np.zeros_like(matrix.free))
+        known = asked.setdefault(branch, np.zeros_like(matrix.free))
+        now = matrix.free & ~known
+        hit[now] = scene.collides(matrix.nodes.q[now])
+        known |= now
+        matrix.free &= ~hit

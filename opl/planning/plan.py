@@ -8,10 +8,11 @@ it ends with the track it would have found had all collisions been known before.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opl.geometry.frames import Array
 from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
 from opl.planning.blocking import block
@@ -71,6 +72,13 @@ class Plan:
         if self.lower_bound is None:
             return None
         return 1.0 - self.lower_bound / self.path.joint_range_sum
+
+    def at_places(self, places: Array) -> Plan:
+        """Return the plan of points that are places of others: fractional ones, shape (n,)."""
+        path, motion, columns = self.path, self.motion, np.arange(len(places))
+        path = replace(path, cutter_point=np.interp(path.cutter_point, columns, places))
+        motion = motion.renumbered(np.interp(motion.cutter_point, columns, places))
+        return replace(self, path=path, motion=motion)
 
 
 @dataclass(frozen=True)

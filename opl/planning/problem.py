@@ -147,18 +147,21 @@ def wheel_distances(
     points: CutterPoints,
     contact_positions: Array,
     at: np.ndarray | None = None,
+    needed: Array | None = None,
 ) -> Array:
     """Return the signed distance of the part to the wheel at nodes in [m], shape (N, M).
 
     As in `signed_wheel_distance`: exact where it is less than the belt penetration permits.
 
     Contact positions are for all cutter points, shape (M,), or of each, shape (N, M). If `at` is
-    given, shape (N, M), all other nodes are minus infinity, not free.
+    given, shape (N, M), all other nodes are minus infinity, not free. If `needed` is given, shape
+    (N, 1), distances of each cutter point are exact where they are less than that.
     """
     cell = scene.cell
     if at is None:
         at = np.ones((len(points), contact_positions.shape[-1]), dtype=bool)
     layer = np.full(at.shape, -np.inf)
+    allowed = np.full((len(at), 1), -cell.planned_penetration) if needed is None else needed
     Ts_cutter_workpiece = inverse(points.Ts_workpiece_cutter)
     t = np.broadcast_to(contact_positions, at.shape)
     for block in blocks_of(*at.shape):
@@ -167,6 +170,6 @@ def wheel_distances(
         # cutter and contact coincide, whatever robot brings the part there
         Ts = cell.wheel.T_contact0_contact(t[block][asked]) @ Ts_cutter_workpiece[block][columns]
         layer[block][asked] = signed_wheel_distance(
-            scene.part, cell.wheel, Ts, -cell.planned_penetration
+            scene.part, cell.wheel, Ts, allowed[block][columns, 0]
         )
     return layer

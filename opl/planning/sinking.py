@@ -1,0 +1,101 @@
+"""Where a motion sinks too deep into the wheel between two places, though it does not at both.
+
+Flat triangles stand in for a curved part, and a joint line leads past its contact: on the way from
+place to place the part is a few micrometres deeper than at the places themselves. Tracks that run
+where the part is as deep as allowed are shut by that, one after the other; so places are left a
+spare depth, as much as was seen to be too little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from opl.cell.robot import forward_kinematics
+from opl.cell.wheel_distance import signed_wheel_distance
+from opl.cell.wheel_triangle import TOLERANCE
+from opl.cell.workcell import PART, WHEEL
+from opl.geometry.frames import Array
+from opl.motion.motion import Phase
+from opl.planning.open_matrix import Track
+from opl.planning.plan import Same
+from opl.planning.problem import GrindingProblem
+from opl.planning.rows import SMALLEST_EDGE, Bulge
+from opl.planning.track_check import Collides
+
+LOOKS = 8  # along a move that sinks too deep
+USELESS = 0.5  # of what was too deep: where so much still is, sparing depth is of no use
+MORE = 1.25  # times what was too deep: what is spared for it
+
+
+def sunk_between(problem: GrindingProblem, blocked: Collides) -> Array:
+    """Return by how much the part is too deep between columns in [m], 0 elsewhere, (n - 1,).
+
+    Args:
+        problem: What is to be planned, of n columns.
+        blocked: A motion, and its moves that collide.
+    """
+    cell, motion = problem.cell, blocked.motion
+    sunk = np.zeros(len(problem.points) - 1)
+    phases = motion.phase
+    moves = [
+        fault.move
+        for fault in blocked.faults
+        if fault.pair == (PART, WHEEL) and phases[fault.move] is Phase.GRINDING
+    ]
+    if not moves:
+        return sunk
+    share = np.arange(LOOKS + 1)[:, None] / LOOKS
+    q = np.stack([motion.q[k - 1] + share * (motion.q[k] - motion.q[k - 1]) for k in moves])
+    Ts = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, q))
+    allowed = -cell.planned_penetration
+    distance = signed_wheel_distance(problem.scene.part, cell.wheel, Ts, allowed)
+    too_deep = np.maximum(allowed - distance.min(axis=1), 0.0) + TOLERANCE
+    edge = np.ceil(motion.cutter_point[moves]).astype(int) - 1
+    np.maximum.at(sunk, edge, too_deep)
+    return sunk
+
+
+def first_sunk(problem: GrindingProblem, collided: Mapping[Same, Collides]) -> Array | None:
+    """Return `sunk_between` of the first motion that sinks, None if none does."""
+    for blocked in collided.values():
+        sunk = sunk_between(problem, blocked)
+        if sunk.any():
+            return sunk
+    return None
+
+
+def until_sunk(
+    problem: GrindingProblem, tracks: Sequence[Track], collided: Mapping[Same, Collides]
+) -> Iterator[Track]:
+    """Yield tracks, all with the same part at the same places, until the motion of one sinks.
+
+    Those of others would do so as well; what collides is noted in ``collided`` meanwhile.
+    """
+    for track in tracks:
+        if first_sunk(problem, collided) is not None:
+            return
+        yield track
+
+
+def shallower(sunk: Array, before: Array | None) -> bool:
+    """Return whether what was spared for what sank before, if anything, was of use there."""
+    return before is None or not ((before > 0.0) & (sunk > USELESS * before)).any()
+
+
+def spare_for(spare: Array, sunk: Array) -> Array:
+    """Return what columns leave of the depth allowed, (n,), after what was spared was too little.
+
+    Args:
+        spare: What they left in [m], shape (n,).
+        sunk: As of `sunk_between`.
+    """
+    here = np.maximum(np.append(sunk, 0.0), np.append(0.0, sunk))
+    return np.asarray(spare + MORE * here)
+
+
+def places_for(places: Array, sunk: Array) -> Sequence[Bulge]:
+    """Return where places are wanted between those that a motion sinks too deep between."""
+    edges = np.flatnonzero((sunk > 0.0) & (np.diff(places) > SMALLEST_EDGE)).tolist()
+    return [Bulge(float(places[k]), float(places[k + 1]), 2, False) for k in edges]
