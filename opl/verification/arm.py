@@ -71,7 +71,7 @@ def as_placed(T: Array) -> At:
 
 def as_pose(position: Sequence[float], xyzw: Sequence[float]) -> Array:
     """Return a pose as Bullet gives it, shape (4, 4)."""
-    T = np.eye(4)
-    T[:3, :3] = np.reshape(pybullet.getMatrixFromQuaternion(xyzw), (3, 3))
-    T[:3, 3] = np.divide(position, SCALE)
-    return T
+    xx, xy, xz, yx, yy, yz, zx, zy, zz = pybullet.getMatrixFromQuaternion(xyzw)
+    x, y, z = (along / SCALE for along in position)
+    rows = (xx, xy, xz, x), (yx, yy, yz, y), (zx, zy, zz, z), (0.0, 0.0, 0.0, 1.0)
+    return np.array(rows)
