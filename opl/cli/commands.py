@@ -95,6 +95,7 @@ def run_job(
     workers = workers or os.cpu_count() or 1
     with ExitStack() as stack:
         loaded, surfaced = stack.enter_context(opl.job_ahead(job, method, workers))
+        gc.freeze()  # what is loaded by now stays: no collection goes through it, here or in a copy
         folder = out or Path("out") / loaded.name
         claim = stack.enter_context(opl.claim_folder(folder, loaded.name))
         with progress_bar(quiet or as_json) as watch:
