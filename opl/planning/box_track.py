@@ -69,7 +69,7 @@ class BoxTracks:
         self._max_contact_change = max_contact_change
         self._most = most
         self._wider = CollisionScene(problem.cell.widened(costs.push_away))
-        self.checks = self.places_checked = 0
+        self.checks = self.places_checked = self.collided = 0  # those that sink aside
 
     @property
     def queries(self) -> int:
@@ -261,6 +261,7 @@ class _Sampled:
                 return outcome.plan.at_places(places), None
             if (sunk := first_sunk(self.problem, hits)) is not None:
                 return None, sunk
+            search.collided += 1
             if not self._swept:
                 self.sweep()
             following = self.smoothest()

@@ -212,10 +212,10 @@ class OptimalSearch:
         if self._early < FIRST_WORK + EARLY_SHARE * before:
             columns, _, inner = self._look(larger, placements)
             if inner is not None:
-                room, checks = self._room(inner), self._tracks.checks
+                room, collided = self._room(inner), self._tracks.collided
                 found = self._tracks.plan(columns, NO_PASSAGES, inner, room, lambda _: False)
                 self.keep(found)
-                self._in_vain += int(found is None and self._tracks.checks > checks)
+                self._in_vain += int(found is None and self._tracks.collided > collided)
             self._early += self._work.done - before
 
     def _hope(self, box: JointBox | None) -> None:
