@@ -67,18 +67,25 @@ class ColumnSampler:
     Args:
         problem: What is to be planned.
         seams: Where angles are cut open.
-        limits: What boxes are within after full turns, infinite for joints without.
+        limits: What boxes are within after full turns, with each flip of the wrist.
     """
 
-    def __init__(self, problem: GrindingProblem, seams: Seams, limits: JointBox) -> None:
+    def __init__(self, problem: GrindingProblem, seams: Seams, limits: Sequence[JointBox]) -> None:
         self._problem = problem
         self._seams = seams
         self.collisions = False  # whether postures that collide are left out
         self.mirrored = False  # whether they are those with the wrist flipped that may not collide
         self.leads = ShutLeads(problem)
-        self.limits = limits
+        self._limits = tuple(limits)
         self.flips = wrist_flips(problem.cell.robot.arm)
         self.work = 0.0  # what was sampled so far, in units of work
+
+    @property
+    def limits(self) -> Sequence[JointBox]:
+        """What boxes are within, with the flip of the wrist that may not collide, if it is told."""
+        if self.collisions and len(self._limits) > 1:
+            return (self._limits[int(self.mirrored)],)
+        return self._limits
 
     def columns(self, box: JointBox, placements: Sequence[Placement], places: Array) -> Columns:
         """Sample the postures of places where they are near to a box.

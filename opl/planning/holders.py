@@ -51,7 +51,7 @@ def holders(
     cut: Callable[[Piece, int], Sequence[Piece]],
     value: float,
     forbidden: Forbidden | None = None,
-    limits: JointBox = UNLIMITED,
+    limits: Sequence[JointBox] = UNLIMITED,
 ) -> tuple[Holder, ...]:
     """Return what holds the least box over some walls up, what could gain most first.
 
@@ -83,7 +83,7 @@ def _least(
     cut: Callable[[Piece, int], Sequence[Piece]],
     value: float,
     forbidden: Forbidden | None = None,
-    limits: JointBox = UNLIMITED,
+    limits: Sequence[JointBox] = UNLIMITED,
 ) -> tuple[float, Array]:
     """Return what no box over walls is smaller than, and how hard each presses on the least one.
 

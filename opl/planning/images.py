@@ -112,11 +112,16 @@ class Images:
         return wrist_flips(self._robot.arm)
 
     @cached_property
-    def limits(self) -> JointBox:
-        """Limits of the joints that a flip of the wrist leaves as they are, else infinite."""
-        same = np.all([(sign == 1.0) & (shift == 0.0) for sign, shift in self.flips], axis=0)
+    def limits(self) -> tuple[JointBox, ...]:
+        """Limits of postures without a flip that the robot makes with each flip of the wrist."""
         lower, upper = self._robot.lower, self._robot.upper
-        return JointBox(np.where(same, lower, -np.inf), np.where(same, upper, np.inf))
+        return tuple(
+            JointBox(
+                np.where(sign > 0.0, lower - shift, shift - upper),
+                np.where(sign > 0.0, upper - shift, shift - lower),
+            )
+            for sign, shift in self.flips
+        )
 
     def of(self, family: int) -> list[Image]:
         """Return the images of a posture, the posture itself first."""

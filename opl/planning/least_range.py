@@ -18,11 +18,12 @@ class NoMotionError(Exception):
 
     Args:
         lower_bound: No motion has a smaller joint range sum, in [rad].
+        proven: Whether it is proven that there is none.
     """
 
-    def __init__(self, lower_bound: float) -> None:
+    def __init__(self, lower_bound: float, proven: bool) -> None:
         super().__init__(f"no motion found; none is below {lower_bound:.4f} rad")
-        self.lower_bound = lower_bound
+        self.lower_bound, self.proven = lower_bound, proven
 
 
 def plan_optimal(
@@ -61,6 +62,7 @@ def plan_optimal(
         search.keep(otherwise(OTHERWISE_SHARE * settings.max_subproblems))
         go_on(1.0)
     if search.plan is None:
-        raise NoMotionError(search.lower_bound)
+        robot, least = problem.cell.robot, search.lower_bound
+        raise NoMotionError(least, least > float((robot.upper - robot.lower).sum()))
     bound, why, held = search.lower_bound, search.open_because, search.holders()
     return replace(search.plan, lower_bound=bound, open_because=why, holders=held)

@@ -43,12 +43,15 @@ class RecursiveSearch:
     Args:
         problem: What is to be planned.
         start: From which start nodes.
+
+    Attributes:
+        matrices: What is blocked, and why.
     """
 
     def __init__(self, problem: GrindingProblem, start: Start) -> None:
         self._problem = problem
-        self._matrices = open_matrices(problem)
-        self._tracks = _tracks(problem, self._matrices, start)
+        self.matrices = open_matrices(problem)
+        self._tracks = _tracks(problem, self.matrices, start)
         self._checks = 0
         self._collided: dict[Same, Collides] = {}
 
@@ -56,7 +59,7 @@ class RecursiveSearch:
         """Return what is found within a number of motions more to be checked, and work."""
         most = None if most_checks is None else self._checks + most_checks
         outcome = propose_and_check(
-            self._problem, self._matrices, self._tracks, self._checks, most, most_work,
+            self._problem, self.matrices, self._tracks, self._checks, most, most_work,
             self._collided,
         )  # fmt: skip
         if isinstance(outcome, OutOfBudget):

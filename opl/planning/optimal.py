@@ -65,8 +65,9 @@ class OptimalSearch:
         self._settings = settings
         q = problem.solutions(few_columns(problem.points.pass_index))
         seams = seams_of(q)
-        robot = problem.cell.robot
-        largest, most = float((robot.upper - robot.lower).sum()), Travel(np.inf, np.inf)
+        robot, most = problem.cell.robot, Travel(np.inf, np.inf)
+        # the proof, closed below that, leaves no motion
+        largest = float((robot.upper - robot.lower).sum()) / (1.0 - settings.widen)
         if fallback is not None:
             largest = fallback.path.joint_range_sum
             most = Travel(fallback.path.joint_travel, fallback.path.contact_travel)
@@ -91,8 +92,7 @@ class OptimalSearch:
         self._places: set[float] = set()
         self._work = Work(problem.scene, self._walls, self._families, self._tracks)
         self._work.begin_again(self.proof)
-        positions = whole_cells(problem.cell.wheel)
-        self._rectangles = Rectangles(self._sampler, points, positions)
+        self._rectangles = Rectangles(self._sampler, points, whole_cells(problem.cell.wheel))
         self._hope(self._families.smallest_grown())
         self.proof.threshold = min(self.proof.threshold, self._guess)
         first = [0.0, float(len(points) // 2), float(len(points) - 1)]

@@ -17,7 +17,7 @@ from opl.planning.least_range import NoMotionError, plan_optimal
 from opl.planning.multi_start import RecursiveSearch, only_apart, plan_recursive, try_recursive
 from opl.planning.plan import Exhausted, Found, ObjectiveValue, OutOfBudget, Plan
 from opl.planning.problem import GrindingProblem
-from opl.planning.reasons import no_path
+from opl.planning.reasons import explain, no_path
 from opl.planning.settings import ObjectiveWeights, Start
 from opl.planning.weighted import plan_weighted
 from opl.run.values import Prepared
@@ -91,12 +91,19 @@ def _search_range(
     try:
         best = plan_optimal(problem, search.optimal, known, report, others)
     except NoMotionError as error:
-        least = error.lower_bound
+        least, proven = error.lower_bound, error.proven
     else:
         return best, last.plan if isinstance(last, Found) else None
     if isinstance(last, Exhausted):
         raise no_path(problem, last.matrices)
     assert isinstance(last, OutOfBudget), "what was found is a plan"
+    if proven:
+        raise NoPathError(
+            "no path: proven for all contact positions, each pass on an IK branch of its own: no "
+            "motion along these passes keeps reach, limits and the plan's clearances with leads as "
+            "the job sets them",
+            explain(problem, in_turns.matrices),
+        )
     raise NoPathError(
         f"no path found: the {last.checks} best motions of the recursive search are not free, and "
         "the proof found none in the work allowed, only that none along these passes has a joint "

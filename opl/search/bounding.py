@@ -12,24 +12,30 @@ MOST_ROUNDS = 12  # of cutting spans off; more would cut little
 STILL = 1e-6  # [rad] a core that grows by less in a round has stopped growing
 
 
-@kernel("boolean(float64[:,::1],int64,float64[::1],float64[::1],float64[::1],float64[::1])")
-def _within_limits(cells, cell, low, high, lower, upper):  # type: ignore[no-untyped-def]
-    """Return whether full turns may bring a box about a core and a cell within the limits."""
-    for j in range(6):
-        if upper[j] < np.inf:
-            a, b = cells[cell, j], cells[cell, 6 + j]
-            least = min(max(a, b) + cells[cell, 18 + j], low[j]) + ROUND_OFF
-            most = max(min(a, b) + cells[cell, 12 + j], high[j]) - ROUND_OFF
-            if lower[j] + 2.0 * np.pi * np.ceil((most - upper[j]) / (2.0 * np.pi)) > least:
-                return False
-    return True
+@kernel("boolean(float64[:,::1],int64,float64[::1],float64[::1],float64[:,:,::1])")
+def _within_limits(cells, cell, low, high, limits):  # type: ignore[no-untyped-def]
+    """Return whether a box about a core and a cell may be within any of the limits."""
+    for k in range(len(limits)):
+        kept = True
+        for j in range(6):
+            if limits[k, 1, j] < np.inf:
+                a, b = cells[cell, j], cells[cell, 6 + j]
+                least = min(max(a, b) + cells[cell, 18 + j], low[j]) + ROUND_OFF
+                most = max(min(a, b) + cells[cell, 12 + j], high[j]) - ROUND_OFF
+                turns = 2.0 * np.pi * np.ceil((most - limits[k, 1, j]) / (2.0 * np.pi))
+                if limits[k, 0, j] + turns > least:
+                    kept = False
+                    break
+        if kept:
+            return True
+    return False
 
 
 @kernel(
-    "int64(float64[:,::1],int64[:,::1],int64[::1],int64,float64[::1],float64[::1],float64[::1],"
-    "float64[::1],float64,float64[::1])"
+    "int64(float64[:,::1],int64[:,::1],int64[::1],int64,float64[:,:,::1],"
+    "float64[::1],float64[::1],float64,float64[::1])"
 )
-def tighten(cells, spans, pass_index, n_keys, lower, upper, low, high, closing, sizes):  # type: ignore[no-untyped-def]
+def tighten(cells, spans, pass_index, n_keys, limits, low, high, closing, sizes):  # type: ignore[no-untyped-def]
     """Cut off what no box below a size can hold; return how many spans are left, 0 if none can be.
 
     Args:
@@ -37,9 +43,8 @@ def tighten(cells, spans, pass_index, n_keys, lower, upper, low, high, closing, 
         spans: Sorted by their walls; those left are moved to the front, shape (n, 5).
         pass_index: Of each wall, shape (k,).
         n_keys: Number of keys.
-        lower: Limits that the box keeps after full turns, the same of all it holds, in [rad],
-            shape (6,); infinite for joints without.
-        upper: The upper ones.
+        limits: Lower and upper ones of which the box keeps those of one flip, after full turns, the
+            same of all it holds, in [rad], shape (m, 2, 6); infinite for joints without.
         low: The lower faces of the box are not above these, lowered, in [rad], shape (6,).
         high: The upper faces are not below these, raised.
         closing: The size in [rad].
@@ -68,7 +73,7 @@ def tighten(cells, spans, pass_index, n_keys, lower, upper, low, high, closing, 
                             max(a, b) + cells[cell, 18 + j], low[j]
                         )
                         size += max(edge, 0.0)
-                    if size < closing and _within_limits(cells, cell, low, high, lower, upper):
+                    if size < closing and _within_limits(cells, cell, low, high, limits):
                         if begin < 0:
                             begin = cell
                         stop = cell + 1

@@ -46,8 +46,8 @@ class BoxProof:
         gap: Fraction by which the bound may stay below the threshold.
         forbidden: Tells which parts of cells are forbidden: asked only of what is left of a
             subproblem when nothing is gained by splitting it further.
-        limits: What boxes are within after full turns, the same of all they hold; infinite for
-            joints of which that is not known. None without limits.
+        limits: What a box is within after full turns of all that it holds, where the robot makes
+            the motion with each flip of the wrist.
     """
 
     def __init__(
@@ -57,11 +57,12 @@ class BoxProof:
         threshold: float,
         gap: float,
         forbidden: Forbidden | None = None,
-        limits: JointBox = UNLIMITED,
+        limits: Sequence[JointBox] = UNLIMITED,
     ) -> None:
         self._cells = Cells(images, cut, forbidden)
         self._gap = gap
         self._limits = limits
+        self._tells_flips = forbidden is not None and len(limits) > 1
         self._begin(threshold)
 
     def _begin(self, threshold: float) -> None:
@@ -214,11 +215,11 @@ class BoxProof:
         low, high, table = node.low.copy(), node.high.copy(), cells.table
         sizes, place, lost = (np.empty(n_walls) for _ in range(3))
         box, prices = np.empty((2, 6)), np.empty((n_walls, 12))
+        limits = np.array([(one.lower, one.upper) for one in self._limits_of(spans)])
         for _ in range(MOST_TRIMS):
             self.work += NUMBERS_OF_A_CELL * float((spans[:, END] - spans[:, FIRST]).sum())
             passes = cells.pass_index[:n_walls], cells.n_keys
-            limits = self._limits.lower, self._limits.upper
-            spans = spans[: tighten(table, spans, *passes, *limits, low, high, closing, sizes)]
+            spans = spans[: tighten(table, spans, *passes, limits, low, high, closing, sizes)]
             if not len(spans):
                 return False
             few = spans[self._few_cells(spans)]
@@ -239,6 +240,13 @@ class BoxProof:
         node.found = Relaxation(box[0], box[1], place, lost, closing, cells.changes)
         return True
 
+    def _limits_of(self, spans: np.ndarray) -> Sequence[JointBox]:
+        """Return the limits of a subproblem: of each flip, or of that with which it is made."""
+        if not self._tells_flips or np.count_nonzero(spans[:, WALL] == 0) != 1:
+            return self._limits
+        flip = int(self._cells.mirrored(spans))
+        return self._limits[flip : flip + 1]
+
     def _few_cells(self, spans: np.ndarray) -> np.ndarray:
         """Return which spans are of walls with so few cells left that they are worth a price."""
         cells = np.bincount(spans[:, WALL], weights=spans[:, END] - spans[:, FIRST])
@@ -257,7 +265,8 @@ class BoxProof:
         tiny = walls[(end == first + 1) & (table[first, 25] - table[first, 24] < SMALLEST)]
         score = np.maximum(missed, found.lost)
         box = JointBox(found.low, found.high)
-        np.maximum.at(score, walls, beyond(table, node.spans, box, self._limits, settled))
+        away = beyond(table, node.spans, box, self._limits_of(node.spans), settled)
+        np.maximum.at(score, walls, away)
         score[tiny] = 0.0
         wall = int(np.argmax(score))
         if score[wall] > settled:

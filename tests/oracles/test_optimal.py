@@ -23,7 +23,7 @@ from opl.planning.cheapest import plan_cheapest
 from opl.planning.columns import ColumnWalls
 from opl.planning.images import Images, seams_of
 from opl.planning.least_cost import least_cost
-from opl.planning.least_range import plan_optimal
+from opl.planning.least_range import NoMotionError, plan_optimal
 from opl.planning.multi_start import plan_recursive
 from opl.planning.obstructed import Obstructions
 from opl.planning.settings import ObjectiveWeights
@@ -516,3 +516,30 @@ def test_prices_scale_and_are_added_up():
     assert travel <= plan.path.joint_travel
     both = sum_of(problem, plan, ObjectiveWeights(0.0, 1.0, 1.0))
     assert 0.0 < least_cost(problem, 1.0, 1.0) <= both
+
+
+def test_where_joints_cannot_turn_as_far_as_they_must_it_is_proven_that_there_is_no_motion():
+    problem = one_row()
+    needed = recursive(one_row).path.q
+    joint = int(np.argmax(np.ptp(needed, axis=0)))
+    middle, least = (needed.max(axis=0) + needed.min(axis=0)) / 2.0, least_range_of(problem, joint)
+    assert least > 0.01
+    robot = problem.cell.robot
+    lower, upper = robot.lower.copy(), robot.upper.copy()
+    lower[joint], upper[joint] = middle[joint] - 0.45 * least, middle[joint] + 0.45 * least
+    cell = replace(problem.cell, robot=replace(robot, lower=lower, upper=upper))
+    with pytest.raises(NoMotionError) as refused:
+        plan_optimal(with_scene(problem, cell=cell), SETTINGS, None)
+    assert refused.value.proven
+    assert refused.value.lower_bound > float((upper - lower).sum())
+
+
+def least_range_of(problem, joint):
+    """Return the least range of a joint over all tracks, each column at any node of one matrix."""
+    least = np.inf
+    for nodes in problem.field.matrices:
+        angles = np.where(problem.free_nodes(nodes), nodes.q[..., joint], np.nan)
+        if not np.isnan(angles).all(axis=1).any():
+            spread = np.nanmin(angles, axis=1).max() - np.nanmax(angles, axis=1).min()
+            least = min(least, spread)
+    return least
