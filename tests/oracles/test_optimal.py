@@ -519,27 +519,12 @@ def test_prices_scale_and_are_added_up():
 
 
 def test_where_joints_cannot_turn_as_far_as_they_must_it_is_proven_that_there_is_no_motion():
-    problem = one_row()
-    needed = recursive(one_row).path.q
-    joint = int(np.argmax(np.ptp(needed, axis=0)))
-    middle, least = (needed.max(axis=0) + needed.min(axis=0)) / 2.0, least_range_of(problem, joint)
-    assert least > 0.01
-    robot = problem.cell.robot
-    lower, upper = robot.lower.copy(), robot.upper.copy()
-    lower[joint], upper[joint] = middle[joint] - 0.45 * least, middle[joint] + 0.45 * least
-    cell = replace(problem.cell, robot=replace(robot, lower=lower, upper=upper))
+    problem, known = one_row(), optimal(one_row)
+    q, robot = known.path.q, problem.cell.robot
+    middle, half = (q.max(axis=0) + q.min(axis=0)) / 2.0, 0.475 * np.ptp(q, axis=0)
+    assert float(2.0 * half.sum()) < known.lower_bound
+    narrow = replace(robot, lower=middle - half, upper=middle + half)
     with pytest.raises(NoMotionError) as refused:
+        cell = replace(problem.cell, robot=narrow)
         plan_optimal(with_scene(problem, cell=cell), SETTINGS, None)
     assert refused.value.proven
-    assert refused.value.lower_bound > float((upper - lower).sum())
-
-
-def least_range_of(problem, joint):
-    """Return the least range of a joint over all tracks, each column at any node of one matrix."""
-    least = np.inf
-    for nodes in problem.field.matrices:
-        angles = np.where(problem.free_nodes(nodes), nodes.q[..., joint], np.nan)
-        if not np.isnan(angles).all(axis=1).any():
-            spread = np.nanmin(angles, axis=1).max() - np.nanmax(angles, axis=1).min()
-            least = min(least, spread)
-    return least
