@@ -55,6 +55,10 @@ def test_kernels_of_other_code_are_not_taken(tmp_path, monkeypatch):
     assert first.parent == tmp_path / "given"
     assert place("a = 1", "b = 2") == first
     assert place("a = 2", "b = 2") != first
+    # nor those that were compiled in another way
+    (package / "files").mkdir()
+    (package / "files" / "kernels.py").write_text("cache = True")
+    assert place("a = 1", "b = 2") != first
 
 
 @pytest.mark.parametrize("given", [False, True])
