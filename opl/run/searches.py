@@ -99,9 +99,9 @@ def _search_range(
     assert isinstance(last, OutOfBudget), "what was found is a plan"
     if proven:
         raise NoPathError(
-            "no path: proven for all contact positions, each pass on an IK branch of its own: no "
-            "motion along these passes keeps reach, limits and the plan's clearances with leads as "
-            "the job sets them",
+            "no path: it is proven that no motion along these passes, at any contact positions, on "
+            "along each pass and never back, each on an IK branch and count of full turns of its "
+            "own, keeps reach, limits and the plan's clearances, with leads as the job sets them",
             explain(problem, in_turns.matrices),
         )
     raise NoPathError(
