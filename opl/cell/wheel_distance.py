@@ -80,7 +80,11 @@ def part_tree(mesh: TriangleMesh) -> PartTree:
 
 
 def signed_wheel_distance(
-    part: PartTree, wheel: ContactWheel, Ts_contact0_workpiece: Array, needed: Array | float
+    part: PartTree,
+    wheel: ContactWheel,
+    Ts_contact0_workpiece: Array,
+    needed: Array | float,
+    enough: Array | float = -np.inf,
 ) -> Array:
     """Return the smallest signed distance of the part to the wheel in [m], where it is too small.
 
@@ -90,21 +94,23 @@ def signed_wheel_distance(
         Ts_contact0_workpiece: Poses of the part in contact frame 0, shape (..., 4, 4).
         needed: Smallest distance allowed in [m]: a part that keeps it is not measured further,
             shape (...) or one for all.
+        enough: What is nearer than this in [m] need not be known to be nearer still.
 
     Returns:
         Distance per pose, shape (...); where the part cuts into the wheel minus the longest of its
         triangles' ways out. Too large by `TOLERANCE` at most where the part is too near, so what is
         nearer than ``needed`` by more than that is less than ``needed``; otherwise that of some
-        point of the part.
+        point of the part. Less than ``enough`` where the least is, too large by any amount there.
     """
     shape = Ts_contact0_workpiece.shape[:-2]
     needs = np.array(np.broadcast_to(needed, shape), dtype=float).reshape(-1)
+    stops = np.array(np.broadcast_to(enough, shape), dtype=float).reshape(-1)
     flat = np.ascontiguousarray(Ts_contact0_workpiece.reshape(-1, 4, 4))
     distances, looks = np.empty(len(flat)), np.empty(len(flat), dtype=np.int64)
     # to call threads costs as much as dozens of poses, and many times that on a busy machine
     kernel = _distances if len(flat) > FEW and threads_are_allowed() else _few_distances
     tree = part.triangles, part.spheres, part.first, part.child
-    kernel(flat, *tree, wheel.width / 2.0, wheel.radius, needs, distances, looks)
+    kernel(flat, *tree, wheel.width / 2.0, wheel.radius, needs, stops, distances, looks)
     part.looks[0] += looks.sum()
     return distances.reshape(shape)
 
@@ -122,10 +128,10 @@ def _sphere_bound(T, spheres, index, half_width, radius):  # type: ignore[no-unt
 
 @kernel(
     "Tuple((float64,int64))(float64[:,::1],float64[:,:,::1],float64[:,::1],int64[::1],int64[::1],"
-    "float64,float64,float64)"
+    "float64,float64,float64,float64)"
 )
 def _part_distance(  # type: ignore[no-untyped-def]
-    T, triangles, spheres, first, child, half_width, radius, needed
+    T, triangles, spheres, first, child, half_width, radius, needed, enough
 ):
     """Distance of the part in one pose, and how many looks that took."""
     room = np.empty((DEEPEST + 1, 9))
@@ -135,7 +141,7 @@ def _part_distance(  # type: ignore[no-untyped-def]
     bounds[0] = -np.inf
     n_waiting = 1
     best, looks = np.inf, 0
-    while n_waiting > 0:
+    while n_waiting > 0 and best >= enough:
         n_waiting -= 1
         if bounds[n_waiting] >= min(best - TOLERANCE, needed):
             continue
@@ -161,25 +167,25 @@ def _part_distance(  # type: ignore[no-untyped-def]
 
 _POSES = (
     "void(float64[:,:,::1],float64[:,:,::1],float64[:,::1],int64[::1],int64[::1],"
-    "float64,float64,float64[::1],float64[::1],int64[::1])"
+    "float64,float64,float64[::1],float64[::1],float64[::1],int64[::1])"
 )
 
 
 @kernel(_POSES, threads=True)
 def _distances(  # type: ignore[no-untyped-def]
-    poses, triangles, spheres, first, child, half_width, radius, needs, distances, looks
+    poses, triangles, spheres, first, child, half_width, radius, needs, stops, distances, looks
 ):
     for k in prange(len(poses)):
         distances[k], looks[k] = _part_distance(
-            poses[k], triangles, spheres, first, child, half_width, radius, needs[k]
+            poses[k], triangles, spheres, first, child, half_width, radius, needs[k], stops[k]
         )
 
 
 @kernel(_POSES)
 def _few_distances(  # type: ignore[no-untyped-def]
-    poses, triangles, spheres, first, child, half_width, radius, needs, distances, looks
+    poses, triangles, spheres, first, child, half_width, radius, needs, stops, distances, looks
 ):
     for k in range(len(poses)):
         distances[k], looks[k] = _part_distance(
-            poses[k], triangles, spheres, first, child, half_width, radius, needs[k]
+            poses[k], triangles, spheres, first, child, half_width, radius, needs[k], stops[k]
         )

@@ -7,6 +7,7 @@ it can move within the cell.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -168,8 +169,17 @@ def surely_nearer(
     rolled = np.abs(middle) > wheel.flat_end
     moved = np.where(rolled, 2.0 * np.sin(np.deg2rad(radius) / 2.0) * lever, radius / MM_PER_M)
     Ts_contact0_workpiece = wheel.T_contact0_contact(middle) @ Ts_cutter_workpiece
-    clearance = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, distance)
-    return (clearance + moved + TOLERANCE < distance), clearance < distance
+    enough = distance - moved - TOLERANCE
+    clearance = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, distance, enough)
+    surely = clearance < enough
+    slid = ~rolled & ~surely & (clearance < distance)
+    most = 2.0 * radius[slid].max(initial=0.0) / MM_PER_M
+    if slid.any() and most < wheel.width:
+        # along the axle: a wheel so much narrower stays inside of the wheel all over these cells
+        narrower, nearer = replace(wheel, width=wheel.width - most), distance - TOLERANCE
+        Ts = Ts_contact0_workpiece[slid]
+        surely[slid] = signed_wheel_distance(part, narrower, Ts, distance, nearer) < nearer
+    return surely, clearance < distance
 
 
 def surely_cuts_along(
@@ -203,9 +213,39 @@ def surely_cuts_along(
     )
     moved = half * (TURN * (x + z) * lever + p)
     Ts_contact0_workpiece = wheel.T_contact0_contact(contact_positions) @ Ts_cutter_workpiece
-    distance = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, allowed)
-    surely = distance + moved + TOLERANCE < allowed
-    return surely & (np.maximum(x, z) <= LARGEST_TURN), distance < allowed
+    enough = allowed - moved - TOLERANCE
+    distance = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, allowed, enough)
+    return (distance < enough) & (np.maximum(x, z) <= LARGEST_TURN), distance < allowed
+
+
+def shut_along(
+    cell: WorkCell,
+    part: PartTree,
+    points: CutterPoints,
+    first: Array,
+    last: Array,
+    contact_positions: Array,
+    most_within: int,
+) -> np.ndarray:
+    """Return between which places the part surely cuts into the wheel all the way, shape (n,).
+
+    Args:
+        cell: The cell.
+        part: The triangles of the part.
+        points: The cutter points.
+        first: From which place, a fractional cutter point, shape (n,).
+        last: To which, not past the next cutter point of the pass.
+        contact_positions: On which contact position, in belt units, shape (n,).
+        most_within: How often a stretch is halved that is cut, but not surely.
+    """
+
+    def surely(run: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
+        return surely_cuts_along(cell, part, points, contact_positions[run], low, high)
+
+    run, _, _, shut = halved(np.arange(len(first)), first, last, surely, most_within)
+    found = np.ones(len(first), dtype=bool)
+    found[run[~shut]] = False
+    return found
 
 
 def cut_finer(t: Array, parts: np.ndarray) -> Array:

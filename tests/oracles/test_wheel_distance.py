@@ -156,6 +156,11 @@ def test_it_is_less_than_needed_exactly_where_the_part_is_too_near(seed, needed)
     near = sure & (exact < needed)
     np.testing.assert_allclose(found[near], exact[near], atol=2 * TOLERANCE)
     assert (found >= exact - TOLERANCE).all()
+    # where it may stop at some depth, it tells of each pose whether the part is as deep
+    stopped = signed_wheel_distance(part, wheel, Ts, needed, needed - 0.02)
+    np.testing.assert_array_equal(stopped < needed - 0.02, found < needed - 0.02)
+    less = found >= needed - 0.02
+    np.testing.assert_array_equal(stopped[less], found[less])
 
 
 def test_an_edge_of_the_wheel_that_sinks_into_a_flat_face_is_seen():
