@@ -1,66 +1,83 @@
-"""Contact positions that no motion along a pass gets past.
+"""Where no motion along a pass gets past: the barriers of each pass, and its sides.
 
-A concave part may cut into the wheel at some contact position all along a pass, between its cutter
-points too: then the pass is ground on one side of it as a whole. That is certain where the part is
-deeper in the wheel, at places along the pass, than any point of it can move on the way to the next.
+A concave part may cut into the wheel at some contact position at many cutter points of a pass, and
+all the way between them: then the pass stays on one side of it there. That is certain where the
+part is deeper in the wheel, at places along the pass, than any point of it can move on the way to
+the next.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
-from itertools import pairwise
-
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.cut_cells import MOST_WITHIN, halved, surely_cuts_along
+from opl.planning.cut_cells import cells_of, shut_along
 from opl.planning.problem import GrindingProblem
-from opl.search.walls import Piece
+from opl.planning.sides import Barrier, Side, sides_of
+
+MOST_LOOKED_AT = 8  # runs of cutter points of a pass, the longest
+MOST_SIDES = 8  # of a pass
+WITHIN = 7  # halvings of the way between cutter points that is too deep in the wheel, but hardly
+SHORTEST = 3  # cutter points
+NEARLY = 0.8  # of the longest run: the deepest of those is taken
 
 
-def barriers(problem: GrindingProblem) -> list[Array]:
-    """Return the contact positions in belt units that each pass stays on one side of, in order.
+def all_sides(problem: GrindingProblem) -> list[list[Side]]:
+    """Return the sides of each pass; one that excludes nothing where there are no barriers."""
+    cell, part, points = problem.cell, problem.scene.part, problem.points
 
-    Of each run of contact positions of the field at which the part cuts into the wheel at all
-    cutter points of a pass, the one where it is deepest, if it is certain between them as well.
+    def shut(place: float, low: float, high: float) -> bool:
+        Ts = points.frames_at(np.array([place]))
+        return bool(cells_of(cell, part, Ts, np.array([low]), np.array([high]))[1][0].all())
+
+    every = (barriers(problem, index) for index in range(points.n_passes))
+    return [sides_of(found, shut, MOST_SIDES) for found in every]
+
+
+def barriers(problem: GrindingProblem, index: int) -> list[Barrier]:
+    """Return the barriers of a pass, the longest first.
+
+    Runs of cutter points at which the part cuts into the wheel on one contact position of the
+    field, as far as it surely does between them as well. Of what is shut around a run no more is
+    looked at, but past its ends.
     """
-    points, cuts = problem.points, problem.cuts
-    found = []
-    for index in range(points.n_passes):
-        own = np.flatnonzero(points.pass_index == index)
-        shut = np.concatenate([[False], cuts[own].all(axis=0), [False]])
-        ends = np.flatnonzero(np.diff(shut.astype(int))).reshape(-1, 2)
-        least_depth = -problem.wheel_distance[own].max(axis=0)
-        rows = [first + int(np.argmax(least_depth[first:end])) for first, end in ends.tolist()]
-        t = problem.field.contact_positions[rows]
-        found.append(np.array([one for one in t.tolist() if _is_shut(problem, own, one)]))
-    return found
+    own = np.flatnonzero(problem.points.pass_index == index)
+    depth = np.where(problem.cuts[own], -problem.wheel_distance[own], 0.0)
+    left, found = depth > 0.0, []
+    for _ in range(MOST_LOOKED_AT):
+        row, first, last = _deepest(depth, left)
+        if last - first + 1 < SHORTEST:
+            break
+        t = float(problem.field.contact_positions[row])
+        places = own[first : last + 1].astype(float)
+        at = places[:-1], places[1:], np.full(last - first, t)
+        shut = shut_along(problem.cell, problem.scene.part, problem.points, *at, WITHIN)
+        found += [Barrier(places[a], places[b], t) for a, b in _runs(shut)]
+        left[first : last + 1, row] = False
+        # where it ends, what is shut may go on at another contact position
+        for column in range(first + (first > 0), last + (last == len(own) - 1)):
+            left[column] &= ~_around(depth[column] > 0.0, row)
+    return sorted(found, key=lambda one: one.first - one.last)
 
 
-def on_sides(piece: Piece, barriers: Array) -> Iterator[Piece]:
-    """Yield the parts of a piece on either side of each barrier; a cell with one is of both."""
-    if piece.line.T_workpiece_cutter is None:
-        side = int(np.searchsorted(barriers, piece.line.contact_position))
-        yield replace(piece, side=side)
-        return
-    ends = np.concatenate([[-np.inf], barriers, [np.inf]])
-    for side, (low, high) in enumerate(pairwise(ends.tolist())):
-        inside = np.flatnonzero((piece.at[1:] > low) & (piece.at[:-1] < high))
-        if len(inside):
-            yield replace(piece.part(int(inside[0]), int(inside[-1]) + 1), side=side)
+def _deepest(depth: Array, left: np.ndarray) -> tuple[int, int, int]:
+    """Return contact position, first and last column of a run that is left.
+
+    Of the longest runs that where the part is deepest in the wheel all along.
+    """
+    runs = [(row, a, b - 1) for row, now in enumerate(left.T) for a, b in _runs(now)]
+    longest = max((b - a for _, a, b in runs), default=-1)
+    some = [run for run in runs if run[2] - run[1] >= NEARLY * longest]
+    return max(some, key=lambda run: depth[run[1] : run[2] + 1, run[0]].min(), default=(0, 0, -1))
 
 
-def _is_shut(problem: GrindingProblem, columns: np.ndarray, contact_position: float) -> bool:
-    """Return whether the part surely cuts into the wheel there all along a pass."""
-    if len(columns) < 2:
-        return False
+def _around(flags: np.ndarray, row: int) -> np.ndarray:
+    """Return which flags are in the run of those set that a row is in."""
+    number = np.cumsum(~flags)
+    return np.asarray(flags & (number == number[row]))
 
-    def surely(_: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
-        t = np.full(len(low), contact_position)
-        part = problem.scene.part
-        return surely_cuts_along(problem.cell, part, problem.points, t, low, high)
 
-    low = columns[:-1].astype(float)
-    _, _, _, shut = halved(np.zeros(len(low), int), low, low + 1.0, surely, MOST_WITHIN)
-    return bool(shut.all())
+def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Return first and end of every run of flags that are set."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in ends.reshape(-1, 2)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.cut_cells import halved, surely_cuts_along
+from opl.planning.cut_cells import shut_along
 from opl.planning.families import GROWN
 from opl.planning.images import Seams, image_within_limits, wrist_flips
 from opl.planning.nodes import inverse_solutions
@@ -104,7 +104,7 @@ class ColumnSampler:
         for block in blocks_of(*grid.shape):
             coarse = self._coarse(places[block], placements)
             free = ~cuts[block] & ~np.isnan(coarse[..., 0])
-            free &= _allowed(there.pass_index[block], placements, grid[block])
+            free &= _allowed(places[block], there.pass_index[block], placements, grid[block])
             t[block], _ = sampled(grid[block], coarse, free, box, FINE, whole=True)
         # where the part begins to cut is known to a hair only
         last = problem.cell.wheel.last_position
@@ -189,7 +189,7 @@ class ColumnSampler:
                 angles = solutions[own][:, :, placement.family]
                 q[block][own] = self._placed(angles, placement)
         free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
-        free &= _allowed(there.pass_index, placements, t)
+        free &= _allowed(places, there.pass_index, placements, t)
         free[free] = image_within_limits(problem.cell.robot, self.flips, q[free])
         if self.collisions:
             self._leave_out_leads(there, placements, t, free)
@@ -239,15 +239,8 @@ class ColumnSampler:
         Each on one contact position, between two neighbouring cutter points.
         """
         problem = self._problem
-
-        def surely(run: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
-            part = problem.scene.part
-            return surely_cuts_along(problem.cell, part, problem.points, t[run], low, high)
-
-        run, _, _, shut = halved(np.arange(len(t)), first, last, surely, WITHIN)
-        found = np.ones(len(t), dtype=bool)
-        found[run[~shut]] = False
-        return found
+        at = first, last, t, WITHIN
+        return shut_along(problem.cell, problem.scene.part, problem.points, *at)
 
     def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m).
@@ -271,10 +264,12 @@ class ColumnSampler:
         return placement.of(start + np.remainder(angles - start, 2.0 * np.pi))
 
 
-def _allowed(pass_index: np.ndarray, placements: Sequence[Placement], t: Array) -> np.ndarray:
+def _allowed(
+    places: Array, pass_index: np.ndarray, placements: Sequence[Placement], t: Array
+) -> np.ndarray:
     """Return which contact positions of places their passes may use, shape (n, m)."""
     allowed = np.empty(t.shape, dtype=bool)
     for index, placement in enumerate(placements):
         own = pass_index == index
-        allowed[own] = placement.holds(t[own])
+        allowed[own] = placement.side.holds(places[own], t[own])
     return allowed

@@ -25,10 +25,10 @@ from opl.cell.workcell import WorkCell
 from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.barriers import on_sides
 from opl.planning.cut_cells import cells_of, cut_finer, rows_of
 from opl.planning.enclosed import ROUND_OFF, EnclosedCells, enclosing
 from opl.planning.images import Images
+from opl.planning.sides import ANY_SIDE, Side
 from opl.search.walls import Chain, Image, Line, Piece, Wall
 
 MOST_CUTS = 3  # of such cells, each finer than the one before
@@ -48,7 +48,7 @@ class ColumnWalls:
         part: The triangles of the part.
         points: The cutter points.
         images: The images of each posture.
-        barriers: Contact positions that each pass stays on one side of, in order; None for none.
+        sides: The sides of each pass; None for one that excludes nothing.
     """
 
     def __init__(
@@ -57,13 +57,13 @@ class ColumnWalls:
         part: PartTree,
         points: CutterPoints,
         images: Images,
-        barriers: Sequence[Array] | None = None,
+        sides: Sequence[Sequence[Side]] | None = None,
     ) -> None:
         self._cell = cell
         self._part = part
         self._points = points
         self.images = images
-        self._barriers = barriers
+        self._sides = sides or [[ANY_SIDE]] * points.n_passes
         self.made = 0.0  # walls made so far; one cell cut finer is part of one
 
     def columns(self, places: Sequence[float]) -> list[Wall]:
@@ -81,17 +81,14 @@ class ColumnWalls:
         # those that lead downwards can be crossed towards the start of the pass only
         up = [edge for edge in edges if edge[4] > edge[2]]
         along = [edge for edge in edges if edge[4] == edge[2]]
+        passes = self._points.pass_index[[int(corners[0][0]) for corners in chains]]
         pieces: list[list[Piece]] = [[] for _ in chains]
         for made, run in ((self._up, up), (self._along, along)):
-            for (number, *_), found in zip(run, made(run) if run else (), strict=True):
-                pieces[number] += found
+            for edge, found in zip(run, made(run) if run else (), strict=True):
+                number, at = edge[0], edge[1] if edge[4] > edge[2] else None
+                for side in self._sides[passes[number]]:
+                    pieces[number] += [part for piece in found for part in side.parts(piece, at)]
         self.made += sum(1.0 if len(corners) == 2 else PART_OF_A_CHAIN for corners in chains)
-        passes = self._points.pass_index[[int(corners[0][0]) for corners in chains]]
-        if self._barriers is not None:
-            pieces = [
-                [part for piece in found for part in on_sides(piece, self._barriers[index])]
-                for found, index in zip(pieces, passes.tolist(), strict=True)
-            ]
         return [
             Wall(int(passes[k]), (min(places) + max(places)) / 2.0, tuple(pieces[k]), chains[k])
             for k, places in enumerate([place for place, _ in corners] for corners in chains)

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from opl.geometry.frames import Array
 from opl.planning.images import Images
 from opl.planning.placement import Placement
+from opl.planning.sides import Side
 from opl.search.box import JointBox
 from opl.search.cells import Key
 from opl.search.in_box import JUMP
@@ -95,7 +95,7 @@ class Families:
         cuts: Where the part would sink too deep into the wheel, shape (N, M).
         pass_index: Pass of each column, shape (N,).
         contact_positions: Those of the solutions in belt units, shape (M,).
-        barriers: Contact positions that each pass stays on one side of, in order.
+        sides: The sides of each pass.
 
     Attributes:
         work: What was held against boxes so far, in units of work.
@@ -108,11 +108,11 @@ class Families:
         cuts: np.ndarray,
         pass_index: np.ndarray,
         contact_positions: Array,
-        barriers: Sequence[Array],
+        sides: Sequence[Sequence[Side]],
     ) -> None:
         self._images = images
         self._contact_positions = contact_positions
-        self._barriers = barriers
+        self._sides = sides
         self._places = few = few_columns(pass_index)
         cuts, pass_index = cuts[few], pass_index[few]
         self._pass_index = pass_index
@@ -130,8 +130,8 @@ class Families:
     def smallest_grown(self) -> JointBox | None:
         """Return a small box that holds a point of every column, grown from one of a few nodes."""
         best: JointBox | None = None
-        if any(len(t) for t in self._barriers):
-            return None  # it might be on either side of one
+        if any(len(of_pass) > 1 for of_pass in self._sides):
+            return None  # it might be on either side of a barrier
         step = max(len(self._pass_index) // FEW_COLUMNS, 1)
         for family, (unrolled, free) in self._unrolled.items():
             if not free.any(axis=1).all():
@@ -179,7 +179,7 @@ class Families:
             columns = self._pass_index == index
             unrolled, free = self._unrolled[placement.family]
             q = np.ascontiguousarray(np.moveaxis(placement.of(unrolled[columns]), 1, 2))
-            allowed = placement.holds(self._contact_positions)
+            allowed = placement.side.holds(self._places[columns], self._contact_positions)
             found = q, np.ascontiguousarray(free[columns] & allowed)
             if not placement.loose.any():
                 if len(self._known) >= MOST_KNOWN:
@@ -192,16 +192,15 @@ class Families:
         self, index: int, center: Array, keys: Sequence[Key] | None
     ) -> Iterator[Placement]:
         """Yield the images that a pass may use; of families not decided yet those near a box."""
-        ends = [-np.inf, *self._barriers[index].tolist(), np.inf]
-        sides = list(pairwise(ends))
+        sides = self._sides[index]
         for family, (unrolled, free) in self._unrolled.items():
             loose = ~self._images.seams.kept[family]
             if keys is not None:
-                own = [(key, side) for name, key, side in keys if name == family]
-                for (flip, *turns), side in own:
-                    shift, between = 2.0 * np.pi * np.array(turns, dtype=float), sides[side]
+                own = [(key, number) for name, key, number in keys if name == family]
+                for (flip, *turns), number in own:
+                    shift, side = 2.0 * np.pi * np.array(turns, dtype=float), sides[number]
                     flipped = flip, self._images.flips[flip]
-                    yield Placement(family, *flipped, shift, loose, center, between)
+                    yield Placement(family, *flipped, shift, loose, center, side)
                 continue
             columns = self._pass_index == index
             q, open_now = unrolled[columns], free[columns]
@@ -209,8 +208,8 @@ class Families:
             for flip, (sign, shift) in enumerate(self._images.flips):
                 whole = np.round((center - mean * sign - shift) / (2.0 * np.pi))
                 whole = 2.0 * np.pi * np.where(loose, 0.0, whole)
-                for between in sides:
-                    yield Placement(family, flip, (sign, shift), whole, loose, center, between)
+                for side in sides:
+                    yield Placement(family, flip, (sign, shift), whole, loose, center, side)
 
     def _fits(self, index: int, box: JointBox, keys: Sequence[Key] | None) -> list[Fit]:
         """Return how the images that a pass may use fit into a box."""

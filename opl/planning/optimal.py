@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from opl.planning.barriers import barriers
+from opl.planning.barriers import all_sides
 from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.box_track import BoxTracks
 from opl.planning.columns import ColumnWalls
@@ -73,7 +73,7 @@ class OptimalSearch:
             most = Travel(fallback.path.joint_travel, fallback.path.contact_travel)
         images = Images(robot, seams, largest)
         part, points = problem.scene.part, problem.points
-        sides, t = barriers(problem), problem.field.contact_positions
+        sides, t = all_sides(problem), problem.field.contact_positions
         self._walls = ColumnWalls(problem.cell, part, points, images, sides)
         self._families = Families(images, q, problem.cuts, points.pass_index, t, sides)
         self._sampler = ColumnSampler(problem, seams, images.limits)

@@ -168,7 +168,7 @@ class Rectangles:
         index = self._points.pass_index[int(places[0])]
         image = placements[index]
         turned = *image.shift, *(image.center * image.loose)
-        which = image.family, image.number, *image.between, *turned
+        which = image.family, image.number, image.side.number, *turned
         left_out = self._sampler.collisions, self._sampler.mirrored
         key = places[0], places[-1], len(places), index, *map(float, (*left_out, *which))
         if key not in self._known:

@@ -1,4 +1,4 @@
-"""Which image of an inverse solution a pass uses, and between which barriers."""
+"""Which image of an inverse solution a pass uses, and on which side of barriers."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
+from opl.planning.sides import ANY_SIDE, Side
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class Placement:
         shift: Full turns in [rad], shape (6,).
         loose: Joints whose full turns are counted anew at each node, shape (6,).
         center: Where those should be near to, in [rad], shape (6,).
-        between: Contact positions in belt units that the pass stays between.
+        side: On which side of each barrier the pass stays.
     """
 
     family: int
@@ -29,21 +30,16 @@ class Placement:
     shift: Array
     loose: np.ndarray
     center: Array
-    between: tuple[float, float] = (-np.inf, np.inf)
+    side: Side = ANY_SIDE
 
     @property
-    def key(self) -> tuple[int, int, bytes, tuple[float, float]]:
+    def key(self) -> tuple[int, int, bytes, int]:
         """The same for those that place alike, but for loose joints."""
-        return self.family, self.number, self.shift.tobytes(), self.between
+        return self.family, self.number, self.shift.tobytes(), self.side.number
 
     def slot(self, flip: int) -> int:
         """Return the slot of the inverse kinematics, with a flip of the whole motion."""
         return self.family + 4 * (self.number ^ flip)
-
-    def holds(self, contact_position: Array) -> np.ndarray:
-        """Return which contact positions in belt units the pass may use."""
-        low, high = self.between
-        return (low < contact_position) & (contact_position < high)
 
     def of(self, q: Array) -> Array:
         """Return the placed joint positions, shape (..., 6)."""

@@ -42,11 +42,13 @@ class Rectangle:
         t = np.broadcast_to(contact_positions, (len(places), len(contact_positions)))
         columns = sampler.at(places, sampler.there(places), [image], t)
         reached = ~np.isnan(columns.q[..., 0])
+        where = places[:-1, None], places[1:, None], contact_positions, contact_positions
         self._q, self._free = np.nan_to_num(columns.q), columns.free
         self._cuts = reached & ~columns.free
         self._looked_at = ~columns.free
         # between which places the part surely cuts into the wheel on a line, and where it may not
-        self._sure, self._doubted = np.zeros((2, len(places) - 1, t.shape[1]), dtype=bool)
+        self._sure = image.side.excludes(*where)
+        self._doubted = np.zeros_like(self._sure)
         begins = (columns.free[:, :-1] != columns.free[:, 1:]) & reached[:, :-1] & reached[:, 1:]
         self._borders = np.stack(np.nonzero(begins), axis=1)
         # from the line beside a border to the border: contact positions, and postures there

@@ -49,7 +49,7 @@ class Piece:
         pad_high: How far above, not negative, shape (n, 6).
         bends: Whether the pads hold because the curve bends little over a cell: they are h^2 / 8
             times its second derivative, shape (n,); None where they hold for other reasons.
-        side: Between which barriers it runs: a pass is ground between the same two as a whole.
+        side: Number of the side of barriers it is on, one for a pass as a whole.
     """
 
     family: int

@@ -1,31 +1,44 @@
 """Contact positions that a pass stays on one side of, held against all vertices of the part."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from benchmarks.stranger_jobs import draw_job
 from opl.cell.wheel_distance import signed_wheel_distance
 from opl.geometry.frames import inverse, transform
 from opl.job.load import load_job
-from opl.planning.barriers import barriers, on_sides
-from opl.planning.cut_cells import rows_of
+from opl.planning.barriers import all_sides, barriers
+from opl.planning.cut_cells import cells_of, rows_of
+from opl.planning.sides import ANY_SIDE, Barrier, sides_of
+from opl.run.searches import search_path
 from opl.search.walls import Line, Piece
 from tests.support.planned import problem_of, small_problem
 
 
-def test_a_concave_part_is_too_deep_in_the_wheel_all_along_each_barrier(tmp_path):
-    draw_job(20261125, 31, 0, tmp_path)
+def never(*_):
+    return False
+
+
+@pytest.mark.parametrize("drawn", [(20261125, 31, 0), (20261202, 94, 0)])
+def test_a_concave_part_is_too_deep_in_the_wheel_all_along_each_barrier(tmp_path, drawn):
+    draw_job(*drawn, tmp_path)
     job = load_job(tmp_path / "job.yaml")
     problem = problem_of(job)
     points, wheel = problem.points, job.cell.wheel
-    found = barriers(problem)
-    assert [len(t) for t in found] == [1] * points.n_passes
     corners = problem.scene.part.triangles.reshape(-1, 3)
-    for index, (t,) in enumerate(found):
-        own = np.flatnonzero(points.pass_index == index)
-        for place in np.linspace(own[0], own[-1], 7 * len(own)):
-            T = wheel.T_contact0_contact(t) @ inverse(points.frames_at(np.array([place]))[0])
-            deepest = wheel.signed_distance(transform(T, corners)).min()
-            assert deepest < -job.cell.planned_penetration
+    for index in range(points.n_passes):
+        found = barriers(problem, index)
+        assert 1 <= len(found) <= 2
+        for one in found:
+            for place in np.linspace(one.first, one.last, 7 * int(one.last - one.first)):
+                T = wheel.T_contact0_contact(one.contact_position)
+                T = T @ inverse(points.frames_at(np.array([place]))[0])
+                deepest = wheel.signed_distance(transform(T, corners)).min()
+                assert deepest < -job.cell.planned_penetration
 
 
 def test_what_is_left_out_along_a_row_is_too_deep_in_the_wheel(tmp_path):
@@ -51,15 +64,83 @@ def test_what_is_left_out_along_a_row_is_too_deep_in_the_wheel(tmp_path):
     assert not all(cut.all() for cut in cuts)
 
 
+def test_what_is_left_out_of_a_column_is_too_deep_in_the_wheel(tmp_path):
+    # a saddle that is hardly deeper than allowed all over the flat
+    draw_job(20261202, 25, 0, tmp_path)
+    problem = problem_of(load_job(tmp_path / "job.yaml"))
+    points, cell, part = problem.points, problem.cell, problem.scene.part
+    Ts = points.frames_at(np.linspace(0.0, len(points) - 1.0, 5))
+    last = np.full(len(Ts), cell.wheel.last_position)
+    ends, cuts = cells_of(cell, part, Ts, -last, last)
+    # cells are not cut smaller without end
+    assert max(map(len, ends)) < 500
+    for T, t, cut in zip(Ts, ends, cuts, strict=True):
+        assert cut.any()
+        some = np.concatenate([t[:-1][cut], (t[:-1] + t[1:])[cut] / 2.0, t[1:][cut]])
+        distance = signed_wheel_distance(
+            part, cell.wheel, cell.wheel.T_contact0_contact(some) @ inverse(T), 0.0
+        )
+        assert (distance < -cell.planned_penetration).all()
+
+
 def test_a_part_that_touches_the_wheel_everywhere_has_no_barrier():
-    assert all(len(t) == 0 for t in barriers(small_problem()))
+    problem = small_problem()
+    assert not barriers(problem, 0)
+    assert all(sides == [ANY_SIDE] for sides in all_sides(problem))
 
 
 def test_a_cell_with_a_barrier_is_of_both_sides_and_a_row_is_of_one():
     at = np.array([-3.0, -1.0, 0.0, 1.0, 3.0])
     nothing = np.zeros((4, 6))
+    below, above = sides_of([Barrier(2.0, 5.0, 0.5)], never, 8)
     column = Piece(0, Line(np.eye(4)), at, np.zeros((5, 6)), nothing, nothing)
-    sides = [(part.side, part.at[0], part.at[-1]) for part in on_sides(column, np.array([0.5]))]
-    assert sides == [(0, -3.0, 1.0), (1, 0.0, 3.0)]
-    row = Piece(0, Line(None, 2.0), at, np.zeros((5, 6)), nothing, nothing)
-    assert [part.side for part in on_sides(row, np.array([0.5, 4.0]))] == [1]
+
+    def parts(piece, place):
+        return [
+            (part.side, part.at[0], part.at[-1])
+            for side in (below, above)
+            for part in side.parts(piece, place)
+        ]
+
+    assert parts(column, 4.5) == [(0, -3.0, 1.0), (1, 0.0, 3.0)]
+    assert parts(column, 5.5) == [(0, -3.0, 3.0), (1, -3.0, 3.0)]
+    # along a contact position, cells that are not wholly on the barrier are left
+    row = replace(column, line=Line(None, 0.0), at=np.array([0.0, 1.5, 3.0, 4.5, 6.0]))
+    assert parts(row, None) == [(0, 0.0, 6.0), (1, 0.0, 3.0), (1, 4.5, 6.0)]
+
+
+def test_barriers_that_meet_leave_no_way_between_them_where_it_is_shut():
+    one, other = Barrier(0.0, 5.0, -1.0), Barrier(5.0, 9.0, 1.0)
+    # where both are, it cannot be below the lower one and above the other
+    assert len(sides_of([one, other], never, 8)) == 3
+    sides = sides_of([one, other], lambda place, low, high: (place, low, high) == (5, -1, 1), 8)
+    assert [(len(side.above), len(side.below)) for side in sides] == [(0, 2), (2, 0)]
+    assert sides_of([one, other], never, 2) == sides_of([one], never, 2)
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 8), st.integers(1, 8), st.integers(0, 8)), max_size=4),
+    st.lists(st.integers(0, 8), min_size=9, max_size=9),
+)
+def test_a_track_that_no_barrier_stops_is_on_one_of_the_sides(drawn, contact):
+    """Contact positions between those of barriers, changed where no barrier is."""
+    barriers = [Barrier(a + 0.25, a + b + 0.25, t) for a, b, t in drawn]
+    # from the middle of each place on, another contact position; the change goes over all between
+    t = [contact[0] + 0.5]
+    for place, wanted in enumerate(contact):
+        before, after = t[-1], wanted + 0.5
+        stops = [b for b in barriers if b.first <= place <= b.last]
+        low, high = min(before, after), max(before, after)
+        t.append(before if any(low < b.contact_position < high for b in stops) else after)
+    places = np.repeat(np.arange(9.0), 2)
+    along = np.stack([t[:-1], t[1:]], axis=1).reshape(-1, 1)
+    sides = sides_of(barriers, never, 16)
+    assert sum(side.holds(places, along).all() for side in sides) >= 1
+
+
+@pytest.mark.parametrize("drawn", [(20261202, 25, 0), (20261202, 79, 0)])
+def test_concave_parts_are_ground_with_the_least_motion(tmp_path, drawn):
+    draw_job(*drawn, tmp_path)
+    job = load_job(tmp_path / "job.yaml")
+    plan = search_path(job.search, problem_of(job)).plan
+    assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)

@@ -13,6 +13,7 @@ from opl.planning.multi_start import tracks_from_best_start
 from opl.planning.nodes import build_nodes
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
 from opl.planning.problem import wheel_distances
+from opl.planning.sides import ANY_SIDE
 from opl.planning.symmetry import twins
 from opl.planning.turned import Kept
 from opl.search.joint_limits import UNLIMITED
@@ -113,7 +114,7 @@ def test_places_near_a_box_are_sampled_alike_in_blocks(monkeypatch):
     points, robot = problem.points, problem.cell.robot
     q = problem.solutions(few_columns(points.pass_index))
     seams = seams_of(q)
-    t, none = problem.field.contact_positions, [np.empty(0)] * points.n_passes
+    t, none = problem.field.contact_positions, [[ANY_SIDE]] * points.n_passes
     families = Families(Images(robot, seams, 10.0), q, problem.cuts, points.pass_index, t, none)
     box = families.smallest_grown()
     placements, _ = families.hold(box, {}, set(), 0.1)

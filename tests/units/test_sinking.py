@@ -11,6 +11,7 @@ from opl.planning.images import Images, seams_of
 from opl.planning.multi_start import tracks_from_best_start
 from opl.planning.open_matrix import open_matrices
 from opl.planning.problem import wheel_distances
+from opl.planning.sides import ANY_SIDE
 from opl.planning.sinking import places_for, shallower, spare_for, sunk_between
 from opl.planning.track_check import Collides, check_track
 from opl.search.joint_limits import UNLIMITED
@@ -50,7 +51,7 @@ def test_nodes_leave_the_depth_that_is_spared():
     problem = small_problem()
     points, t = problem.points, problem.field.contact_positions
     q = problem.solutions(few_columns(points.pass_index))
-    seams, none = seams_of(q), [np.empty(0)] * points.n_passes
+    seams, none = seams_of(q), [[ANY_SIDE]] * points.n_passes
     images = Images(problem.cell.robot, seams, 10.0)
     families = Families(images, q, problem.cuts, points.pass_index, t, none)
     box = families.smallest_grown()
