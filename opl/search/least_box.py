@@ -3,7 +3,8 @@
 A subproblem allows each wall some spans, runs of cells of a piece. What every box below the
 threshold must hold anyway, the core, cuts spans off; a linear program over the convex hulls of what
 is left of the walls bounds the size of the box. The box found meets some walls in their hulls only:
-the one that it misses most is split. Walls are added while the proof goes on.
+the one that it misses most is split. Walls are added while the proof goes on: subproblems split
+before they were known are many more than they take, so the tree is begun anew now and then.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from copy import copy
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.search.bounding import distances, tighten, trim
+from opl.search.bounding import tighten, trim
 from opl.search.box import JointBox
+from opl.search.branching import parts, where_to_split
 from opl.search.cells import END, FIRST, KEY, WALL, Cells, Forbidden
-from opl.search.joint_limits import UNLIMITED, torn
+from opl.search.joint_limits import UNLIMITED
 from opl.search.relaxation import least_box
 from opl.search.subproblems import Candidate, Relaxation, Subproblem
 from opl.search.walls import Image, Piece, Wall
@@ -30,9 +32,9 @@ NUMBERS_OF_A_SOURCE = 6  # that it is worth to tell whether a box can hold a pie
 NUMBERS_OF_AN_ENTRY = 2500  # that entering a cell into the table is worth
 MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
-SMALLEST = 1e-6  # along a wall: a cell that is not cut further
 TRIMMED = 0.9  # of the cells: more left, and trimming goes on no longer
 FEWEST_UNSEEN = 8  # subproblems split before a box is shown that is not settled
+FEWEST_BEFORE_ANEW = 256  # subproblems of a tree that is begun anew for walls added since
 MOST_UNSEEN = 256  # that many where those shown before told nothing new
 
 
@@ -72,9 +74,15 @@ class BoxProof:
         self.work = 0.0  # how many numbers were worked on, about
         self._count = self._unseen = 0
         self._show_after = FEWEST_UNSEEN
+        self._anew_after = FEWEST_BEFORE_ANEW
+        self._plant(0.0)
+
+    def _plant(self, bound: float) -> None:
+        """Begin a tree of subproblems: one of which nothing but a bound is known."""
+        self._of_tree, self._walls_then = 0, len(self.walls)
         self._open: list[Subproblem] = []
         nothing = np.empty((0, 5), dtype=np.int64)
-        self._push(0.0, nothing, 0, np.full(6, np.inf), np.full(6, -np.inf))
+        self._push(bound, nothing, 0, np.full(6, np.inf), np.full(6, -np.inf))
 
     def again(self, threshold: float) -> BoxProof:
         """Return the proof begun again for boxes below another size, with the walls of this one."""
@@ -115,15 +123,22 @@ class BoxProof:
             caller adds a wall that misses the box, or lowers the threshold, and puts it back; or
             splits it, or gives it up.
         """
+        grown = len(self.walls) > self._walls_then
+        if grown and self._of_tree >= self._anew_after and np.isinf(self.stuck):
+            self._anew_after *= 2
+            self._plant(self._open[0].bound)
         node = heapq.heappop(self._open)
         self.subproblems += 1
+        self._of_tree += 1
         if node.found is None or node.n_walls < len(self.walls) or self._sharper(node.found):
             if not self._bound(node):
                 return None
             if self._open and node.bound > self._open[0].bound + 1e-9:
                 heapq.heappush(self._open, node)  # others are more promising now
                 return None
-        self._kept, self._branch = node, self._where_to_split(node)
+        may_lose = SETTLED * self._gap * self.threshold
+        self._branch = where_to_split(node, self._cells, self._limits_of(node.spans), may_lose)
+        self._kept = node
         settled = self._branch is None
         if node.n_walls < len(self.walls):
             self.put_back() if settled else self.split()
@@ -172,7 +187,9 @@ class BoxProof:
     def split(self) -> None:
         """Split the subproblem of the last candidate."""
         if self._branch is not None:
-            self._split(self._kept, *self._branch)
+            node = self._kept
+            for spans in parts(node, self._cells, *self._branch):
+                self._push(node.bound, spans, node.n_walls, node.low, node.high)
 
     def put_back(self) -> None:
         """Leave the subproblem of the last candidate open."""
@@ -251,50 +268,3 @@ class BoxProof:
         """Return which spans are of walls with so few cells left that they are worth a price."""
         cells = np.bincount(spans[:, WALL], weights=spans[:, END] - spans[:, FIRST])
         return np.asarray(cells[spans[:, WALL]] <= MOST_PRICED)
-
-    def _where_to_split(self, node: Subproblem) -> tuple[int, float] | None:
-        """Return the wall to be split, and where along it; None if that gains nothing."""
-        found, walls, table = node.found, node.spans[:, WALL], self._cells.table
-        assert found is not None
-        if np.count_nonzero(walls == 0) > 1:
-            return 0, float(found.place[0])
-        settled = SETTLED * self._gap * self.threshold
-        missed = np.full(node.n_walls, np.inf)
-        np.minimum.at(missed, walls, distances(table, node.spans, found.low, found.high))
-        first, end = node.spans[:, FIRST], node.spans[:, END]
-        tiny = walls[(end == first + 1) & (table[first, 25] - table[first, 24] < SMALLEST)]
-        score = np.maximum(missed, found.lost)
-        box = JointBox(found.low, found.high)
-        limits = self._limits_of(node.spans)
-        np.maximum.at(score, walls, torn(table, node.spans, box, limits, settled))
-        score[tiny] = 0.0
-        wall = int(np.argmax(score))
-        if score[wall] > settled:
-            return wall, float(found.place[wall])
-        return None
-
-    def _split(self, node: Subproblem, wall: int, place: float) -> None:
-        before, end = np.searchsorted(node.spans[:, WALL], [wall, wall + 1])
-        own = node.spans[before:end]
-        if len(own) > 1:
-            # the nearest, and all others
-            table, box = self._cells.table, node.found
-            assert box is not None
-            away = distances(table, own, box.low, box.high)
-            k = int(np.argmin(away))
-            halves = [own[k : k + 1], np.delete(own, k, axis=0)]
-        else:
-            if own[0, END] == own[0, FIRST] + 1:
-                own = self._cells.finer(own[0])
-            halves = [own]
-            if len(own) == 0:
-                return
-        if len(own) == 1:
-            at = self._cells.table[own[0, FIRST] : own[0, END], 24]
-            n, least = len(at), max(len(at) // 8, 1)
-            middle = own[0, FIRST] + min(max(int(np.searchsorted(at, place)), least), n - least)
-            halves = [own.copy(), own.copy()]
-            halves[0][0, END] = halves[1][0, FIRST] = middle
-        for half in halves:
-            spans = np.concatenate([node.spans[:before], half, node.spans[end:]])
-            self._push(node.bound, spans, node.n_walls, node.low, node.high)

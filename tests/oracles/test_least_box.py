@@ -1,0 +1,99 @@
+"""The least box over walls that are added while the proof goes on, held against samples of them."""
+
+import numpy as np
+import pytest
+
+from opl.search import least_box
+from opl.search.least_box import BoxProof
+from opl.search.walls import Image, Line, Piece, Wall
+
+SAME = (Image(np.ones(6), np.zeros(6), (0,)),)
+GAP = 1e-3
+N_WALLS, CELLS, SAMPLES = 7, 6, 9
+
+
+class Bent:
+    """A wall along a parabola in three joints."""
+
+    def __init__(self, random):
+        self._q = np.zeros((3, 6))
+        self._q[:, :3] = random.normal(size=(3, 3)) * [[1.0], [0.7], [0.4]]
+
+    def at(self, t):
+        t = np.asarray(t)[..., None]
+        return self._q[0] + t * self._q[1] + t**2 * self._q[2]
+
+    def piece(self, t):
+        """Return cells between places along it; a chord is off by h^2 / 8 times the bend."""
+        bend = np.diff(t)[:, None] ** 2 / 4.0 * self._q[2]
+        pads = np.minimum(-bend, 0.0), np.maximum(-bend, 0.0)
+        return Piece(id(self), Line(np.eye(4)), t, self.at(t), *pads)
+
+
+def crossing(curves):
+    """Return walls along curves, and what cuts their cells."""
+    by_family = {id(curve): curve for curve in curves}
+
+    def cut(piece, cell):
+        start, end = piece.at[cell : cell + 2]
+        return (by_family[piece.family].piece(np.linspace(start, end, 4)),)
+
+    at = np.linspace(-1.0, 1.0, CELLS + 1)
+    return [Wall(k, float(k), (curve.piece(at),)) for k, curve in enumerate(curves)], cut
+
+
+def grown(q):
+    """Return the least box over samples of curves, shape (n, m, 6), added one by one."""
+    low, high = q[0], q[0]
+    for one in q[1:]:
+        low = np.minimum(low[:, None], one).reshape(-1, 6)
+        high = np.maximum(high[:, None], one).reshape(-1, 6)
+        low, high = least_of_all(low, high)
+    return float((high - low).sum(axis=1).min())
+
+
+def least_of_all(low, high):
+    """Return the boxes that hold no other of some boxes, the thousand smallest at the most."""
+    order = np.argsort((high - low).sum(axis=1), kind="stable")[:1000]
+    return low[order], high[order]
+
+
+def proven(curves, late):
+    """Return the bound, with walls added when a box misses them, and the bounds on the way."""
+    walls, cut = crossing(curves)
+    proof = BoxProof(lambda _: SAME, cut, 20.0, GAP)
+    left = walls[2:] if late else []
+    for wall in walls if not late else walls[:2]:
+        proof.add(wall)
+    bounds = []
+    while not proof.closed:
+        bounds.append(proof.lower_bound)
+        candidate = proof.take_next()
+        if candidate is None:
+            continue
+        if left and candidate.settled:
+            proof.add(left.pop(0))
+            proof.put_back()
+        elif not candidate.settled:
+            proof.split()
+        else:
+            size = float((candidate.high - candidate.low).sum())
+            if size >= proof.threshold:
+                proof.give_up()
+                continue
+            proof.threshold = size
+            proof.put_back()
+    return proof.lower_bound, bounds
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_walls_added_late_and_trees_begun_anew_lead_to_the_same_bound(seed, monkeypatch):
+    random = np.random.default_rng(seed)
+    curves = [Bent(random) for _ in range(N_WALLS)]
+    at_once, _ = proven(curves, late=False)
+    monkeypatch.setattr(least_box, "FEWEST_BEFORE_ANEW", 3)
+    late, bounds = proven(curves, late=True)
+    assert (np.diff(bounds) >= -1e-12).all()
+    assert late == pytest.approx(at_once, rel=2.0 * GAP)
+    samples = grown(np.stack([curve.at(np.linspace(-1.0, 1.0, SAMPLES)) for curve in curves]))
+    assert late <= samples
