@@ -17,7 +17,7 @@ from opl.geometry.frames import Array
 from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.costs import track_cost
 from opl.planning.filling import BrokenEdgeError, fill_in
-from opl.planning.nodes import NodeField, NodeMatrix
+from opl.planning.nodes import NodeField
 from opl.planning.open_matrix import Track, close_collisions, open_matrices
 from opl.planning.passages import NO_PASSAGES, Passages
 from opl.planning.plan import Found, Plan, Same, propose_and_check
@@ -25,9 +25,8 @@ from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulge, Row, bars, bulging, crossed, levels, shut_edges
 from opl.planning.settings import CostWeights
 from opl.planning.sinking import first_sunk, places_for, shallower, spare_for, until_sunk
-from opl.planning.symmetry import twins
+from opl.planning.symmetry import everywhere, twins
 from opl.planning.track_check import Collides
-from opl.planning.turned import Kept
 from opl.search.box import JointBox
 from opl.search.in_box import missing as missing_of
 from opl.search.in_box import nearest
@@ -40,6 +39,7 @@ ROUNDS = 3  # of sampling closer around a track
 BULGE = 1.75  # times the room of a motion: how far it may leave its box between two places
 EDGES_OF_WORK = 3e5  # that cost a unit of work to search, all rounds
 MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
+MOST_WORK = 5000.0  # units on them, most of them spent on free moves that are not there
 MOST_SPARED = 4  # times that depth is spared in one box for what sinks between places
 MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
 
@@ -157,10 +157,17 @@ class _Sampled:
         q = np.where(
             (columns.free & nearest(columns.q, columns.free, box))[..., None], columns.q, np.nan
         )
+        pass_index, sampler = columns.points.pass_index, search.sampler
+        flips = []
+        for flip, move in enumerate(sampler.flips):
+            slots = np.array([placed.slot(flip) for placed in columns.placements])
+            if not sampler.collisions or flip == sampler.mirrored:
+                flips.append((slots[pass_index], *move))
+        matrices = everywhere(problem.cell, columns.t, q, flips)
         self.problem = replace(
             problem,
             points=columns.points,
-            field=NodeField(columns.t[0], problem.field.reached[:0], {}, tuple(self._images(q))),
+            field=NodeField(columns.t[0], problem.field.reached[:0], {}, tuple(matrices)),
             wheel_distance=np.zeros(columns.t.shape),
             known_sides=problem.sides_at(columns.places, columns.t),
         )
@@ -248,12 +255,15 @@ class _Sampled:
         One that sinks is the last: others do so as well. `sunk_between` of it, if it does.
         """
         search, places = self._search, self._columns.places
-        most = search.checks + MOST_CHECKS
-        while search.checks < most:
+        scene = self.problem.scene
+        most, end = search.checks + MOST_CHECKS, scene.work + MOST_WORK
+        while search.checks < most and scene.work < end:
             tracks = twins(self.matrices, track, self.problem.cell.robot)
             before, hits = search.checks, dict[Same, Collides]()
             tries = until_sunk(self.problem, tracks, hits)
-            outcome = propose_and_check(self.problem, self.matrices, tries, before, collided=hits)
+            outcome = propose_and_check(
+                self.problem, self.matrices, tries, before, None, end - scene.work, hits
+            )
             now = outcome.plan if isinstance(outcome, Found) else outcome
             search.checks = now.checks
             search.places_checked += (search.checks - before) * len(places)
@@ -269,32 +279,3 @@ class _Sampled:
                 break
             track = following
         return None, None
-
-    def _images(self, q: Array) -> list[NodeMatrix]:
-        """Return the matrices that make these postures elsewhere in joint space, best first."""
-        problem = self._search._problem
-        robot = problem.cell.robot
-        sampler = self._search.sampler
-        flips = list(enumerate(sampler.flips))
-        if sampler.collisions:
-            flips = [flips[sampler.mirrored]]
-        found: list[tuple[float, int, NodeMatrix]] = []
-        pass_index, index = self._columns.points.pass_index, np.arange(q.shape[1])
-        for flip, (sign, shift) in flips:
-            slots = np.array([one.slot(flip) for one in self._columns.placements])[pass_index]
-            moved = q * sign + shift
-            low, high = np.nanmin(moved, axis=(0, 1)), np.nanmax(moved, axis=(0, 1))
-            first = np.ceil((robot.lower - high) / (2.0 * np.pi))
-            last = np.floor((robot.upper - low) / (2.0 * np.pi))
-            counts = [np.arange(a, b + 1) for a, b in zip(first, last, strict=True)]
-            for count in np.stack(np.meshgrid(*counts, indexing="ij"), axis=-1).reshape(-1, 6):
-                turned = moved + 2.0 * np.pi * count
-                within = problem.cell.within_limits(turned)
-                if not within.any(axis=1).all():
-                    continue
-                at = np.where(within[..., None], turned, np.nan)
-                margin = np.minimum(turned - robot.lower, robot.upper - turned)
-                near = float((1.0 / np.maximum(np.nanmin(margin, axis=(0, 1)), 1e-3)).sum())
-                nodes = NodeMatrix(slots, Kept(np.ascontiguousarray(at)), self._columns.t, index)
-                found.append((near, len(found), nodes))
-        return [nodes for _, _, nodes in sorted(found, key=lambda entry: entry[:2])]

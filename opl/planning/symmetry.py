@@ -6,15 +6,53 @@ one. The joint ranges stay the same, the distances from the limits and the colli
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from opl.cell.robot import Robot
+from opl.cell.workcell import WorkCell
+from opl.geometry.frames import Array
 from opl.planning.nodes import NodeMatrix
 from opl.planning.open_matrix import OpenMatrix, Track
+from opl.planning.turned import Kept
 
 SAME_SUM = 1e-6  # [rad] two tracks whose joint range sums differ by less are equally good
+
+
+def everywhere(
+    cell: WorkCell, t: Array, q: Array, flips: Sequence[tuple[np.ndarray, Array, Array]]
+) -> list[NodeMatrix]:
+    """Return the matrices that make some postures anywhere within the limits.
+
+    Those farthest from the limits first.
+
+    Args:
+        cell: The cell.
+        t: Contact positions of each place in belt units, shape (n, m).
+        q: Their postures in [rad], NaN where there are none, shape (n, m, 6).
+        flips: Of each flip of the wrist the IK branch of each place, shape (n,), and sign and shift
+            of the joints, shape (6,).
+    """
+    robot, index = cell.robot, np.arange(q.shape[1])
+    found: list[tuple[float, int, NodeMatrix]] = []
+    for ik_branch, sign, shift in flips:
+        moved = q * sign + shift
+        low, high = np.nanmin(moved, axis=(0, 1)), np.nanmax(moved, axis=(0, 1))
+        first = np.ceil((robot.lower - high) / (2.0 * np.pi))
+        last = np.floor((robot.upper - low) / (2.0 * np.pi))
+        counts = [np.arange(a, b + 1) for a, b in zip(first, last, strict=True)]
+        for count in np.stack(np.meshgrid(*counts, indexing="ij"), axis=-1).reshape(-1, 6):
+            turned = moved + 2.0 * np.pi * count
+            within = cell.within_limits(turned)
+            if not within.any(axis=1).all():
+                continue
+            at = np.where(within[..., None], turned, np.nan)
+            margin = np.minimum(turned - robot.lower, robot.upper - turned)
+            near = float((1.0 / np.maximum(np.nanmin(margin, axis=(0, 1)), 1e-3)).sum())
+            nodes = NodeMatrix(ik_branch, Kept(np.ascontiguousarray(at)), t, index)
+            found.append((near, len(found), nodes))
+    return [nodes for _, _, nodes in sorted(found, key=lambda entry: entry[:2])]
 
 
 def twins(matrices: list[OpenMatrix], track: Track, robot: Robot) -> list[Track]:
