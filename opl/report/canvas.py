@@ -15,6 +15,7 @@ import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
@@ -107,7 +108,9 @@ def svg(figure: Figure, title: str) -> str:
     """Return the figure as SVG text without date, version or random names."""
     text = io.StringIO()
     metadata = {"Title": title, "Creator": "opl", "Date": None}
-    figure.savefig(text, format="svg", metadata=metadata)
+    # savefig would draw the figure twice: once to lay it out, for nothing to be seen
+    canvas = FigureCanvasSVG(figure)
+    canvas.print_svg(text, metadata=metadata)  # type: ignore[no-untyped-call]
     return text.getvalue()
 
 
