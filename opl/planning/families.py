@@ -17,7 +17,7 @@ from opl.planning.placement import Placement
 from opl.planning.sides import Side
 from opl.search.box import JointBox
 from opl.search.cells import Key
-from opl.search.in_box import JUMP
+from opl.search.chords import JUMP
 from opl.search.outside import outside
 
 MOST_COLUMNS = 1000  # at which a box is held against the families

@@ -15,7 +15,7 @@ import numpy as np
 from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
-from opl.search.in_box import JUMP
+from opl.search.chords import JUMP
 from opl.search.outside import nearest_on_chord
 
 LEFT, BELOW, ABOVE = range(3)  # from where a cell is entered
