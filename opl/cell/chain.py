@@ -131,7 +131,8 @@ def _pose(c, s, before_joint, axis, directions, base, flange, room, found):  # t
 
 @kernel(
     "void(float64[:,::1],float64[:,:,::1],int64[::1],float64[:,::1],float64[:,:],float64[:,:],"
-    "float64[:,:,::1])"
+    "float64[:,:,::1])",
+    early=True,
 )
 def _poses(q, before_joint, axis, directions, base, flange, found):  # type: ignore[no-untyped-def]
     """Set the poses of the flange in the base frame, see `Chain.poses`."""

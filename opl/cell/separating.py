@@ -130,7 +130,7 @@ def _turn_about(axis, angle, T):  # type: ignore[no-untyped-def]
     T[2, 0], T[2, 1], T[2, 2] = d * z * x - s * y, d * z * y + s * x, c + d * z * z
 
 
-@kernel("void(" + _GIVEN + "float64[::1],float64[::1],int64[::1],boolean[:,::1])")
+@kernel("void(" + _GIVEN + "float64[::1],float64[::1],int64[::1],boolean[:,::1])", early=True)
 def separate(q, solids, paired, enough, more, last, apart, best, near):  # type: ignore[no-untyped-def]
     """Go through configurations one after the other; see `Separation.near`.
 
@@ -230,6 +230,7 @@ def separate(q, solids, paired, enough, more, last, apart, best, near):  # type:
 @kernel(
     "void(" + _GIVEN + "float64[:,::1],float64[:,::1],int64[:,::1],boolean[:,::1],int64)",
     threads=True,
+    early=True,
 )
 def separate_parts(  # type: ignore[no-untyped-def]
     q, solids, paired, enough, more, last, apart, best, near, length

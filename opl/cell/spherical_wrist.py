@@ -226,13 +226,13 @@ _POSES = (
 )
 
 
-@kernel(_POSES)
+@kernel(_POSES, early=True)
 def _solve_few(Ts, theta4_free, sizes, offsets, signs, q):  # type: ignore[no-untyped-def]
     for n in range(len(Ts)):
         _solve_one(Ts[n], theta4_free[n], sizes, offsets, signs, q[n])
 
 
-@kernel(_POSES, threads=True)
+@kernel(_POSES, threads=True, early=True)
 def _solve_all(Ts, theta4_free, sizes, offsets, signs, q):  # type: ignore[no-untyped-def]
     for n in prange(len(Ts)):
         _solve_one(Ts[n], theta4_free[n], sizes, offsets, signs, q[n])

@@ -171,7 +171,7 @@ _POSES = (
 )
 
 
-@kernel(_POSES, threads=True)
+@kernel(_POSES, threads=True, early=True)
 def _distances(  # type: ignore[no-untyped-def]
     poses, triangles, spheres, first, child, half_width, radius, needs, stops, distances, looks
 ):
@@ -181,7 +181,7 @@ def _distances(  # type: ignore[no-untyped-def]
         )
 
 
-@kernel(_POSES)
+@kernel(_POSES, early=True)
 def _few_distances(  # type: ignore[no-untyped-def]
     poses, triangles, spheres, first, child, half_width, radius, needs, stops, distances, looks
 ):

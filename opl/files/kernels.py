@@ -36,6 +36,7 @@ class Kernel:
             it is called with.
         threads: Whether loops over `prange` are shared among threads.
         for_arrays: What does for arrays what it does for scalars, None for the function itself.
+        early: Whether it is loaded before it is called where there is time: most runs call it.
     """
 
     def __init__(
@@ -44,12 +45,14 @@ class Kernel:
         signature: str | None,
         threads: bool,
         for_arrays: Callable[..., Any] | None,
+        early: bool,
     ) -> None:
         self.__wrapped__ = function
         self.__doc__ = function.__doc__
         self._signature = signature
         self._threads = threads
         self._for_arrays = for_arrays
+        self.early = early
 
     def __call__(self, *arguments: Any) -> Any:  # noqa: D102
         assert not self._threads or threads_are_allowed(), "a copy of a process has no threads"
@@ -88,26 +91,27 @@ def kernel(
     signature: str | None = None,
     threads: bool = False,
     for_arrays: Callable[..., Any] | None = None,
+    early: bool = False,
 ) -> Callable[[Any], Kernel]:
     """Return what makes a `Kernel` of a function, with arguments as there."""
 
     def make(function: FunctionType) -> Kernel:
-        made = Kernel(function, signature, threads, for_arrays)
+        made = Kernel(function, signature, threads, for_arrays, early)
         _made.append(made)
         return made
 
     return make
 
 
-def load_numba() -> None:
-    """Load numba, with what its first kernel needs."""
-    _numba()
+def load_kernels(early: bool = False) -> None:
+    """Load kernels of the modules that are loaded, so that no job waits for them.
 
-
-def load_kernels() -> None:
-    """Load all kernels of the modules that are loaded, so that no job waits for them."""
+    Args:
+        early: Those alone that most runs call.
+    """
     for made in _made:
-        _ = made.compiled
+        if made.early or not early:
+            _ = made.compiled
 
 
 def use_one_thread() -> None:

@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from opl.files.beside import Beside, Later
-from opl.files.kernels import load_numba
+from opl.files.kernels import load_kernels
 from opl.job.load import Job, check_job, job_in_si
 from opl.run.values import Surfaced
 
@@ -39,7 +39,7 @@ def job_ahead(
             beside.begin(surfaced)
             for module in ("stages", "reporting", "delivery"):
                 import_module(f"opl.run.{module}")
-            load_numba()
+            load_kernels(early=True)
         yield job.value(), surfaced
 
 

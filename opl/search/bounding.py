@@ -33,7 +33,8 @@ def _within_limits(cells, cell, low, high, limits):  # type: ignore[no-untyped-d
 
 @kernel(
     "int64(float64[:,::1],int64[:,::1],int64[::1],int64,float64[:,:,::1],"
-    "float64[::1],float64[::1],float64,float64[::1])"
+    "float64[::1],float64[::1],float64,float64[::1])",
+    early=True,
 )
 def tighten(cells, spans, pass_index, n_keys, limits, low, high, closing, sizes):  # type: ignore[no-untyped-def]
     """Cut off what no box below a size can hold; return how many spans are left, 0 if none can be.
@@ -130,7 +131,10 @@ def _pressed(cells, cell, prices, low, high):  # type: ignore[no-untyped-def]
     return min(start, end)
 
 
-@kernel("int64(float64[:,::1],int64[:,::1],int64,float64[:,::1],float64[::1],float64[::1],float64)")
+@kernel(
+    "int64(float64[:,::1],int64[:,::1],int64,float64[:,::1],float64[::1],float64[::1],float64)",
+    early=True,
+)
 def trim(cells, spans, n_walls, prices, low, high, left):  # type: ignore[no-untyped-def]
     """Cut cells off the ends of spans that no box below a size can hold; return how many are left.
 
@@ -169,7 +173,7 @@ def trim(cells, spans, n_walls, prices, low, high, left):  # type: ignore[no-unt
     return n
 
 
-@kernel("float64[::1](float64[:,::1],int64[:,::1],float64[::1],float64[::1])")
+@kernel("float64[::1](float64[:,::1],int64[:,::1],float64[::1],float64[::1])", early=True)
 def distances(cells, spans, low, high):  # type: ignore[no-untyped-def]
     """Return by how much a box misses the chords of each span, shape (n, 5), in [rad]."""
     found = np.empty(len(spans))

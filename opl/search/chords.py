@@ -67,7 +67,8 @@ def clip(q, low, high, enter, leave):  # type: ignore[no-untyped-def]
 
 @kernel(
     "void(float64[:,::1],float64[:,:,::1],boolean[:,::1],float64[::1],float64[::1],float64[::1],"
-    "boolean,float64[:,::1],float64[::1])"
+    "boolean,float64[:,::1],float64[::1])",
+    early=True,
 )
 def sample(t, q, free, low, high, share, whole, found, spacing):  # type: ignore[no-untyped-def]
     """Find contact positions where chords lie in a box.

@@ -75,7 +75,7 @@ _FIELD = (
 )
 
 
-@kernel(f"void({_FIELD},boolean[:,::1])")
+@kernel(f"void({_FIELD},boolean[:,::1])", early=True)
 def _add_dead_ends(  # type: ignore[no-untyped-def]
     q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked, dead
 ):
@@ -99,7 +99,9 @@ def _add_dead_ends(  # type: ignore[no-untyped-def]
             dead[column, here] = not leads_on
 
 
-@kernel(f"Tuple((int64,float64,int64))({_FIELD},boolean[:,::1],int64,float64,int64[::1])")
+@kernel(
+    f"Tuple((int64,float64,int64))({_FIELD},boolean[:,::1],int64,float64,int64[::1])", early=True
+)
 def _descend(  # type: ignore[no-untyped-def]
     q,
     free,

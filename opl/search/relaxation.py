@@ -92,7 +92,8 @@ def _pivot(table, basis, n_rows, n_columns, dual):  # type: ignore[no-untyped-de
 @kernel(
     "UniTuple(float64,2)(float64[:,::1],int64[:,::1],int64,float64[::1],float64[::1],float64,"
     "float64[:,::1],"
-    "float64[::1],float64[::1],float64[:,::1])"
+    "float64[::1],float64[::1],float64[:,::1])",
+    early=True,
 )
 def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, prices):  # type: ignore[no-untyped-def]
     """Return a bound on the box that holds a core and a point of each wall, in [rad].

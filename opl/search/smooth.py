@@ -128,7 +128,8 @@ def smoothest_within(
 @kernel(
     "float64(float64[:,:,::1],boolean[:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
     "int16[:,:,::1],int64[::1],float64[::1],float64,float64,float64[::1],float64[::1],float64,float64[:,::1],"
-    "int64[::1])"
+    "int64[::1])",
+    early=True,
 )
 def _cheapest(  # type: ignore[no-untyped-def]
     q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked,
