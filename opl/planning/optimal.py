@@ -152,9 +152,9 @@ class OptimalSearch:
         placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
         missed = missed[:MOST_ADDED]
         if not candidate.settled:
-            if not self._sampler.collisions and placements:
+            if placements:
                 self._look_for_more(box, placements)
-                if self._in_vain >= MOST_IN_VAIN:
+                if self._in_vain >= MOST_IN_VAIN and not self._sampler.collisions:
                     self._mind_collisions()
                     return
             if missed:
