@@ -1,6 +1,6 @@
 """The surface of the part in patches, and how near each can be to the wheel, a plain cylinder.
 
-The cylinder is written out from its axis, apart from `ContactWheel`.
+The cylinder is written out from its axis, apart from `ContactWheel` and from the planner's kernels.
 """
 
 from __future__ import annotations
@@ -10,9 +10,70 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array, transform
 
 MOST = 50  # triangles in a patch
+
+
+@kernel("UniTuple(float64,4)(float64,float64,float64,float64[:,::1],float64,float64)")
+def _out_of_drum(x, y, z, T, radius, width):  # type: ignore[no-untyped-def]
+    """Return the distance of a point from a `Drum` in [m], and the direction in which it grows."""
+    x, y, z = x - T[0, 3], y - T[1, 3], z - T[2, 3]
+    along = x * T[0, 2] + y * T[1, 2] + z * T[2, 2]
+    x, y, z = x - along * T[0, 2], y - along * T[1, 2], z - along * T[2, 2]
+    away = np.sqrt(x * x + y * y + z * z)
+    beside, beyond = abs(along) - width / 2.0, away - radius
+    # parts of the shortest motion out: along the axis, and away from it
+    if beside <= 0.0 and beyond <= 0.0:
+        distance = max(beside, beyond)
+        sideways, outward = (1.0, 0.0) if beside > beyond else (0.0, 1.0)
+    else:
+        sideways, outward = max(beside, 0.0), max(beyond, 0.0)
+        distance = np.sqrt(sideways * sideways + outward * outward)
+        sideways, outward = sideways / distance, outward / distance
+    if along < 0.0:
+        sideways = -sideways
+    outward /= max(away, 1e-12)
+    return (
+        distance,
+        sideways * T[0, 2] + outward * x,
+        sideways * T[1, 2] + outward * y,
+        sideways * T[2, 2] + outward * z,
+    )
+
+
+@kernel("void(float64[:,::1],float64[:,::1],float64,float64,float64[::1],float64[:,::1])")
+def _from_drum(points, T, radius, width, distance, direction):  # type: ignore[no-untyped-def]
+    """Do `Drum.distances` for points in the base frame, shape (n, 3)."""
+    for k in range(len(points)):
+        x, y, z = points[k]
+        distance[k], x, y, z = _out_of_drum(x, y, z, T, radius, width)
+        direction[k, 0], direction[k, 1], direction[k, 2] = x, y, z
+
+
+@kernel(
+    "void(float64[:,::1],float64[:,::1],float64[:,:,::1],float64[:,::1],float64[:,::1],float64,"
+    "float64,float64[::1],float64[:,::1],float64[::1])"
+)
+def _beside_drum(  # type: ignore[no-untyped-def]
+    T, middle, axes, half, T_base_drum, radius, width, distance, outward, boxes
+):
+    """Do `Patches.beside` for patches whose part is at T in the base frame."""
+    for k in range(len(middle)):
+        p, q, r = middle[k]
+        x = T[0, 0] * p + T[0, 1] * q + T[0, 2] * r + T[0, 3]
+        y = T[1, 0] * p + T[1, 1] * q + T[1, 2] * r + T[1, 3]
+        z = T[2, 0] * p + T[2, 1] * q + T[2, 2] * r + T[2, 3]
+        away, x, y, z = _out_of_drum(x, y, z, T_base_drum, radius, width)
+        distance[k] = boxes[k] = away
+        for i in range(3):
+            outward[k, i] = x * T[0, i] + y * T[1, i] + z * T[2, i]
+        for edge in range(3):
+            along = 0.0
+            for i in range(3):
+                along += outward[k, i] * axes[k, i, edge]
+            boxes[k] -= abs(along) * half[k, edge]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,22 +98,8 @@ class Drum:
         Returns:
             Distances, negative inside, shape (n,); unit vectors, shape (n, 3).
         """
-        axis = self.T_base_drum[:3, 2]
-        from_middle = p_base - self.T_base_drum[:3, 3]
-        along = from_middle @ axis
-        radial = from_middle - along[:, None] * axis
-        away = np.linalg.norm(radial, axis=1)
-        beside, beyond = np.abs(along) - self.width / 2.0, away - self.radius
-        # parts of the shortest motion out: along the axis, and away from it
-        sideways, outward = np.maximum(beside, 0.0), np.maximum(beyond, 0.0)
-        inside = (beside <= 0.0) & (beyond <= 0.0)
-        sideways = np.where(inside, beside > beyond, sideways)
-        outward = np.where(inside, beside <= beyond, outward)
-        norm = np.hypot(sideways, outward)
-        distance = np.where(inside, np.maximum(beside, beyond), norm)
-        side = np.where(along < 0.0, -1.0, 1.0)
-        direction = (sideways / norm * side)[:, None] * axis
-        direction = direction + (outward / norm / np.maximum(away, 1e-12))[:, None] * radial
+        distance, direction = np.empty(len(p_base)), np.empty((len(p_base), 3))
+        _from_drum(p_base, self.T_base_drum, self.radius, self.width, distance, direction)
         return distance, direction
 
 
@@ -103,8 +150,12 @@ class Patches:
 
     def beside(self, drum: Drum, T_base_workpiece: Array) -> Beside:
         """Return how near the patches can be to the wheel in a pose of the part, shape (4, 4)."""
-        distance, outward = drum.distances(transform(T_base_workpiece, self.middle))
-        return Beside(self, distance, outward @ T_base_workpiece[:3, :3])
+        count = len(self.middle)
+        distance, outward, boxes = np.empty(count), np.empty((count, 3)), np.empty(count)
+        given = T_base_workpiece, self.middle, self.axes, self.half
+        wheel = drum.T_base_drum, drum.radius, drum.width
+        _beside_drum(*given, *wheel, distance, outward, boxes)
+        return Beside(self, distance, outward, boxes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,16 +170,13 @@ class Beside:
         patches: The patches.
         distance: Of the middle of each in [m], shape (p,).
         outward: In which direction it grows, in the workpiece frame, shape (p, 3).
+        boxes: Bounds by the boxes around the patches, shape (p,).
     """
 
     patches: Patches
     distance: Array
     outward: Array
-
-    def of_boxes(self) -> Array:
-        """Return a bound of each patch by the box around it, shape (p,)."""
-        along = np.abs(np.einsum("pi,pik->pk", self.outward, self.patches.axes))
-        return np.asarray(self.distance - (along * self.patches.half).sum(axis=1))
+    boxes: Array
 
     def of_corners(self, k: int) -> float:
         """Return a bound of one patch by its triangles, no less than that of its box."""

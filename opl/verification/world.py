@@ -176,7 +176,7 @@ class World(Arm):
         the smallest there is; others are those of some patch.
         """
         beside = self._patches.beside(self._drum, self._T_base_workpiece)
-        bounds, nearest = beside.of_boxes(), np.inf
+        bounds, nearest = beside.boxes, np.inf
         for k in bounds.argsort():
             wanted = min(nearest, within if nearest > within else counts) + 2.0 * MARGIN
             if bounds[k] > wanted:

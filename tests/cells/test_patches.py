@@ -55,7 +55,7 @@ def test_patches_are_all_the_triangles_and_their_bounds_hold():
     weights = np.random.default_rng(2).dirichlet(np.ones(3), 200)
     T = at([0.5, 0.1, 1.0], [0.15, 0.2, 0.3])
     beside = patches.beside(DRUM, T)
-    for k, (patch, of_box) in enumerate(zip(patches.triangles, beside.of_boxes(), strict=True)):
+    for k, (patch, of_box) in enumerate(zip(patches.triangles, beside.boxes, strict=True)):
         points = np.einsum("wk,mki->wmi", weights, patch).reshape(-1, 3)
         nearest = DRUM.distances(points @ T[:3, :3].T + T[:3, 3])[0].min()
         assert nearest >= beside.of_corners(k) >= of_box - 1e-12
