@@ -18,6 +18,7 @@ from opl.planning.sides import Side
 from opl.search.box import JointBox
 from opl.search.cells import Key
 from opl.search.chords import JUMP
+from opl.search.joint_limits import about
 from opl.search.outside import outside
 
 MOST_COLUMNS = 1000  # at which a box is held against the families
@@ -165,21 +166,27 @@ class Families:
     def grown(self, box: JointBox, placements: Sequence[Placement]) -> JointBox | None:
         """Return a box grown for all columns at the field's contact positions, as `grown` does."""
         for index, placement in enumerate(placements):
-            larger = _grown(*self._placed(index, placement), box)
+            larger = _grown(*self._placed(index, placement, box), box)
             if larger is None:
                 return None
             box = larger
         return box
 
-    def _placed(self, index: int, placement: Placement) -> tuple[Array, np.ndarray]:
-        """Return the nodes of a pass as placed, shape (n, 6, m), and which are free, (n, m)."""
-        key = index, placement.key
+    def _placed(self, index: int, placement: Placement, box: JointBox) -> tuple[Array, np.ndarray]:
+        """Return the nodes of a pass as placed, shape (n, 6, m), and which are free, (n, m).
+
+        Those beyond the limits where a box is within them are not.
+        """
+        limits = about(box, self._images.limits)
+        key = index, placement.key, limits.lower.tobytes(), limits.upper.tobytes()
         found = self._known.get(key)
         if found is None:
             columns = self._pass_index == index
             unrolled, free = self._unrolled[placement.family]
-            q = np.ascontiguousarray(np.moveaxis(placement.of(unrolled[columns]), 1, 2))
+            placed = placement.of(unrolled[columns])
             allowed = placement.side.holds(self._places[columns], self._contact_positions)
+            allowed = allowed & limits.holds(placed)
+            q = np.ascontiguousarray(np.moveaxis(placed, 1, 2))
             found = q, np.ascontiguousarray(free[columns] & allowed)
             if not placement.loose.any():
                 if len(self._known) >= MOST_KNOWN:
@@ -215,7 +222,7 @@ class Families:
         """Return how the images that a pass may use fit into a box."""
         found = []
         for placement in self._placements(index, (box.lower + box.upper) / 2.0, keys):
-            q, free = self._placed(index, placement)
+            q, free = self._placed(index, placement, box)
             missing, row = np.empty(len(q)), np.empty(len(q))
             outside(q, free, box.lower, box.upper, JUMP, missing, row)
             found.append(Fit(placement, missing, row))

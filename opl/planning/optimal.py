@@ -83,6 +83,7 @@ class OptimalSearch:
         self._largest = largest
         self._proven = self._least_hope = 0.0
         self._told = fallback is not None  # whether a motion or a box tells what to hope for
+        self._raised = RAISED  # grows as long as neither a motion nor a new box tells
         self._given_up = self._refined = 0
         self._refined_for = 0.0  # size of the box for which rectangles were cut finer last
         self._forbidden: Forbidden | None = None  # of collisions, once they are known to matter
@@ -108,11 +109,6 @@ class OptimalSearch:
     def work_share(self) -> float:
         """How much of the work allowed is done."""
         return self._work.done / self._settings.max_subproblems
-
-    @property
-    def minds_collisions(self) -> bool:
-        """Whether the proof rests on where the robot collides as well."""
-        return self._forbidden is not None
 
     @property
     def open_because(self) -> str | None:
@@ -223,7 +219,8 @@ class OptimalSearch:
         if box is not None:
             self._told = True
             hoped = max(box.size * (1.0 + self._settings.widen), self._least_hope)
-            self.proof.threshold = min(self.proof.threshold, hoped)
+            if hoped < self.proof.threshold:
+                self.proof.threshold, self._raised = hoped, RAISED
 
     def _mind_collisions(self) -> None:
         """Leave out where the robot collides: it does wherever a motion might have been."""
@@ -252,7 +249,8 @@ class OptimalSearch:
 
     def _hope_for_less(self) -> None:
         """Begin the proof again: no motion is as good as was hoped."""
-        raised = RAISED if self._told else GUESSED
+        raised = self._raised if self._told else GUESSED
+        self._raised = RAISED if self.plan else min(self._raised**2, GUESSED)
         hope = min(self._value, self.proof.threshold * raised)
         self._begin_again(self.proof, hope, hope)
 
