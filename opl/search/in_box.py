@@ -28,7 +28,8 @@ def sampled(
     """
     found, spacing = np.empty((len(q), count)), np.empty(len(q))
     share = np.linspace(0.0, 1.0, count)
-    given = (np.ascontiguousarray(one) for one in (t, q, free))
+    # a broadcast row is contiguous as well, but may not be written to, and kernels take no such
+    given = (np.require(one, requirements=["C", "W"]) for one in (t, q, free))
     sample(*given, box.lower, box.upper, share, whole, found, spacing)
     return found, spacing
 
@@ -53,8 +54,16 @@ def missing_chords(q: Array, free: np.ndarray, box: JointBox) -> Array:
 def nearest_points(q: Array, free: np.ndarray, box: JointBox) -> tuple[Array, Array]:
     """Return what `missing_chords` does, and the fractional row of the points, -1 for none."""
     missing, row = np.empty(len(q)), np.empty(len(q))
-    by_joint = np.ascontiguousarray(np.moveaxis(q, 1, 2))
-    outside(by_joint, np.ascontiguousarray(free), box.lower, box.upper, JUMP, missing, row)
+    by_joint = np.require(np.moveaxis(q, 1, 2), requirements=["C", "W"])
+    outside(
+        by_joint,
+        np.require(free, requirements=["C", "W"]),
+        box.lower,
+        box.upper,
+        JUMP,
+        missing,
+        row,
+    )
     return missing, row
 
 
@@ -71,5 +80,5 @@ def clipped(q: Array, box: JointBox) -> tuple[Array, Array]:
     Shape (n, m - 1) each; one that does not meet the box leaves before it enters.
     """
     enter, leave = np.empty((2, len(q), q.shape[1] - 1))
-    clip(np.ascontiguousarray(q), box.lower, box.upper, enter, leave)
+    clip(np.require(q, requirements=["C", "W"]), box.lower, box.upper, enter, leave)
     return enter, leave

@@ -1,0 +1,44 @@
+"""Where chords lie in a box, held against closed forms on straight columns."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from opl.search.box import JointBox
+from opl.search.in_box import clipped, nearest_points, sampled
+
+ROWS = np.linspace(-1.0, 1.0, 9)
+some = st.lists(st.integers(-200, 200).map(lambda k: k / 1000.0), min_size=6, max_size=6)
+
+
+@settings(deadline=None)
+@given(some, some, st.integers(1, 200).map(lambda k: k / 1000.0 + 1e-4))
+def test_a_straight_column_is_sampled_where_the_box_holds_it(start, slope, half):
+    q = np.array(start) + ROWS[:, None] * np.array(slope)
+    box = JointBox(np.full(6, -half), np.full(6, half))
+    # where each joint is within its faces
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.sort((np.array([[-half], [half]]) - start) / np.array(slope), axis=0)
+    still = np.abs(slope) < 1e-12
+    ends[:, still] = np.where(np.abs(np.array(start)[still]) <= half, [[-9.0], [9.0]], 9.0)
+    first, last = max(ends[0].max(), -1.0), min(ends[1].min(), 1.0)
+    if last - first < 1e-6:
+        return
+    free = np.ones((1, len(ROWS)), dtype=bool)
+    t, spacing = sampled(ROWS[None], q[None], free, box, 5)
+    assert t[0] == pytest.approx(np.linspace(first, last, 5), abs=1e-6)
+    assert spacing == pytest.approx((last - first) / 4.0, abs=1e-6)
+    assert nearest_points(q[None], free, box)[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_columns_may_be_read_only():
+    """Those of one place are contiguous where they are broadcast, too."""
+    t = np.broadcast_to(ROWS, (1, len(ROWS)))
+    q = np.broadcast_to(np.repeat(ROWS[:, None], 6, axis=1), (1, len(ROWS), 6))
+    free = np.broadcast_to(np.ones(len(ROWS), dtype=bool), (1, len(ROWS)))
+    assert not (t.flags.writeable or q.flags.writeable or free.flags.writeable)
+    box = JointBox(np.full(6, 0.3), np.full(6, 0.6))
+    assert sampled(t, q, free, box, 2)[0][0] == pytest.approx([0.3, 0.6])
+    assert (np.diff(clipped(q, box), axis=0) >= 0.0).sum() == 2
+    assert nearest_points(q, free, box)[0] == pytest.approx(0.0)
