@@ -87,19 +87,27 @@ class ColumnSampler:
             return (self._limits[int(self.mirrored)],)
         return self._limits
 
-    def columns(self, box: JointBox, placements: Sequence[Placement], places: Array) -> Columns:
+    def columns(
+        self,
+        box: JointBox,
+        placements: Sequence[Placement],
+        places: Array,
+        spare: Array | None = None,
+    ) -> Columns:
         """Sample the postures of places where they are near to a box.
 
         Args:
             box: The box.
             placements: The image that each pass uses.
             places: Fractional cutter points, the cutter points among them, shape (n,).
+            spare: Depth in [m] that they leave of what is allowed, shape (n,); none if not given.
         """
-        problem = self._problem
+        problem, spare = self._problem, np.zeros(len(places)) if spare is None else spare
         there = self.there(places)
         positions = problem.field.contact_positions
         grid = np.broadcast_to(positions, (len(places), len(positions)))
         cuts = self._cuts(places, there, grid)
+        cuts |= self._spends(there, grid, ~cuts, spare)
         t = np.empty((len(places), FINE))
         for block in blocks_of(*grid.shape):
             coarse = self._coarse(places[block], placements)
@@ -109,16 +117,17 @@ class ColumnSampler:
         # where the part begins to cut is known to a hair only
         last = problem.cell.wheel.last_position
         t = np.clip(np.concatenate([t[:, :1] - BORDER, t, t[:, -1:] + BORDER], axis=1), -last, last)
-        columns = self._closer(self._within(box, self.at(places, there, placements, t)), box)
+        columns = self._within(box, self.spared(self.at(places, there, placements, t), spare))
+        columns = self._closer(columns, box, spare)
         if self.collisions:
             self._leave_out_collisions(columns, box)
             # where collisions begin is seen at the samples only
             for _ in range(CLOSER):
-                columns = self._closer(columns, box)
+                columns = self._closer(columns, box, spare)
                 self._leave_out_collisions(columns, box)
         return columns
 
-    def _closer(self, columns: Columns, box: JointBox) -> Columns:
+    def _closer(self, columns: Columns, box: JointBox, spare: Array) -> Columns:
         """Sample places that a box misses anew, closer around what is nearest to it."""
         missed, row = nearest_points(columns.q, columns.free, box)
         t, last = columns.t, columns.t.shape[1] - 1
@@ -132,7 +141,8 @@ class ColumnSampler:
             high = t[own, np.minimum(np.ceil(row[own]).astype(int) + 1, last)]
             finer = np.linspace(low, high, last + 1, axis=1)
             places = columns.places[own]
-            found = self._within(box, self.at(places, self.there(places), [placement], finer))
+            found = self.at(places, self.there(places), [placement], finer)
+            found = self._within(box, self.spared(found, spare[own]))
             t[own], columns.q[own], columns.free[own] = finer, found.q, found.free
         return columns
 
@@ -197,12 +207,16 @@ class ColumnSampler:
 
     def spared(self, columns: Columns, spare: Array) -> Columns:
         """Leave out postures that leave less than some depth of that allowed, by place in [m]."""
-        asked = columns.free & (spare > 0.0)[:, None]
+        spends = self._spends(columns.points, columns.t, columns.free, spare)
+        return replace(columns, free=columns.free & ~spends)
+
+    def _spends(self, there: CutterPoints, t: Array, free: np.ndarray, spare: Array) -> np.ndarray:
+        """Return which free nodes leave less than some depth in [m] of that allowed, (n, m)."""
+        asked = free & (spare > 0.0)[:, None]
         if not asked.any():
-            return columns
+            return asked
         scene, needed = self._problem.scene, spare[:, None] - self._problem.cell.planned_penetration
-        distance = wheel_distances(scene, columns.points, columns.t, asked, needed)
-        return replace(columns, free=columns.free & (~asked | (distance >= needed)))
+        return np.asarray(asked & (wheel_distances(scene, there, t, asked, needed) < needed))
 
     def _leave_out_leads(
         self, there: CutterPoints, placements: Sequence[Placement], t: Array, free: np.ndarray

@@ -16,6 +16,7 @@ from opl.cell.collision import CollisionScene
 from opl.geometry.frames import Array
 from opl.planning.box_columns import Columns, ColumnSampler
 from opl.planning.costs import track_cost
+from opl.planning.families import grown
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.nodes import NodeField
 from opl.planning.open_matrix import Track, close_collisions, open_matrices
@@ -102,14 +103,8 @@ class BoxTracks:
         Returns:
             The motion; None if nothing is free, or if something was learnt instead.
         """
-        inner = cut_at(box.widened(room / 2.0), self.sampler.limits)
-        t, spacing = samples_in(columns.t, columns.q, columns.free, inner, SAMPLES)
-        places, rows, one = columns.places, passages.rows, t[:, :1]
-        known = levels(places, rows, inner, one), crossed(places, passages.crossings, one)
-        t = np.concatenate([t, *known], axis=1)
-        self.sampler.work += len(t) * t.shape[1] ** 2 / EDGES_OF_WORK
-        at = self.sampler.at(places, columns.points, columns.placements, t)
-        coarse = sampled = _Sampled(self, at, rows, inner, np.zeros(len(t)))
+        places, rows = columns.places, passages.rows
+        coarse = sampled = self._sampled(columns, passages, box, room, np.zeros(len(places)))
         track: Track | None = coarse.smoothest()
         if track is None:
             ladders = [matrix.ladder_within(self._max_contact_change) for matrix in coarse.matrices]
@@ -123,7 +118,7 @@ class BoxTracks:
         for _ in range(MOST_SPARED + 1):
             if track is None:
                 break
-            closest, track = sampled.closest(track, spacing)
+            closest, track = sampled.closest(track)
             if (bulges := closest.bulges(track, box.widened(BULGE * room))) and learn(bulges):
                 return None
             plan, sunk = closest.check(track)
@@ -131,8 +126,11 @@ class BoxTracks:
                 return plan
             if sunk is None or not shallower(sunk, before):
                 break
-            before = sunk
-            sampled = _Sampled(self, at, rows, inner, spare_for(sampled.spare, sunk))
+            before, spare = sunk, spare_for(sampled.spare, sunk)
+            # where the box holds no posture that leaves so much, the nearest that does
+            columns = self.sampler.columns(box, columns.placements, places, spare)
+            box = grown(columns.q, columns.free, box) or box
+            sampled = self._sampled(columns, passages, box, room, spare)
             track = sampled.smoothest()
         if sunk is not None and learn(places_for(places, sunk)):
             return None
@@ -140,19 +138,38 @@ class BoxTracks:
         around = coarse.smoothest()
         return None if around is None else coarse.check(around)[0]
 
+    def _sampled(
+        self, columns: Columns, passages: Passages, box: JointBox, room: float, spare: Array
+    ) -> _Sampled:
+        """Return the nodes of places that a motion in a box may use."""
+        inner = cut_at(box.widened(room / 2.0), self.sampler.limits)
+        t, spacing = samples_in(columns.t, columns.q, columns.free, inner, SAMPLES)
+        places, one = columns.places, t[:, :1]
+        known = levels(places, passages.rows, inner, one), crossed(places, passages.crossings, one)
+        t = np.concatenate([t, *known], axis=1)
+        self.sampler.work += len(t) * t.shape[1] ** 2 / EDGES_OF_WORK
+        at = self.sampler.at(places, columns.points, columns.placements, t)
+        return _Sampled(self, at, passages.rows, inner, spare, spacing)
+
 
 class _Sampled:
     """The nodes of some places at contact positions of their own."""
 
     def __init__(
-        self, search: BoxTracks, columns: Columns, rows: Sequence[Row], box: JointBox, spare: Array
+        self,
+        search: BoxTracks,
+        columns: Columns,
+        rows: Sequence[Row],
+        box: JointBox,
+        spare: Array,
+        spacing: Array,
     ) -> None:
-        columns = search.sampler.spared(columns, spare)
         self._search = search
-        self._columns = columns
+        self._columns = columns = search.sampler.spared(columns, spare)
         self._rows = rows
         self._box = box
         self.spare = spare  # depth in [m] that nodes leave of what is allowed, by column
+        self._spacing = spacing  # belt units between contact positions, by column
         problem = search._problem
         q = np.where(
             (columns.free & nearest(columns.q, columns.free, box))[..., None], columns.q, np.nan
@@ -214,24 +231,25 @@ class _Sampled:
                 asked |= now
         return None
 
-    def closer(self, track: Track, spacing: Array) -> _Sampled:
+    def _closer(self, track: Track) -> _Sampled:
         """Return closer samples around a track, whose own nodes are among them."""
         search, columns = self._search, self._columns
         own = self.matrices[track.matrix].nodes.t_along(track.rows)
         about = np.linspace(-1.0, 1.0, SAMPLES)
         last = search._problem.cell.wheel.last_position
-        t = np.clip(own[:, None] + about * spacing[:, None], -last, last)
+        t = np.clip(own[:, None] + about * self._spacing[:, None], -last, last)
         around = search.sampler.at(columns.places, columns.points, columns.placements, t)
-        return _Sampled(search, around, self._rows, self._box, self.spare)
+        spacing = self._spacing * 2.0 / (SAMPLES - 1)
+        return _Sampled(search, around, self._rows, self._box, self.spare, spacing)
 
-    def closest(self, track: Track, spacing: Array) -> tuple[_Sampled, Track]:
+    def closest(self, track: Track) -> tuple[_Sampled, Track]:
         """Return samples closer and closer around a track, and the smoothest track in them."""
         sampled: _Sampled = self
         for _ in range(ROUNDS):
-            closer = sampled.closer(track, spacing)
+            closer = sampled._closer(track)
             if (finer := closer.smoothest()) is None:
                 break
-            sampled, track, spacing = closer, finer, spacing * 2.0 / (SAMPLES - 1)
+            sampled, track = closer, finer
         return sampled, track
 
     def bulges(self, track: Track, box: JointBox) -> list[Bulge]:

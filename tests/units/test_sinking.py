@@ -1,21 +1,28 @@
 """What is spared for tracks along which the part sinks too deep between two places."""
 
+from dataclasses import replace
+from functools import cache
+
 import numpy as np
 
 from opl.cell.workcell import PART, WHEEL
 from opl.motion.collision_check import CollidingMove
 from opl.motion.motion import Phase
+from opl.planning import box_track
 from opl.planning.box_columns import ColumnSampler
+from opl.planning.box_track import BoxTracks
 from opl.planning.families import Families, few_columns
 from opl.planning.images import Images, seams_of
 from opl.planning.multi_start import tracks_from_best_start
 from opl.planning.open_matrix import open_matrices
+from opl.planning.passages import NO_PASSAGES
 from opl.planning.problem import wheel_distances
 from opl.planning.sides import ANY_SIDE
-from opl.planning.sinking import places_for, shallower, spare_for, sunk_between
+from opl.planning.sinking import MORE, places_for, shallower, spare_for, sunk_between
 from opl.planning.track_check import Collides, check_track
 from opl.search.joint_limits import UNLIMITED
-from tests.support.planned import small_problem
+from opl.search.smooth import Travel
+from tests.support.planned import small_problem, v_job
 
 
 def test_moves_that_sink_are_those_between_their_columns():
@@ -47,7 +54,9 @@ def test_depth_is_spared_at_both_ends_and_where_it_is_of_no_use_places_are_taken
     assert not places_for(np.array([0.0, 1.0, 1.001, 2.0, 3.0]), sunk)
 
 
-def test_nodes_leave_the_depth_that_is_spared():
+@cache
+def near_a_box():
+    """Return a small box for the small problem, and the postures of its places near to that."""
     problem = small_problem()
     points, t = problem.points, problem.field.contact_positions
     q = problem.solutions(few_columns(points.pass_index))
@@ -57,13 +66,48 @@ def test_nodes_leave_the_depth_that_is_spared():
     box = families.smallest_grown()
     placements, _ = families.hold(box, {}, set(), 0.1)
     sampler = ColumnSampler(problem, seams, UNLIMITED)
-    columns = sampler.columns(box, placements, np.arange(len(points), dtype=float))
-    depth = problem.cell.planned_penetration
-    distance = wheel_distances(
-        problem.scene, points, columns.t, None, np.full((len(points), 1), 1.0)
-    )
-    spare = np.where(np.arange(len(points)) % 2 == 0, depth + np.median(distance), 0.0)
+    return box, sampler, sampler.columns(box, placements, np.arange(len(points), dtype=float))
+
+
+def distances(columns):
+    """Return the distance of the part to the wheel in [m], far away too, shape (n, m)."""
+    problem = small_problem()
+    far = np.full((len(columns.places), 1), 1.0)
+    return wheel_distances(problem.scene, problem.points, columns.t, None, far)
+
+
+def test_nodes_leave_the_depth_that_is_spared():
+    _, sampler, columns = near_a_box()
+    depth = small_problem().cell.planned_penetration
+    distance = distances(columns)
+    spare = np.where(np.arange(len(distance)) % 2 == 0, depth + np.median(distance), 0.0)
     found = sampler.spared(columns, spare)
     wanted = columns.free & ((distance >= spare[:, None] - depth) | (spare == 0.0)[:, None])
     np.testing.assert_array_equal(found.free, wanted)
     assert 0 < found.free[::2].sum() < columns.free[::2].sum()
+
+
+def test_where_a_box_leaves_no_depth_to_spare_tracks_are_sought_in_the_next_that_does(monkeypatch):
+    problem, settings = small_problem(), v_job().search.optimal
+    box, sampler, columns = near_a_box()
+    edge, needed = 29, 402.5e-6  # of depth, more than there is near the box at both its places
+    sunk = np.zeros(len(problem.points) - 1)
+    sunk[edge] = needed / MORE
+    spare = spare_for(np.zeros(len(columns.places)), sunk)
+    assert not sampler.spared(columns, spare).free[edge].any()
+    checked = []
+
+    def check(sampled, track):
+        q = sampled.matrices[track.matrix].nodes.along(track.rows)
+        t = sampled.matrices[track.matrix].nodes.t_along(track.rows)
+        at = replace(columns, t=t[:, None])
+        checked.append((q, distances(at)[edge : edge + 2] + problem.cell.planned_penetration))
+        return None, sunk if len(checked) == 1 else None
+
+    monkeypatch.setattr(box_track._Sampled, "check", check)
+    tracks = BoxTracks(problem, sampler, settings.costs, np.inf, Travel(np.inf, np.inf))
+    tracks.plan(columns, NO_PASSAGES, box, 1e-3, lambda _: False)
+    (_, before), (q, spared), *_ = checked
+    assert before.min() < needed
+    assert spared.min() >= needed - 1e-9
+    assert box.size < np.ptp(q, axis=0).sum() < 1.05 * box.size
