@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import ContactWheel
@@ -206,24 +207,47 @@ def _in_order(
 ) -> NDArray[np.intp]:
     """Choose one place for each configuration so that none goes back, shape (s, n).
 
-    Dynamic programming over the configurations; the sum of the squares of all misfits is least.
-    Places, distances in [m] and contact positions have shape (s, n, k), even changes of t, the
-    changes of all moves if they were as fast, shape (s, n + 1).
+    The sum of the squares of all misfits is least. Places, distances in [m] and contact positions
+    have shape (s, n, k), even changes of t, the changes of all moves if they were as fast, shape
+    (s, n + 1).
     """
-    n = tried.shape[1]
-    came_from = np.zeros(tried.shape, dtype=np.intp)
-    begun = t[:, 0] - t_ends[0][:, None] - even[:, :1]
-    cost = np.square(apart[:, 0]) + np.square(UNEVEN * begun)
-    for k in range(1, n):
-        change = t[:, k, :, None] - t[:, k - 1, None]
-        total = cost[:, None] + np.square(UNEVEN * (change - even[:, k, None, None]))
-        total[tried[:, k, :, None] < tried[:, k - 1, None]] = np.inf
-        came_from[:, k] = total.argmin(axis=2)
-        least = np.take_along_axis(total, came_from[:, k, :, None], axis=2)[..., 0]
-        cost = least + np.square(apart[:, k])
-    last = cost + np.square(UNEVEN * (t_ends[1][:, None] - t[:, -1] - even[:, -1:]))
     chosen = np.empty(tried.shape[:2], dtype=np.intp)
-    chosen[:, -1] = last.argmin(axis=1)
-    for k in range(n - 1, 0, -1):
-        chosen[:, k - 1] = np.take_along_axis(came_from[:, k], chosen[:, k, None], axis=1)[:, 0]
+    given = (np.require(one, requirements=["C", "W"]) for one in (tried, apart, t, even, *t_ends))
+    _choose(*given, chosen)
     return chosen
+
+
+@kernel(
+    "void(float64[:,:,::1],float64[:,:,::1],float64[:,:,::1],float64[:,::1],float64[::1],"
+    "float64[::1],int64[:,::1])"
+)
+def _choose(tried, apart, t, even, t_before, t_after, chosen):  # type: ignore[no-untyped-def]
+    """Do `_in_order` by dynamic programming over the configurations."""
+    n_segments, n, count = tried.shape
+    came_from = np.zeros((n, count), np.int64)
+    cost, further = np.empty(count), np.empty(count)
+    for s in range(n_segments):
+        for j in range(count):
+            begun = UNEVEN * (t[s, 0, j] - t_before[s] - even[s, 0])
+            cost[j] = apart[s, 0, j] * apart[s, 0, j] + begun * begun
+        for k in range(1, n):
+            for j in range(count):
+                least, came_from[k, j] = np.inf, 0
+                for i in range(count):
+                    if tried[s, k, j] < tried[s, k - 1, i]:
+                        continue
+                    change = UNEVEN * (t[s, k, j] - t[s, k - 1, i] - even[s, k])
+                    total = cost[i] + change * change
+                    if total < least:
+                        least, came_from[k, j] = total, i
+                further[j] = least + apart[s, k, j] * apart[s, k, j]
+            cost[:] = further
+        least, last = np.inf, 0
+        for j in range(count):
+            ended = UNEVEN * (t_after[s] - t[s, n - 1, j] - even[s, n])
+            total = cost[j] + ended * ended
+            if total < least:
+                least, last = total, j
+        for k in range(n - 1, -1, -1):
+            chosen[s, k] = last
+            last = came_from[k, last]
