@@ -15,7 +15,7 @@ from opl.planning.images import Seams, image_within_limits, wrist_flips
 from opl.planning.nodes import inverse_solutions
 from opl.planning.placement import Placement
 from opl.planning.problem import GrindingProblem, wheel_distances
-from opl.planning.shut_leads import ShutLeads
+from opl.planning.shut_leads import RESERVE, ShutLeads
 from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
 from opl.search.in_box import missing_chords, nearest_points, sampled
@@ -25,7 +25,6 @@ FINE = 33  # contact positions of a place at which a box is held against it
 POSTURES_OF_WORK = 400  # that cost a unit of work
 WITHIN = 6  # halvings of the way between places that is too deep in the wheel, but hardly
 CLOSER = 2  # times that places are sampled closer where collisions begin
-SPARE = 3e-4  # [m] of clearance: a motion may come nearer between two places than at both
 BORDER = 1e-2  # belt units to look beyond what lies in the box
 
 
@@ -75,6 +74,7 @@ class ColumnSampler:
         self._seams = seams
         self.collisions = False  # whether postures that collide are left out
         self.mirrored = False  # whether they are those with the wrist flipped that may not collide
+        self.reserve = RESERVE  # [m] beyond the clearance needed that postures leave
         self.leads = ShutLeads(problem)
         self._limits = tuple(limits)
         self.flips = wrist_flips(problem.cell.robot.arm)
@@ -117,14 +117,20 @@ class ColumnSampler:
         # where the part begins to cut is known to a hair only
         last = problem.cell.wheel.last_position
         t = np.clip(np.concatenate([t[:, :1] - BORDER, t, t[:, -1:] + BORDER], axis=1), -last, last)
-        columns = self._within(box, self.spared(self.at(places, there, placements, t), spare))
-        columns = self._closer(columns, box, spare)
-        if self.collisions:
+        # what is left of a place may leave the clearance needed, and hardly more
+        for reserve in (RESERVE, 0.0):
+            self.reserve = reserve
+            columns = self._within(box, self.spared(self.at(places, there, placements, t), spare))
+            columns = self._closer(columns, box, spare)
+            if not self.collisions:
+                break
             self._leave_out_collisions(columns, box)
             # where collisions begin is seen at the samples only
             for _ in range(CLOSER):
                 columns = self._closer(columns, box, spare)
                 self._leave_out_collisions(columns, box)
+            if columns.free.any(axis=1).all():
+                break
         return columns
 
     def _closer(self, columns: Columns, box: JointBox, spare: Array) -> Columns:
@@ -227,7 +233,7 @@ class ColumnSampler:
             own, row = placements[int(there.pass_index[column])], np.flatnonzero(free[column])
             flip = own.number ^ int(self.mirrored)
             T = there.Ts_workpiece_cutter[column]
-            free[column, row] = ~self.leads.at(T, own.family, flip, t[column, row])
+            free[column, row] = ~self.leads.at(T, own.family, flip, t[column, row], self.reserve)
 
     def there(self, places: Array) -> CutterPoints:
         """Return fractional cutter points of some passes, shape (n,), as points of their own."""
@@ -245,7 +251,7 @@ class ColumnSampler:
         q in [rad], shape (n, 6).
         """
         sign, shift = self.flips[self.mirrored]
-        return self._problem.scene.collision.wider(SPARE).collides(q * sign + shift)
+        return self._problem.scene.collision.wider(self.reserve).collides(q * sign + shift)
 
     def shut_along(self, first: Array, last: Array, t: Array) -> np.ndarray:
         """Return between which places the part surely cuts into the wheel all the way, (n,).

@@ -28,7 +28,7 @@ AT_ONCE = 4  # configurations of a lead that are looked at together
 CELLS_OF_WORK = 15  # enclosed along a lead, that cost a unit of work
 NODES_OF_WORK = 100  # looked at along a lead, likewise
 HALVINGS = 10  # of the way between two contact positions of the field
-SPARE = 3e-4  # [m] of clearance, where samples are looked at
+RESERVE = 3e-4  # [m] of clearance: a motion may come nearer between two samples than at both
 # places of the part that each lead goes through as if they were ground, shape (k, 4, 4)
 Leads = tuple[Array, ...]
 
@@ -48,7 +48,7 @@ class ShutLeads:
         self._problem = problem
         self._flips = wrist_flips(problem.cell.robot.arm)
         self._leads: dict[bytes, list[Leads]] = {}  # by the place
-        self._known: dict[tuple[bytes, int, int], tuple[bool, Array]] = {}
+        self._known: dict[tuple[bytes, int, int, float], tuple[bool, Array]] = {}
         points = problem.points
         for index in range(points.n_passes):
             own = np.flatnonzero(points.pass_index == index)
@@ -77,10 +77,12 @@ class ShutLeads:
             return np.zeros(len(low), dtype=bool), np.zeros(len(low), dtype=bool)
         near = self.at(T, piece.family, flip, (low + high) / 2.0)
         surely = near.copy()
-        surely[near] = self._shut(T, piece.family, flip, low[near], high[near])
+        surely[near] = self._shut(T, piece.family, flip, low[near], high[near], 0.0)
         return surely, near
 
-    def at(self, T_workpiece_cutter: Array, family: int, flip: int, t: Array) -> np.ndarray:
+    def at(
+        self, T_workpiece_cutter: Array, family: int, flip: int, t: Array, reserve: float = RESERVE
+    ) -> np.ndarray:
         """Return at which contact positions every lead is shut, as far as the field tells, (n,).
 
         Where two neighbouring contact positions of the field agree, so does what lies between.
@@ -90,35 +92,39 @@ class ShutLeads:
             family: The posture.
             flip: Which flip of it.
             t: The contact positions in belt units, shape (n,).
+            reserve: What leads leave beyond the clearance needed, in [m].
         """
-        key = T_workpiece_cutter.tobytes(), family, flip
+        key = T_workpiece_cutter.tobytes(), family, flip, reserve
         if key[0] not in self._leads:
             return np.zeros(len(t), dtype=bool)
         if key not in self._known:
-            self._known[key] = self._where_shut(T_workpiece_cutter, family, flip)
+            self._known[key] = self._where_shut(T_workpiece_cutter, *key[1:])
         first, changes = self._known[key]
         return np.asarray((np.searchsorted(changes, t) % 2 == 1) != first)
 
-    def _where_shut(self, T: Array, family: int, flip: int) -> tuple[bool, Array]:
+    def _where_shut(self, T: Array, family: int, flip: int, reserve: float) -> tuple[bool, Array]:
         """Return whether leads are shut at the least contact position, and where that changes."""
         t = self._problem.field.contact_positions
-        shut = self._shut(T, family, flip, t, t)
+        shut = self._shut(T, family, flip, t, t, reserve)
         before = np.flatnonzero(shut[1:] != shut[:-1])
         low, high = t[before], t[before + 1]
         for _ in range(HALVINGS):
             middle = (low + high) / 2.0
-            as_before = self._shut(T, family, flip, middle, middle) == shut[before]
+            as_before = self._shut(T, family, flip, middle, middle, reserve) == shut[before]
             low, high = np.where(as_before, middle, low), np.where(as_before, high, middle)
         return bool(shut[0]), np.where(shut[before], high, low)
 
-    def _shut(self, T: Array, family: int, flip: int, low: Array, high: Array) -> np.ndarray:
+    def _shut(
+        self, T: Array, family: int, flip: int, low: Array, high: Array, reserve: float
+    ) -> np.ndarray:
         """Return in which cells every lead is shut, whatever the contact position, shape (n,)."""
         shut = np.zeros(len(low), dtype=bool)
         for leads in self._leads.get(T.tobytes(), ()):
             # only those of which all leads before are shut
             left = np.flatnonzero(~shut)
             for lead in leads:
-                cells = _Cells(self._problem, family, self._flips[flip], low[left], high[left])
+                ends = low[left], high[left]
+                cells = _Cells(self._problem, family, self._flips[flip], *ends, reserve)
                 self.work += len(left) / (CELLS_OF_WORK if (low < high).any() else NODES_OF_WORK)
                 left = left[cells.shut(T, lead)]
             shut[left] = True
@@ -134,6 +140,7 @@ class _Cells:
         flip: Sign and shift of its flip.
         low: Least contact position of each, shape (n,).
         high: Greatest; those of no width are looked at where they are.
+        reserve: What leads leave beyond the clearance needed, in [m].
     """
 
     def __init__(
@@ -143,7 +150,9 @@ class _Cells:
         flip: tuple[Array, Array],
         low: Array,
         high: Array,
+        reserve: float,
     ) -> None:
+        self._collision = problem.scene.collision.wider(reserve)
         self._cell, self._scene = problem.cell, problem.scene
         self._family, self._flip = family, flip
         self._low, self._high = low, high
@@ -221,11 +230,10 @@ class _Cells:
     def _collides(self, q: Array, turned: Array) -> np.ndarray:
         """Return which postures collide, however far joints turn, shape (n,)."""
         sign, shift = self._flip
-        collision, placed = self._scene.collision, q * sign + shift
-        if not turned.any():
-            return collision.wider(SPARE).collides(placed)
-        hits = collision.collides(placed)
-        hits[hits] = collision.collides_throughout(placed[hits], turned[hits])
+        placed = q * sign + shift
+        hits = self._collision.collides(placed)
+        if turned.any():
+            hits[hits] = self._collision.collides_throughout(placed[hits], turned[hits])
         return np.asarray(hits)
 
 

@@ -8,6 +8,8 @@ import opl
 from benchmarks.stranger_jobs import draw_job
 from benchmarks.stranger_parts import FAMILIES, draw_part
 from opl.geometry.mesh import load_mesh
+from opl.run.searches import search_path
+from tests.support.planned import problem_of
 
 
 @pytest.mark.parametrize("family", list(FAMILIES))
@@ -50,3 +52,11 @@ def test_drawn_jobs_are_cut_into_passes_and_repeat_byte_by_byte(tmp_path):
             assert stranger.points / 3 < len(surfaced.points) < 5 * stranger.points
             drawn += 1
     assert drawn > 0
+
+
+def test_passes_end_where_leads_leave_the_clearance_and_hardly_more(tmp_path):
+    """There the samples of a box, which leave 0.3 mm more where they can, see nothing free."""
+    draw_job(20261129, 9, 1, tmp_path)
+    job = opl.load_job(tmp_path / "job.yaml")
+    plan = search_path(job.search, problem_of(job)).plan
+    assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)
