@@ -18,13 +18,14 @@ from opl.planning.problem import GrindingProblem, wheel_distances
 from opl.planning.shut_leads import RESERVE, ShutLeads
 from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
-from opl.search.in_box import missing_chords, nearest_points, sampled
+from opl.search.in_box import hidden, missing, missing_chords, nearest_points, sampled
 from opl.search.joint_limits import about
 
 FINE = 33  # contact positions of a place at which a box is held against it
 POSTURES_OF_WORK = 400  # that cost a unit of work
 WITHIN = 6  # halvings of the way between places that is too deep in the wheel, but hardly
 CLOSER = 2  # times that places are sampled closer where collisions begin
+HIDDEN = 5e-5  # of the box: what a chord that meets it may stand off the postures
 BORDER = 1e-2  # belt units to look beyond what lies in the box
 
 
@@ -134,13 +135,15 @@ class ColumnSampler:
         return columns
 
     def _closer(self, columns: Columns, box: JointBox, spare: Array) -> Columns:
-        """Sample places that a box misses anew, closer around what is nearest to it."""
+        """Sample places that a box misses, or may miss, closer around what is nearest to it."""
         missed, row = nearest_points(columns.q, columns.free, box)
+        poor = (missed > GROWN) & np.isfinite(missed)
+        held = np.where(columns.free, missing(columns.q, box), np.inf).min(axis=1) <= GROWN
+        met = np.flatnonzero(~held & (missed <= GROWN))  # by a chord alone
+        poor[met] = hidden(columns.q[met], row[met]) > HIDDEN * box.size
         t, last = columns.t, columns.t.shape[1] - 1
         for index, placement in enumerate(columns.placements):
-            own = np.flatnonzero(
-                (columns.points.pass_index == index) & (missed > GROWN) & np.isfinite(missed)
-            )
+            own = np.flatnonzero((columns.points.pass_index == index) & poor)
             if not len(own):
                 continue
             low = t[own, np.maximum(np.floor(row[own]).astype(int) - 1, 0)]

@@ -6,7 +6,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
-from opl.search.chords import JUMP, clip, sample
+from opl.search.chords import BEND, JUMP, clip, sample
 from opl.search.outside import outside
 
 
@@ -65,6 +65,18 @@ def nearest_points(q: Array, free: np.ndarray, box: JointBox) -> tuple[Array, Ar
         row,
     )
     return missing, row
+
+
+def hidden(q: Array, row: Array) -> Array:
+    """Return how far postures may stand off the chords at fractional rows, in all joints in [rad].
+
+    Postures of shape (n, m, 6), rows of shape (n,); shape (n,).
+    """
+    bend = np.abs(np.diff(q, n=2, axis=1))
+    bend = np.pad(np.where(bend < JUMP, bend, 0.0), ((0, 0), (1, 1), (0, 0)))
+    every, before = np.arange(len(q)), np.floor(row).astype(int)
+    most = np.maximum(bend[every, before], bend[every, before + 1])
+    return np.asarray(BEND * most.sum(axis=-1) / 8.0)
 
 
 def nearest(q: Array, free: np.ndarray, box: JointBox) -> np.ndarray:

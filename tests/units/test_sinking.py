@@ -1,7 +1,6 @@
 """What is spared for tracks along which the part sinks too deep between two places."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 
@@ -9,19 +8,15 @@ from opl.cell.workcell import PART, WHEEL
 from opl.motion.collision_check import CollidingMove
 from opl.motion.motion import Phase
 from opl.planning import box_track
-from opl.planning.box_columns import ColumnSampler
 from opl.planning.box_track import BoxTracks
-from opl.planning.families import Families, few_columns
-from opl.planning.images import Images, seams_of
 from opl.planning.multi_start import tracks_from_best_start
 from opl.planning.open_matrix import open_matrices
 from opl.planning.passages import NO_PASSAGES
 from opl.planning.problem import wheel_distances
-from opl.planning.sides import ANY_SIDE
 from opl.planning.sinking import MORE, places_for, shallower, spare_for, sunk_between
 from opl.planning.track_check import Collides, check_track
-from opl.search.joint_limits import UNLIMITED
 from opl.search.smooth import Travel
+from tests.support.boxes import near_a_box
 from tests.support.planned import small_problem, v_job
 
 
@@ -52,21 +47,6 @@ def test_depth_is_spared_at_both_ends_and_where_it_is_of_no_use_places_are_taken
     places = np.array([0.0, 1.0, 1.5, 2.0, 3.0])
     assert [(one.first, one.last, one.parts) for one in places_for(places, sunk)] == [(1.0, 1.5, 2)]
     assert not places_for(np.array([0.0, 1.0, 1.001, 2.0, 3.0]), sunk)
-
-
-@cache
-def near_a_box():
-    """Return a small box for the small problem, and the postures of its places near to that."""
-    problem = small_problem()
-    points, t = problem.points, problem.field.contact_positions
-    q = problem.solutions(few_columns(points.pass_index))
-    seams, none = seams_of(q), [[ANY_SIDE]] * points.n_passes
-    images = Images(problem.cell.robot, seams, 10.0)
-    families = Families(images, q, problem.cuts, points.pass_index, t, none)
-    box = families.smallest_grown()
-    placements, _ = families.hold(box, {}, set(), 0.1)
-    sampler = ColumnSampler(problem, seams, UNLIMITED)
-    return box, sampler, sampler.columns(box, placements, np.arange(len(points), dtype=float))
 
 
 def distances(columns):
