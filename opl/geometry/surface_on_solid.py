@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh, winding_number
@@ -18,6 +19,7 @@ _LOOKS = 24
 _DEPTH = 1e-3
 
 _REACH = 2e-3  # [m] within which triangles of the solid are sought around a cutter point
+_AT_ONCE = 1 << 17  # pairs of a cutter point and a triangle
 
 # the surface is sampled about this often across its longest side, to choose the places from
 _SAMPLES = 12
@@ -97,34 +99,45 @@ def heights_of_solid(Ts_workpiece_cutter: Array, part: TriangleMesh) -> Array:
         shape (n,).
     """
     triangles = part.triangles
-    low, high = triangles.min(axis=1) - _REACH, triangles.max(axis=1) + _REACH
+    low, high = triangles.min(axis=1).T - _REACH, triangles.max(axis=1).T + _REACH
     heights = np.full(len(Ts_workpiece_cutter), -np.inf)
-    for k, T in enumerate(Ts_workpiece_cutter):
-        near = ((low <= T[:3, 3]) & (high >= T[:3, 3])).all(axis=1)
-        places = _nearest_to_origin(triangles[near] - T[:3, 3])
+    at_once = max(1, _AT_ONCE // max(len(triangles), 1))
+    for first in range(0, len(heights), at_once):
+        Ts = Ts_workpiece_cutter[first : first + at_once]
+        near = np.ones((len(Ts), len(triangles)), dtype=bool)
+        for k in range(3):
+            near &= (low[k] <= Ts[:, k, 3, None]) & (high[k] >= Ts[:, k, 3, None])
+        point, triangle = np.nonzero(near)
+        places, of = _nearest_to_origin(triangles[triangle] - Ts[point, None, :3, 3])
         away = np.linalg.norm(places, axis=1)
-        if len(away) and away.min() < _REACH:
-            heights[k] = np.copysign(away.min(), places[away.argmin()] @ T[:3, 2])
+        order = np.lexsort((away, point[of]))  # of each point, the nearest first
+        own, begun = np.unique(point[of][order], return_index=True)
+        nearest = order[begun]
+        found = np.copysign(away[nearest], (places[nearest] * Ts[own, :3, 2]).sum(axis=1))
+        heights[first + own] = np.where(away[nearest] < _REACH, found, -np.inf)
     return heights
 
 
-def _nearest_to_origin(triangles: Array) -> Array:
-    """Return points of triangles, shape (m, 3, 3), one of which is nearest to the origin, (k, 3).
+def _nearest_to_origin(triangles: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return points of triangles, shape (m, 3, 3), one of each nearest to the origin.
 
     That of each side, and where a triangle is right below or above the origin that of its inside.
+
+    Returns:
+        They, shape (k, 3), and which triangles they are of, shape (k,).
     """
     sides = np.roll(triangles, -1, axis=1) - triangles
     squares = np.maximum(np.square(sides).sum(axis=2), np.finfo(float).tiny)
     share = np.clip(-(triangles * sides).sum(axis=2) / squares, 0.0, 1.0)
     on_sides = triangles + share[..., None] * sides
     normals = np.cross(sides[:, 0], sides[:, 1])
-    flat = np.square(normals).sum(axis=1) > 0.0
-    triangles, sides, normals = triangles[flat], sides[flat], normals[flat]
-    along = (triangles[:, 0] * normals).sum(axis=1) / np.square(normals).sum(axis=1)
-    feet = along[:, None] * normals
-    left_of = np.cross(sides, feet[:, None] - triangles) @ normals[..., None]
+    flat = np.flatnonzero(np.square(normals).sum(axis=1) > 0.0)
+    along = (triangles[flat, 0] * normals[flat]).sum(axis=1)
+    feet = (along / np.square(normals[flat]).sum(axis=1))[:, None] * normals[flat]
+    left_of = np.cross(sides[flat], feet[:, None] - triangles[flat]) @ normals[flat, :, None]
     inside = (left_of[..., 0] >= 0.0).all(axis=1)
-    return np.concatenate([on_sides.reshape(-1, 3), feet[inside]])
+    of = np.concatenate([np.repeat(np.arange(len(triangles)), 3), flat[inside]])
+    return np.concatenate([on_sides.reshape(-1, 3), feet[inside]]), of
 
 
 def _size(box: Array) -> float:
