@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator
 from copy import copy
+from functools import cached_property
 
 import coal
 import numpy as np
@@ -18,7 +19,7 @@ from opl.cell.coal_shapes import coal_mesh, coal_solid
 from opl.cell.robot_shapes import collision_shapes
 from opl.cell.separation import Bodies, Separation
 from opl.cell.workcell import PART, SECOND_OPINION, SECOND_OPINION_OF_A_LINK, WHEEL, WorkCell
-from opl.geometry.frames import Array, transform
+from opl.geometry.frames import Array, read_only, transform
 
 BodyPair = tuple[str, str]
 ROUND_OFF = 1e-6  # [m] of coal: bodies farther apart by more than this do not collide for it
@@ -114,8 +115,9 @@ class CollisionScene:
         scene._prepare(self._margins + reserve, both_move)
         return scene
 
+    @cached_property
     def levers(self) -> Array:
-        """Return how far from each joint's axis anything it moves can ever be, in [m], shape (6,).
+        """How far from each joint's axis anything it moves can ever be, in [m], shape (6,).
 
         When joint k turns by d [rad], no point moves farther than d times lever k.
         """
@@ -140,7 +142,7 @@ class CollisionScene:
                 float(np.linalg.norm(np.cross(axis, centre))) + radius for centre, radius in spheres
             )
             rest = max(float(np.linalg.norm(centre)) + radius for centre, radius in spheres)
-        return levers
+        return read_only(levers)
 
     def collides(self, q: Array) -> np.ndarray:
         """Return which configurations in [rad], shape (n, 6), collide; shape (n,) of bool."""

@@ -153,7 +153,7 @@ def _between(
     around[:-1] |= chosen[1:]
     near[around] = scene.wider(NEARBY).collides(q[around])
     ends = np.flatnonzero(chosen[1:] & (near[1:] | near[:-1])) + 1
-    parts = np.ceil(np.abs(q[ends] - q[ends - 1]) @ scene.levers() / FINE).astype(int)
+    parts = np.ceil(np.abs(q[ends] - q[ends - 1]) @ scene.levers / FINE).astype(int)
     ends, parts = ends[parts > 1], parts[parts > 1]
     if not len(ends):
         return {}

@@ -36,7 +36,7 @@ class StraightMoves:
 
     def __init__(self, cell: WorkCell, scene: CollisionScene, part: PartTree) -> None:
         self.checked = 0  # configurations
-        self.levers = scene.levers()
+        self.levers = scene.levers
         self._cell = cell
         self._scene = scene
         self._part = part
