@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class GrindingPath:
         """Largest minus smallest value of each joint in [rad], shape (6,)."""
         return np.asarray(np.ptp(self.q, axis=0))
 
-    @property
+    @cached_property
     def joint_range_sum(self) -> float:
         """Sum of the joint ranges in [rad]: what the search keeps small (equation 14)."""
         return float(self.joint_ranges.sum())

@@ -9,9 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
-from opl.search.cells import FIRST
+from opl.search.cells import END, FIRST
 
 TOUCHING = 1e-8  # [rad] of a limit
 UNLIMITED = (JointBox(np.full(6, -np.inf), np.full(6, np.inf)),)
@@ -51,15 +52,22 @@ def torn(
         return found
     for near, excess in zip(turned, excesses, strict=True):
         face, joint = divmod(int(np.argmax(excess)), 6)
-        limit = (near.lower, near.upper)[face][joint]
-        for k, (first, end) in enumerate(spans[:, FIRST:].tolist()):
-            own = cells[first:end]
-            start, stop = own[:, joint], own[:, 6 + joint]
-            low = float((np.minimum(start, stop) + own[:, 12 + joint]).min())
-            high = float((np.maximum(start, stop) + own[:, 18 + joint]).max())
-            if low <= limit + TOUCHING and high >= limit - TOUCHING:
-                found[k] = max(found[k], high - low)
+        limit = float((near.lower, near.upper)[face][joint])
+        _turns(cells, np.ascontiguousarray(spans), joint, limit, found)
     return found
+
+
+@kernel("void(float64[:,::1],int64[:,::1],int64,float64,float64[::1])")
+def _turns(cells, spans, joint, limit, found):  # type: ignore[no-untyped-def]
+    """Raise ``found`` to how far a joint turns over spans that reach a limit of it."""
+    for k in range(len(spans)):
+        low, high = np.inf, -np.inf
+        for cell in range(spans[k, FIRST], spans[k, END]):
+            start, stop = cells[cell, joint], cells[cell, 6 + joint]
+            low = min(low, min(start, stop) + cells[cell, 12 + joint])
+            high = max(high, max(start, stop) + cells[cell, 18 + joint])
+        if low <= limit + TOUCHING and high >= limit - TOUCHING:
+            found[k] = max(found[k], high - low)
 
 
 def _turned(box: JointBox, limits: JointBox) -> JointBox:
