@@ -112,5 +112,6 @@ class Ghosts:
     def less(self, amount):
         return Ghosts(self._q, self._radius - amount)
 
+    @property
     def levers(self):
         return np.ones(6)  # distances are those of joint space
