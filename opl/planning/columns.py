@@ -82,12 +82,16 @@ class ColumnWalls:
         up = [edge for edge in edges if edge[4] > edge[2]]
         along = [edge for edge in edges if edge[4] == edge[2]]
         passes = self._points.pass_index[[int(corners[0][0]) for corners in chains]]
+        made = dict[Edge, list[Piece]]()
+        for make, run in ((self._up, up), (self._along, along)):
+            made |= zip(run, make(run) if run else (), strict=True)
+        # in their order, in which the wall can be split
         pieces: list[list[Piece]] = [[] for _ in chains]
-        for made, run in ((self._up, up), (self._along, along)):
-            for edge, found in zip(run, made(run) if run else (), strict=True):
-                number, at = edge[0], edge[1] if edge[4] > edge[2] else None
-                for side in self._sides[passes[number]]:
-                    pieces[number] += [part for piece in found for part in side.parts(piece, at)]
+        for edge in edges:
+            number, at = edge[0], edge[1] if edge[4] > edge[2] else None
+            for side in self._sides[passes[number]]:
+                found = made.get(edge, [])
+                pieces[number] += [part for piece in found for part in side.parts(piece, at)]
         self.made += sum(1.0 if len(corners) == 2 else PART_OF_A_CHAIN for corners in chains)
         return [
             Wall(int(passes[k]), (min(places) + max(places)) / 2.0, tuple(pieces[k]), chains[k])

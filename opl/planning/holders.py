@@ -14,7 +14,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
-from opl.search.cells import Forbidden
+from opl.search.forbidden import Forbidden
 from opl.search.joint_limits import UNLIMITED
 from opl.search.least_box import BoxProof
 from opl.search.walls import Image, Piece, Wall

@@ -28,7 +28,7 @@ from opl.planning.rows import Bulge
 from opl.planning.settings import OptimalSettings
 from opl.planning.work import Work
 from opl.search.box import JointBox
-from opl.search.cells import Forbidden
+from opl.search.forbidden import Forbidden
 from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
 from opl.search.walls import Chain

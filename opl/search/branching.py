@@ -1,4 +1,4 @@
-"""Which wall a subproblem is split at, where along it, and into what."""
+"""Which wall a subproblem is split at, and into what."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import numpy as np
 
 from opl.search.bounding import distances
 from opl.search.box import JointBox
-from opl.search.cells import END, FIRST, WALL, Cells
+from opl.search.cells import END, FIRST, SOURCE, WALL, Cells
 from opl.search.joint_limits import torn
 from opl.search.subproblems import Subproblem
 
 SMALLEST = 1e-6  # along a wall: a cell that is not cut further
-LEAST_SHARE = 8  # of the cells of a span: one of so many on each side at the least
+LEAST_SHARE = 8  # of cells or spans: one of so many on each side at the least
 
 
 def where_to_split(
     node: Subproblem, cells: Cells, limits: Sequence[JointBox], settled: float
-) -> tuple[int, float] | None:
-    """Return the wall to be split, and where along it; None if that gains nothing.
+) -> int | None:
+    """Return the wall to be split; None if that gains nothing.
 
     Args:
         node: The subproblem, bounded.
@@ -31,7 +31,7 @@ def where_to_split(
     found, walls, table = node.found, node.spans[:, WALL], cells.table
     assert found is not None
     if np.count_nonzero(walls == 0) > 1:
-        return 0, float(found.place[0])
+        return 0
     missed = np.full(node.n_walls, np.inf)
     np.minimum.at(missed, walls, distances(table, node.spans, found.low, found.high))
     first, end = node.spans[:, FIRST], node.spans[:, END]
@@ -41,31 +41,39 @@ def where_to_split(
     np.maximum.at(score, walls, torn(table, node.spans, box, limits, settled))
     score[tiny] = 0.0
     wall = int(np.argmax(score))
-    if score[wall] > settled:
-        return wall, float(found.place[wall])
-    return None
+    return wall if score[wall] > settled else None
 
 
-def parts(node: Subproblem, cells: Cells, wall: int, place: float) -> list[np.ndarray]:
-    """Return the spans of the subproblems that one is split into at a place along a wall."""
+def parts(node: Subproblem, cells: Cells, wall: int) -> list[np.ndarray]:
+    """Return the spans of the subproblems that one is split into at a wall."""
     before, end = np.searchsorted(node.spans[:, WALL], [wall, wall + 1])
     own = node.spans[before:end]
-    if len(own) > 1:
-        # the nearest, and all others
-        assert node.found is not None
-        away = distances(cells.table, own, node.found.low, node.found.high)
-        k = int(np.argmin(away))
-        halves = [own[k : k + 1], np.delete(own, k, axis=0)]
-    else:
-        if own[0, END] == own[0, FIRST] + 1:
-            own = cells.finer(own[0])
-        halves = [own]
-        if len(own) == 0:
-            return []
-    if len(own) == 1:
-        at = cells.table[own[0, FIRST] : own[0, END], 24]
-        n, least = len(at), max(len(at) // LEAST_SHARE, 1)
-        middle = own[0, FIRST] + min(max(int(np.searchsorted(at, place)), least), n - least)
+    assert node.found is not None
+    place, source = node.found.place[wall].tolist()
+    starts, start = own[:, SOURCE], source
+    if len(own) == 1 and own[0, END] == own[0, FIRST] + 1:
+        own = cells.finer(own[0])
+        starts, start = cells.table[own[:, FIRST], 24], place
+    kinds = cells.kinds_of(own)
+    if len(own) == 0:
+        halves = []
+    elif len(own) == 1:
+        middle = own[0, FIRST] + _between(cells.table[own[0, FIRST] : own[0, END], 24], place)
         halves = [own.copy(), own.copy()]
         halves[0][0, END] = halves[1][0, FIRST] = middle
+    elif wall == 0 or (kinds != kinds[0]).any():
+        # the nearest, or all of its image, and all others
+        away = distances(cells.table, own, node.found.low, node.found.high)
+        nearest = int(np.argmin(away))
+        alike = np.arange(len(own)) == nearest if wall == 0 else kinds == kinds[nearest]
+        halves = [own[alike], own[~alike]]
+    else:
+        middle = _between(starts, start)
+        halves = [own[:middle], own[middle:]]
     return [np.concatenate([node.spans[:before], half, node.spans[end:]]) for half in halves]
+
+
+def _between(starts: np.ndarray, place: float) -> int:
+    """Return how many of some that follow each other are split from the others at a place."""
+    n, least = len(starts), max(len(starts) // LEAST_SHARE, 1)
+    return min(max(int(np.searchsorted(starts, place)), least), n - least)

@@ -8,11 +8,12 @@ cells turn out to be forbidden, their rows are made shorter, for all subproblems
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from opl.geometry.frames import Array
+from opl.search.forbidden import Forbidden
 from opl.search.walls import Image, Piece, Wall
 
 COLUMNS = 26  # start 0:6, end 6:12, pad_low 12:18, pad_high 18:24, places 24 and 25
@@ -23,31 +24,6 @@ WALL, KEY, SOURCE, FIRST, END = range(5)  # columns of a span
 PIECE, IMAGE, MIRRORED, FIRST_CELL, N_CELLS, KIND, FLIP = range(7)
 Key = tuple[int, tuple[int, ...], int]  # a family, the key of its image, and the side
 FORBIDDEN = 1e3  # [rad] presses on every face of any box by more than is of interest
-
-
-class Forbidden(Protocol):
-    """Tells which parts of cells are forbidden."""
-
-    @property
-    def n_flips(self) -> int:
-        """How many flips of the wrist a posture has that are forbidden each for itself."""
-
-    def clear(
-        self, piece: Piece, flip: int, first: int, end: int, looks: int
-    ) -> tuple[Array, Array]:
-        """Return which part of each cell of a piece is not known to be forbidden.
-
-        Args:
-            piece: The piece.
-            flip: Which flip of its postures.
-            first: Cells from this one on are looked at,
-            end: to before this one.
-            looks: 1 to look at them, 2 to look closer.
-
-        Returns:
-            Where it begins and ends in fractions of the cell, each of shape (n,); it ends before it
-            begins where nothing is left.
-        """
 
 
 class Cells:
@@ -126,6 +102,10 @@ class Cells:
         for index, key in both.T.tolist():
             found.setdefault(index, []).append(names[key])
         return found
+
+    def kinds_of(self, spans: np.ndarray) -> np.ndarray:
+        """Return numbers that tell family, side and image of spans, shape (n,)."""
+        return np.asarray(self._sources[spans[:, SOURCE], KIND])
 
     def mirrored(self, spans: np.ndarray) -> bool:
         """Return whether spans are of whole motions with the wrist flipped."""

@@ -19,7 +19,8 @@ from opl.geometry.frames import Array
 from opl.search.bounding import tighten, trim
 from opl.search.box import JointBox
 from opl.search.branching import parts, where_to_split
-from opl.search.cells import END, FIRST, KEY, WALL, Cells, Forbidden
+from opl.search.cells import END, FIRST, KEY, WALL, Cells
+from opl.search.forbidden import Forbidden
 from opl.search.joint_limits import UNLIMITED
 from opl.search.relaxation import least_box
 from opl.search.subproblems import Candidate, Relaxation, Subproblem
@@ -171,7 +172,12 @@ class BoxProof:
         assert node.found is not None
         # against a core turned inside out, so that no face is held by it
         n, low, high = node.n_walls, node.found.high, node.found.low
-        box, place, lost, prices = np.empty((2, 6)), np.empty(n), np.empty(n), np.empty((n, 12))
+        box, place, lost, prices = (
+            np.empty((2, 6)),
+            np.empty((n, 2)),
+            np.empty(n),
+            np.empty((n, 12)),
+        )
         size = float((low - high).sum())
         least_box(self._cells.table, node.spans, n, low, high, size, box, place, lost, prices)
         return np.asarray(prices[:, :6] - prices[:, 6:])
@@ -188,7 +194,7 @@ class BoxProof:
         """Split the subproblem of the last candidate."""
         if self._branch is not None:
             node = self._kept
-            for spans in parts(node, self._cells, *self._branch):
+            for spans in parts(node, self._cells, self._branch):
                 self._push(node.bound, spans, node.n_walls, node.low, node.high)
 
     def put_back(self) -> None:
@@ -230,7 +236,7 @@ class BoxProof:
         self.work += NUMBERS_OF_AN_ENTRY * (cells.entered - entered)
         spans = np.concatenate([node.spans, *new])
         low, high, table = node.low.copy(), node.high.copy(), cells.table
-        sizes, place, lost = (np.empty(n_walls) for _ in range(3))
+        sizes, lost, place = np.empty(n_walls), np.empty(n_walls), np.empty((n_walls, 2))
         box, prices = np.empty((2, 6)), np.empty((n_walls, 12))
         limits = np.array([(one.lower, one.upper) for one in self._limits_of(spans)])
         for _ in range(MOST_TRIMS):

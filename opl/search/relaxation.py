@@ -91,8 +91,7 @@ def _pivot(table, basis, n_rows, n_columns, dual):  # type: ignore[no-untyped-de
 
 @kernel(
     "UniTuple(float64,2)(float64[:,::1],int64[:,::1],int64,float64[::1],float64[::1],float64,"
-    "float64[:,::1],"
-    "float64[::1],float64[::1],float64[:,::1])",
+    "float64[:,::1],float64[:,::1],float64[::1],float64[:,::1])",
     early=True,
 )
 def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, prices):  # type: ignore[no-untyped-def]
@@ -109,7 +108,8 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
         high: The upper faces are not below these.
         closing: A larger bound than this is of no interest, in [rad].
         box: Filled with lower and upper faces of the box found, shape (2, 6).
-        place: Filled with where along each wall the box meets its hull, shape (n_walls,).
+        place: Filled with where the box meets the hull of each wall: along it, and at which source,
+            both the mean of the points that it meets, shape (n_walls, 2).
         lost: Filled with how much more each wall would press had its cells no pads, in [rad].
         prices: Filled with how hard each wall presses on each upper face of the box, and on each
             lower one, from 0 to 1, shape (n_walls, 12).
@@ -139,9 +139,10 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
                         most[w, f] = max(most[w, f], out)
                         away += max(out, 0.0)
                     if away < nearest:
-                        nearest, place[w] = away, cells[cell, 24 + side]
+                        nearest, place[w, 0] = away, cells[cell, 24 + side]
                         for f in range(12):
                             first[w, f] = pressed(cells, cell, side, f, low, high)
+                        place[w, 1] = spans[k, 2]
     n = 0
     wall_of, face_of = (
         np.empty(12 * n_walls, dtype=np.int64),
@@ -168,7 +169,7 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
         table[1 + f, 0] = 1.0 + 1e-9 * f  # no step is for nothing
         basis[f] = faces + f
     point_wall = np.empty(most_points, dtype=np.int64)
-    point_place = np.empty(most_points)
+    point_place = np.empty((most_points, 2))
     now = np.empty((n_walls, 12))
     press, press_cell = np.zeros(n_walls), np.zeros(n_walls, dtype=np.int64)
     n_points, bound = 0, -np.inf
@@ -201,7 +202,7 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
             press[w] = 0.0
             if not priced:
                 continue
-            best, at, at_side = np.inf, -1, 0
+            best, at, at_side, at_span = np.inf, -1, 0, -1
             for k in range(begin[w], end[w]):
                 for cell in range(spans[k, 3], spans[k, 4]):
                     for side in range(2):
@@ -210,7 +211,7 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
                             if now[w, f] > 0.0:
                                 out += now[w, f] * pressed(cells, cell, side, f, low, high)
                         if out < best:
-                            best, at, at_side = out, cell, side
+                            best, at, at_side, at_span = out, cell, side, k
             press[w], press_cell[w] = best, at
             least += best
             if best < known - CLOSE / n_walls and n_points < most_points:
@@ -225,7 +226,8 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
                 table[row, points + n_points] = 1.0
                 table[row, 0] = 1e-12 * (1.0 + n_points)
                 basis[12 + n_points] = points + n_points
-                point_wall[n_points], point_place[n_points] = w, cells[at, 24 + at_side]
+                point_wall[n_points], point_place[n_points, 0] = w, cells[at, 24 + at_side]
+                point_place[n_points, 1] = spans[at_span, 2]
                 for other in range(12 + n_points):
                     factor = table[row, basis[other]]
                     if factor != 0.0:
@@ -254,7 +256,7 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
         box[1, j] = high[j] + max(-table[0, faces + j], 0.0)
         box[0, j] = low[j] - max(-table[0, faces + 6 + j], 0.0)
     left = np.ones(n_walls)
-    along = np.zeros(n_walls)
+    along = np.zeros((n_walls, 2))
     for i in range(n_points):
         share = max(-table[0, points + i], 0.0)
         share = min(share, left[point_wall[i]])

@@ -61,7 +61,7 @@ def test_the_bound_over_hulls_is_that_of_another_solver(seed):
     low = random.normal(size=6) * 0.05
     high = low + np.abs(random.normal(size=6)) * 0.05
     wanted = by_scipy(cells, spans, low, high)
-    box, place, lost = np.empty((2, 6)), np.empty(n_walls), np.empty(n_walls)
+    box, place, lost = np.empty((2, 6)), np.empty((n_walls, 2)), np.empty(n_walls)
     prices = np.empty((n_walls, 12))
     bound, _ = least_box(cells, spans, n_walls, low, high, wanted + 1e-9, box, place, lost, prices)
     assert bound <= wanted + 1e-8

@@ -30,8 +30,8 @@ class Bent:
         return Piece(id(self), Line(np.eye(4)), t, self.at(t), *pads)
 
 
-def crossing(curves):
-    """Return walls along curves, and what cuts their cells."""
+def crossing(curves, in_pieces):
+    """Return walls along curves, whole or each cell a piece, and what cuts their cells."""
     by_family = {id(curve): curve for curve in curves}
 
     def cut(piece, cell):
@@ -39,7 +39,11 @@ def crossing(curves):
         return (by_family[piece.family].piece(np.linspace(start, end, 4)),)
 
     at = np.linspace(-1.0, 1.0, CELLS + 1)
-    return [Wall(k, float(k), (curve.piece(at),)) for k, curve in enumerate(curves)], cut
+    runs = [at[k : k + 2] for k in range(CELLS)] if in_pieces else [at]
+    walls = [
+        Wall(k, float(k), tuple(curve.piece(run) for run in runs)) for k, curve in enumerate(curves)
+    ]
+    return walls, cut
 
 
 def grown(q):
@@ -58,9 +62,9 @@ def least_of_all(low, high):
     return low[order], high[order]
 
 
-def proven(curves, late):
+def proven(curves, late, in_pieces=False):
     """Return the bound, with walls added when a box misses them, and the bounds on the way."""
-    walls, cut = crossing(curves)
+    walls, cut = crossing(curves, in_pieces)
     proof = BoxProof(lambda _: SAME, cut, 20.0, GAP)
     left = walls[2:] if late else []
     for wall in walls if not late else walls[:2]:
@@ -86,13 +90,14 @@ def proven(curves, late):
     return proof.lower_bound, bounds
 
 
+@pytest.mark.parametrize("in_pieces", [False, True])
 @pytest.mark.parametrize("seed", range(12))
-def test_walls_added_late_and_trees_begun_anew_lead_to_the_same_bound(seed, monkeypatch):
+def test_walls_added_late_and_trees_begun_anew_lead_to_the_same_bound(seed, in_pieces, monkeypatch):
     random = np.random.default_rng(seed)
     curves = [Bent(random) for _ in range(N_WALLS)]
     at_once, _ = proven(curves, late=False)
     monkeypatch.setattr(least_box, "FEWEST_BEFORE_ANEW", 3)
-    late, bounds = proven(curves, late=True)
+    late, bounds = proven(curves, late=True, in_pieces=in_pieces)
     assert (np.diff(bounds) >= -1e-12).all()
     assert late == pytest.approx(at_once, rel=2.0 * GAP)
     samples = grown(np.stack([curve.at(np.linspace(-1.0, 1.0, SAMPLES)) for curve in curves]))
