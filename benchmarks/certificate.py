@@ -127,7 +127,7 @@ def certified(case: str) -> dict[str, Any]:
     search = OptimalSearch(problem, job.search.optimal, plan_recursive(problem))
     while not search.finished:
         search.step()
-    walls, minds_collisions = search.proof.walls, search.minds_collisions
+    walls, minds_collisions = search.proof.walls, search.forbidden is not None
     return certificate_of(problem, walls, search.lower_bound, minds_collisions)
 
 

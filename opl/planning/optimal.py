@@ -86,7 +86,7 @@ class OptimalSearch:
         self._raised = RAISED  # grows as long as neither a motion nor a new box tells
         self._given_up = self._refined = 0
         self._refined_for = 0.0  # size of the box for which rectangles were cut finer last
-        self._forbidden: Forbidden | None = None  # of collisions, once they are known to matter
+        self.forbidden: Forbidden | None = None  # of collisions, once they are known to matter
         self._early = 0.0  # work on early motions
         self._in_vain = 0  # boxes in which none of these was free
         self.proof = self._new_proof(largest)
@@ -131,7 +131,7 @@ class OptimalSearch:
     def holders(self) -> tuple[Holder, ...]:
         """Return what holds the least box over the walls up."""
         walls, images, cut = self.proof.walls, self._walls.images, self._walls.finer
-        return holders(walls, images.of, cut, self._value, self._forbidden, images.limits)
+        return holders(walls, images.of, cut, self._value, self.forbidden, images.limits)
 
     def step(self) -> None:
         """Work on one subproblem."""
@@ -225,7 +225,7 @@ class OptimalSearch:
     def _mind_collisions(self) -> None:
         """Leave out where the robot collides: it does wherever a motion might have been."""
         scene, leads = self._problem.scene.collision, self._sampler.leads
-        self._forbidden = Obstructions(scene, leads, self._walls)
+        self.forbidden = Obstructions(scene, leads, self._walls)
         self._sampler.collisions = True
         self._places.clear()
         self.proof.put_back()  # before what is proven is noted
@@ -238,7 +238,7 @@ class OptimalSearch:
     def _new_proof(self, threshold: float) -> BoxProof:
         """Return a proof without walls, for boxes below a size."""
         images, gap = self._walls.images, PROOF_SHARE * self._settings.widen
-        kept = self._forbidden, images.limits
+        kept = self.forbidden, images.limits
         return BoxProof(images.of, self._walls.finer, threshold, gap, *kept)
 
     @property
