@@ -22,6 +22,7 @@ from opl.cell.collision import CollisionScene
 from opl.cell.robot import load_robot
 from opl.geometry.frames import Array, transform
 from opl.job.load import Job, load_job
+from opl.planning.barriers import all_sides
 from opl.planning.multi_start import plan_recursive
 from opl.planning.optimal import OptimalSearch
 from opl.planning.problem import GrindingProblem
@@ -71,6 +72,15 @@ def certificate_of(
         "triangles": part.vertices[part.faces].tolist(),
         "Ts_workpiece_cutter": problem.points.Ts_workpiece_cutter.tolist(),
         "pass_index": problem.points.pass_index.tolist(),
+        "barriers": [
+            (one.first, one.last, one.contact_position)
+            for one in dict.fromkeys(
+                one
+                for sides in all_sides(problem)
+                for side in sides
+                for one in (*side.above, *side.below)
+            )
+        ],
         "walls": [wall.chain for wall in walls],
     }
 

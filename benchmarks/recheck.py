@@ -4,8 +4,10 @@ No code of opl is used, and no number that its search computed but the claim its
 says where the walls are that every motion must cross, and which bound they are said to prove. Each
 wall is enclosed anew, cell by cell, in interval arithmetic rounded outwards; cells go where a point
 of the part is surely too deep in the wheel, or no count of full turns keeps the limits, or where
-bodies are named that must not collide and near a box that is not refuted surely do. Branch and
-bound then shows that no box below the bound holds a posture of every wall. Its linear programs are
+bodies are named that must not collide and near a box that is not refuted surely do. Where
+barriers are named, each is shown to be shut all the way, and a motion stays on one side of it, so
+that walls may be crossed on that side alone. Branch and bound then shows that no box below the
+bound holds a posture of every wall. Its linear programs are
 solved by HiGHS, and only their prices are used: any prices bound the box from below.
 """
 
@@ -25,6 +27,7 @@ from scipy.sparse import coo_array
 from benchmarks.intervals import Array
 from benchmarks.recheck_arms import SURE, TURN, Flip
 from benchmarks.recheck_bodies import Bodies
+from benchmarks.recheck_sides import fitting, left_open
 from benchmarks.recheck_walls import COARSE, Cells, Machine, joined
 
 WORTH_TRYING = 1e-3  # of the bound: what a proof may lack for smaller cells to make a difference
@@ -175,6 +178,10 @@ class Proof:
             least = np.maximum.reduceat(high, starts).min(axis=0)
             edges = np.maximum(np.maximum(low, most) - np.minimum(high, least), 0.0)
             kept = edges.sum(axis=1) < self._bound + SURE
+            # and on a side of each barrier on which it crosses every wall
+            sides = self._cells.sides[left]
+            crossed = np.bitwise_or.reduceat(sides, starts)
+            kept &= fitting(sides, int(np.bitwise_and.reduce(crossed)))
             if kept.all():
                 return left
             left = left[kept]
@@ -219,7 +226,10 @@ class Proof:
         return size, pressing, box, place
 
     def _cut(self, left: NDArray[np.int64], box: Array, place: Array) -> list[NDArray[np.int64]]:
-        """Return the cells in two parts, parted at the wall that the box misses most."""
+        """Return the cells in two parts, parted at the wall that the box misses most.
+
+        By the sides of a barrier, if its cells are not on one side of it.
+        """
         cells = self._cells.pick(left)
         missed = misses(cells.start, cells.end, box)
         starts = self._starts(left)
@@ -227,9 +237,12 @@ class Proof:
         away = np.minimum.reduceat(missed, starts)
         away[ends - starts == 1] = -1.0  # one cell: nothing to part
         wall = int(np.argmax(away))
-        if away[wall] <= 0.0:
-            return []  # the box holds all that could be parted
         own = np.arange(starts[wall], ends[wall])
+        # if the box holds all that could be parted, it may yet hold no one side of a barrier
+        if way := left_open(cells.sides if away[wall] <= 0.0 else cells.sides[own]):
+            return [left[fitting(cells.sides, side)] for side in way]
+        if away[wall] <= 0.0:
+            return []
         # one piece: the same posture, one cell after the other
         kind = np.cumsum(np.any(np.abs(np.diff(cells.start[own], axis=0)) > 1.0, axis=1))
         kind = np.append(0, kind)
@@ -267,7 +280,7 @@ def recheck(certificate: dict[str, Any]) -> tuple[bool, int]:
     bodies = Bodies(certificate["bodies"]) if "bodies" in certificate else None
     for fine in (COARSE, COARSE / 10.0, COARSE / 100.0):
         machine = Machine(certificate, fine)
-        walls = [machine.wall(wall) for wall in certificate["walls"]]
+        walls = machine.walls()
         proof = Proof(walls, machine.arm.flips(), certificate["bound"], bodies)
         holds = proof.holds()
         subproblems += proof.subproblems

@@ -23,7 +23,10 @@ from tests.oracles.test_optimal import SETTINGS, recursive, v_row
 from tests.support.planned import problem_of
 
 FOLDER = Path(benchmarks.__path__[0])
-CHECKER = ("intervals", "recheck", "recheck_arms", "recheck_bodies", "recheck_walls")
+CHECKER = (
+    "intervals", "recheck", "recheck_arms", "recheck_bodies",
+    "recheck_depth", "recheck_pass", "recheck_sides", "recheck_walls",
+)  # fmt: skip
 
 
 @cache
@@ -59,6 +62,15 @@ def test_a_bound_above_a_motion_that_exists_is_not_proven():
 def test_a_bound_does_not_hold_without_what_it_rests_on():
     _, certificate = searched()
     assert not recheck({**certificate, "walls": certificate["walls"][:1]})[0]
+
+
+def test_a_bound_that_rests_on_barriers_is_proven_anew_with_them_alone():
+    certificate = json.loads(json.dumps(certified("s_shape:1")))
+    (first, last, t), *others = certificate["barriers"]
+    assert recheck(certificate)[0]
+    assert not recheck({**certificate, "barriers": []})[0]
+    with pytest.raises(ValueError, match="are not shut"):
+        recheck({**certificate, "barriers": [(first, last + 12.0, t), *others]})
 
 
 def test_the_checker_uses_nothing_of_opl():
