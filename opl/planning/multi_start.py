@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -99,30 +98,37 @@ def _tracks(problem: GrindingProblem, matrices: list[OpenMatrix], start: Start) 
 def tracks_from_best_start(matrices: list[OpenMatrix]) -> Iterator[Track]:
     """Yield tracks by increasing joint range sum over all start nodes of all matrices.
 
-    A start node is given up as soon as its sum reaches the best known. What a check of a track
-    blocks is noted in its matrix before the next is taken: only then a start node can yield again.
+    A start node is given up as soon as its sum is more than the best known, and is looked at again
+    when no other has less. One that full turns make of another is reckoned to have the same sum at
+    first. What a check of a track blocks is noted in its matrix before the next is taken: only then
+    a start node can yield again.
     """
     searches = [_Search(matrix) for matrix in matrices]
-    # (joint range sum, matrix, start row, rows); where a start was given up, its sum then and None
+    # (joint range sum, matrix, start row, rows); None for rows where the sum is no less than that
     queue: list[tuple[float, int, int, np.ndarray | None]] = []
-    bound = np.inf
-    for index, search in enumerate(searches):
-        for row in np.flatnonzero(search.matrix.free[0]).tolist():
-            descent = search.descend(row, bound)
-            queue.append((descent.joint_range_sum, index, row, descent.rows))
-            if descent.rows is not None:
-                bound = min(bound, descent.joint_range_sum)
-    queue = [entry for entry in queue if np.isfinite(entry[0])]
+    known: list[float] = []  # sums of those with rows
+    # of IK branches and contact position, whatever the full turns
+    reckoned: dict[tuple[bytes, int], float] = {}
+    for index, matrix in enumerate(matrices):
+        queue += [(0.0, index, row, None) for row in np.flatnonzero(matrix.free[0]).tolist()]
     heapq.heapify(queue)
     while queue:
-        _, index, row, rows = heapq.heappop(queue)
-        if rows is not None and matrices[index].allows(rows):
-            yield Track(index, rows)
-            if matrices[index].allows(rows):
-                continue  # nothing was blocked: the same search would find the same track
-        descent = searches[index].descend(row, np.inf)
-        if descent.rows is not None:
-            heapq.heappush(queue, (descent.joint_range_sum, index, row, descent.rows))
+        total, index, row, rows = heapq.heappop(queue)
+        matrix = matrices[index]
+        if rows is not None:
+            heapq.heappop(known)
+            if matrix.allows(rows):
+                yield Track(index, rows)
+                if matrix.allows(rows):
+                    continue  # nothing was blocked: the same search would find the same track
+        same = matrix.nodes.ik_branch.tobytes(), int(matrix.nodes.position_index[row])
+        if rows is None and reckoned.get(same, 0.0) > total:
+            heapq.heappush(queue, (reckoned[same], index, row, None))
+            continue
+        total, rows = searches[index].descend_to(row, known)
+        if np.isfinite(total):
+            reckoned[same] = total
+            heapq.heappush(queue, (total, index, row, rows))
 
 
 def tracks_from_nearest_start(matrices: list[OpenMatrix], home: Array) -> Iterator[Track]:
@@ -146,20 +152,34 @@ class _Search:
     def __init__(self, matrix: OpenMatrix) -> None:
         self.matrix = matrix
         self._dead = np.zeros_like(matrix.free)
+        self._dead_ends = np.zeros_like(matrix.free)
+        self._left = (-1, -1)  # nodes and edges when all dead ends were known
 
-    @cached_property
-    def _dead_ends(self) -> np.ndarray:
-        """Of the ladder as it was; a search that finds them also finds how far it can come."""
-        found = np.zeros_like(self.matrix.free)
-        add_dead_ends(self.matrix.ladder, self.matrix.blocked_edges, found)
-        return found
+    def descend_to(self, start: int, known: list[float]) -> tuple[float, np.ndarray | None]:
+        """Return joint range sum and rows of the track from a start node; no rows if given up.
+
+        It is given up where its sum is more than the least of some known, a heap to which that of
+        the track is added.
+        """
+        descent = self.descend(start, float(np.nextafter(known[0], np.inf)) if known else np.inf)
+        if descent.rows is not None:
+            heapq.heappush(known, descent.joint_range_sum)
+        return descent.joint_range_sum, descent.rows
 
     def descend(self, start: int, bound: float) -> Descent:
+        """Search from a start node; give up at a bound on the joint range sum."""
         matrix = self.matrix
         if not matrix.free[0, start]:
             return Descent(None, np.inf, 0)
-        # to stop at a bound is right only where the search would not have turned back
-        dead = self._dead_ends if np.isfinite(bound) else self._dead
-        descent = descend(matrix.ladder, start, matrix.blocked_edges, dead, bound)
+        blocked = matrix.blocked_edges
+        dead = self._dead  # a search that finds them also finds how far it can come
+        if np.isfinite(bound):
+            # to stop at a bound is right only where the search would not have turned back
+            left = int(matrix.free.sum()), len(blocked)
+            if left != self._left:
+                add_dead_ends(matrix.ladder, blocked, self._dead_ends)
+                self._left = left
+            dead = self._dead_ends
+        descent = descend(matrix.ladder, start, blocked, dead, bound)
         matrix.reached = max(matrix.reached, descent.reached)
         return descent

@@ -17,6 +17,7 @@ from opl.planning.sides import ANY_SIDE
 from opl.planning.symmetry import twins
 from opl.planning.turned import Kept
 from opl.search.joint_limits import UNLIMITED
+from opl.search.recursive import descend
 from tests.support.planned import small_problem
 
 
@@ -128,3 +129,19 @@ def test_places_near_a_box_are_sampled_alike_in_blocks(monkeypatch):
     np.testing.assert_array_equal(in_blocks.t, at_once.t)
     np.testing.assert_array_equal(in_blocks.q, at_once.q)
     np.testing.assert_array_equal(in_blocks.free, at_once.free)
+
+
+def test_the_first_track_has_the_least_sum_of_all_starts_of_all_turns():
+    problem = small_problem()
+    sums, starts = [], set()
+    for matrix in open_matrices(problem):
+        for row in np.flatnonzero(matrix.free[0]):
+            dead = np.zeros_like(matrix.free)
+            descent = descend(matrix.ladder, row, matrix.blocked_edges, dead)
+            sums.append(descent.joint_range_sum)
+            starts.add((matrix.nodes.ik_branch.tobytes(), int(matrix.nodes.position_index[row])))
+    assert len(starts) < len(sums)  # full turns make more of them
+    matrices = open_matrices(problem)
+    track = next(tracks_from_best_start(matrices))
+    found = matrices[track.matrix].nodes.range_sum(track.rows)
+    assert found == pytest.approx(min(sums), abs=1e-12)
