@@ -1,16 +1,15 @@
 """How far the held part is from the wheel, exactly, for any number of poses.
 
 The distance depends on cutter point and contact position only, not on the robot or its ik_branch,
-so one layer of distances serves every ik_branch. Bounding spheres around groups of triangles skip
-most of the mesh at once.
+so one layer of distances serves every ik_branch. Nodes of the part's tree that are certainly far
+enough away are skipped, most of the mesh at once.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from opl.cell.part_tree import PartTree
 from opl.cell.wheel_triangle import (
     DEEPEST,
     TOLERANCE,
@@ -19,64 +18,9 @@ from opl.cell.wheel_triangle import (
 )
 from opl.files.kernels import kernel, prange, threads_are_allowed
 from opl.geometry.frames import Array
-from opl.geometry.mesh import TriangleMesh
 from opl.geometry.wheel import ContactWheel
 
 FEW = 64  # poses that are not worth more than one thread
-
-
-@dataclass(frozen=True)
-class PartTree:
-    """The triangles of the held part in a tree of bounding spheres.
-
-    Attributes:
-        triangles: Corners in the workpiece frame in [m], ordered so that each sphere holds a slice,
-            shape (k, 3, 3).
-        spheres: Centre and radius of each sphere in [m], shape (c, 4); the first holds everything.
-        first: Index of each sphere's first triangle, shape (c,).
-        end: Index after each sphere's last triangle, shape (c,).
-        child: Index of each sphere's first child, the second follows it; 0 for a leaf, shape (c,).
-        looks: How many spheres and triangles were looked at so far, shape (1,).
-    """
-
-    triangles: Array
-    spheres: Array
-    first: np.ndarray
-    end: np.ndarray
-    child: np.ndarray
-    looks: np.ndarray
-
-
-def part_tree(mesh: TriangleMesh) -> PartTree:
-    """Sort the triangles of a mesh into a tree by halving them along the longest side."""
-    triangles = mesh.triangles
-    centres = triangles.mean(axis=1)
-    order = np.arange(len(triangles))
-    slices = [(0, len(triangles))]
-    child: list[int] = []
-    spheres = []
-    for first, end in slices:  # grows while it is read
-        corners = triangles[order[first:end]].reshape(-1, 3)
-        centre = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
-        spheres.append([*centre, np.linalg.norm(corners - centre, axis=1).max()])
-        if end - first == 1:
-            child.append(0)
-            continue
-        inside = centres[order[first:end]]
-        along = inside[:, int(np.argmax(np.ptp(inside, axis=0)))]
-        order[first:end] = order[first:end][np.argsort(along, kind="stable")]
-        middle = (first + end) // 2
-        child.append(len(slices))
-        slices += [(first, middle), (middle, end)]
-    firsts, ends = np.array(slices, dtype=np.int64).T
-    return PartTree(
-        np.ascontiguousarray(triangles[order]),
-        np.array(spheres),
-        np.ascontiguousarray(firsts),
-        np.ascontiguousarray(ends),
-        np.array(child, dtype=np.int64),
-        np.zeros(1, dtype=np.int64),
-    )
 
 
 def signed_wheel_distance(
@@ -109,31 +53,40 @@ def signed_wheel_distance(
     distances, looks = np.empty(len(flat)), np.empty(len(flat), dtype=np.int64)
     # to call threads costs as much as dozens of poses, and many times that on a busy machine
     kernel = _distances if len(flat) > FEW and threads_are_allowed() else _few_distances
-    tree = part.triangles, part.spheres, part.first, part.child
-    kernel(flat, *tree, wheel.width / 2.0, wheel.radius, needs, stops, distances, looks)
+    tree = part.triangles, part.spheres, part.slabs, part.first, part.child
+    kernel(flat, tree, wheel.width / 2.0, wheel.radius, needs, stops, distances, looks)
     part.looks[0] += looks.sum()
     return distances.reshape(shape)
 
 
-@kernel("float64(float64[:,::1],float64[:,::1],int64,float64,float64)")
-def _sphere_bound(T, spheres, index, half_width, radius):  # type: ignore[no-untyped-def]
-    """Lower bound on the distance of anything in a sphere."""
-    p, q, r = spheres[index, 0], spheres[index, 1], spheres[index, 2]
+@kernel("float64(float64[:,::1],float64[:,::1],float64[:,::1],int64,float64,float64)")
+def _bound(T, spheres, slabs, index, half_width, radius):  # type: ignore[no-untyped-def]
+    """Lower bound on the distance of anything in a sphere and its slab.
+
+    The distance is convex: nothing is nearer than the slope at the centre tells. And what is moved
+    along that slope until it is beyond the wheel is out of it.
+    """
+    p, q, r, reach = spheres[index, 0], spheres[index, 1], spheres[index, 2], spheres[index, 3]
     x = T[0, 0] * p + T[0, 1] * q + T[0, 2] * r + T[0, 3]
     y = T[1, 0] * p + T[1, 1] * q + T[1, 2] * r + T[1, 3]
     z = T[2, 0] * p + T[2, 1] * q + T[2, 2] * r + T[2, 3]
-    value, _, _, _ = distance_of_point(x, y, z, half_width, radius)
-    return value - spheres[index, 3]
+    value, gx, gy, gz = distance_of_point(x, y, z, half_width, radius)
+    p, q, r = slabs[index, 0], slabs[index, 1], slabs[index, 2]
+    along = gx * (T[0, 0] * p + T[0, 1] * q + T[0, 2] * r)
+    along += gy * (T[1, 0] * p + T[1, 1] * q + T[1, 2] * r)
+    along += gz * (T[2, 0] * p + T[2, 1] * q + T[2, 2] * r)
+    nearest = along * (slabs[index, 3] if along > 0.0 else slabs[index, 4])
+    aside = np.sqrt(max(1.0 - along * along, 0.0)) * reach
+    return value + max(nearest - aside, -reach)
 
 
-@kernel(
-    "Tuple((float64,int64))(float64[:,::1],float64[:,:,::1],float64[:,::1],int64[::1],int64[::1],"
-    "float64,float64,float64,float64)"
-)
-def _part_distance(  # type: ignore[no-untyped-def]
-    T, triangles, spheres, first, child, half_width, radius, needed, enough
-):
+_TREE = "Tuple((float64[:,:,::1],float64[:,::1],float64[:,::1],int64[::1],int64[::1]))"
+
+
+@kernel(f"Tuple((float64,int64))(float64[:,::1],{_TREE},float64,float64,float64,float64)")
+def _part_distance(T, tree, half_width, radius, needed, enough):  # type: ignore[no-untyped-def]
     """Distance of the part in one pose, and how many looks that took."""
+    triangles, spheres, slabs, first, child = tree
     room = np.empty((DEEPEST + 1, 9))
     waiting = np.empty(64, dtype=np.int64)  # deeper than any halving of an array can go
     bounds = np.empty(64)
@@ -153,8 +106,8 @@ def _part_distance(  # type: ignore[no-untyped-def]
             )
             continue
         one, other = child[node], child[node] + 1
-        low = _sphere_bound(T, spheres, one, half_width, radius)
-        high = _sphere_bound(T, spheres, other, half_width, radius)
+        low = _bound(T, spheres, slabs, one, half_width, radius)
+        high = _bound(T, spheres, slabs, other, half_width, radius)
         if low > high:
             one, other = other, one
             low, high = high, low
@@ -166,26 +119,22 @@ def _part_distance(  # type: ignore[no-untyped-def]
 
 
 _POSES = (
-    "void(float64[:,:,::1],float64[:,:,::1],float64[:,::1],int64[::1],int64[::1],"
-    "float64,float64,float64[::1],float64[::1],float64[::1],int64[::1])"
+    f"void(float64[:,:,::1],{_TREE},float64,float64,"
+    "float64[::1],float64[::1],float64[::1],int64[::1])"
 )
 
 
 @kernel(_POSES, threads=True, early=True)
-def _distances(  # type: ignore[no-untyped-def]
-    poses, triangles, spheres, first, child, half_width, radius, needs, stops, distances, looks
-):
+def _distances(poses, tree, half_width, radius, needs, stops, distances, looks):  # type: ignore[no-untyped-def]
     for k in prange(len(poses)):
         distances[k], looks[k] = _part_distance(
-            poses[k], triangles, spheres, first, child, half_width, radius, needs[k], stops[k]
+            poses[k], tree, half_width, radius, needs[k], stops[k]
         )
 
 
 @kernel(_POSES, early=True)
-def _few_distances(  # type: ignore[no-untyped-def]
-    poses, triangles, spheres, first, child, half_width, radius, needs, stops, distances, looks
-):
+def _few_distances(poses, tree, half_width, radius, needs, stops, distances, looks):  # type: ignore[no-untyped-def]
     for k in range(len(poses)):
         distances[k], looks[k] = _part_distance(
-            poses[k], triangles, spheres, first, child, half_width, radius, needs[k], stops[k]
+            poses[k], tree, half_width, radius, needs[k], stops[k]
         )

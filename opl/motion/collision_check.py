@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opl.cell.collision import CollisionScene
+from opl.cell.part_tree import PartTree
 from opl.cell.robot import forward_kinematics
-from opl.cell.wheel_distance import PartTree, signed_wheel_distance
+from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.wheel_triangle import TOLERANCE
 from opl.cell.workcell import PART, WHEEL, WorkCell
 from opl.geometry.frames import Array, transform
@@ -178,9 +179,9 @@ def _at_wheel(
     """
     corners = box_corners(part.triangles.reshape(-1, 3))
 
-    def distance(q: Array, enough: Array) -> Array:
+    def distance(q: Array, kept: Array, enough: Array) -> Array:
         Ts = cell.Ts_contact0_workpiece(forward_kinematics(cell.robot, q))
-        return signed_wheel_distance(part, cell.wheel, Ts, enough)
+        return signed_wheel_distance(part, cell.wheel, Ts, kept, enough)
 
     Ts_base_workpiece = forward_kinematics(cell.robot, motion.q) @ cell.T_flange_workpiece
     placed = transform(Ts_base_workpiece[:, None], corners)
@@ -198,7 +199,9 @@ def _at_wheel(
     most = CERTAIN * cell.planned_penetration
     kept = needed + np.where(way > 0.0, np.minimum(way / 2.0 + TOLERANCE, most), 0.0)
     found = np.full(len(q), np.inf)
-    found[looked_at] = distance(q[looked_at], kept[looked_at])
+    # how deep it sinks matters no longer; but the next move may sink where this one may not
+    enough = np.where(motion.free[move], -np.inf, needed)
+    found[looked_at] = distance(q[looked_at], kept[looked_at], enough[looked_at])
     sunk = np.zeros(len(motion), dtype=bool)
     sunk[move[found < needed]] = True
     sunk &= chosen
@@ -216,9 +219,9 @@ def _at_wheel(
         at = end[one]
         middle = before[k] + step // 2
         between = q[at - 1] + (middle / FINER)[:, None] * (q[at] - q[at - 1])
-        enough = needed[at] + np.minimum(way[at] * step / FINER / 4.0 + TOLERANCE, most)
-        there = distance(between, enough)
+        kept = needed[at] + np.minimum(way[at] * step / FINER / 4.0 + TOLERANCE, most)
+        there = distance(between, kept, needed[at])
         sunk[move[at[there < needed[at]]]] = True
-        apart[one, middle] = np.minimum(there, enough)
+        apart[one, middle] = np.minimum(there, kept)
         step //= 2
     return sunk, at_end

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from opl.cell.collision import CollisionScene
-from opl.cell.wheel_distance import PartTree
+from opl.cell.part_tree import PartTree
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from opl.cell.collision import BodyPair, CollisionScene
-from opl.cell.wheel_distance import PartTree
+from opl.cell.part_tree import PartTree
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.motion.straight_moves import StraightMoves

@@ -11,8 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from opl.cell.collision import BodyPair, CollisionScene
+from opl.cell.part_tree import PartTree
 from opl.cell.robot import forward_kinematics
-from opl.cell.wheel_distance import PartTree, signed_wheel_distance
+from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import PART, SECOND_OPINION, WHEEL, WorkCell
 from opl.geometry.frames import Array
 from opl.motion.collision_check import RESOLUTION, densify
@@ -115,7 +116,8 @@ class StraightMoves:
         doubtful = (wheel.signed_distance(centres) - self._spheres[:, 3] < needed).any(axis=1)
         # few poses are left to be measured
         unknown = np.flatnonzero(~near)[doubtful]
-        clearance = signed_wheel_distance(self._part, wheel, Ts_contact0_workpiece[unknown], needed)
+        Ts = Ts_contact0_workpiece[unknown]
+        clearance = signed_wheel_distance(self._part, wheel, Ts, needed, enough=needed)
         near[unknown] = clearance < needed
         return near
 

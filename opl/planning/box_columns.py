@@ -14,7 +14,7 @@ from opl.planning.families import GROWN
 from opl.planning.images import Seams, image_within_limits, wrist_flips
 from opl.planning.nodes import inverse_solutions
 from opl.planning.placement import Placement
-from opl.planning.problem import GrindingProblem, wheel_distances
+from opl.planning.problem import GrindingProblem, nearer_nodes
 from opl.planning.shut_leads import RESERVE, ShutLeads
 from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
@@ -225,7 +225,7 @@ class ColumnSampler:
         if not asked.any():
             return asked
         scene, needed = self._problem.scene, spare[:, None] - self._problem.cell.planned_penetration
-        return np.asarray(asked & (wheel_distances(scene, there, t, asked, needed) < needed))
+        return nearer_nodes(scene, there, t, asked, needed)
 
     def _leave_out_leads(
         self, there: CutterPoints, placements: Sequence[Placement], t: Array, free: np.ndarray
@@ -277,9 +277,7 @@ class ColumnSampler:
         for column in (np.floor(places).astype(int), np.ceil(places).astype(int)):
             near += cuts[column[:, None], after - 1].astype(int) + cuts[column[:, None], after]
         unsure = (near > 0) & (near < 4)
-        distance = wheel_distances(self._problem.scene, there, t, unsure)
-        found = distance < -self._problem.cell.planned_penetration
-        return np.asarray(np.where(unsure, found, near == 4))
+        return np.asarray(nearer_nodes(self._problem.scene, there, t, unsure) | (near == 4))
 
     def _placed(self, angles: Array, placement: Placement) -> Array:
         """Return postures as placed, of principal angles of their family, shape (n, m, 6)."""

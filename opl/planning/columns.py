@@ -20,7 +20,7 @@ import numpy as np
 from opl.cell.flange_jets import contact_jets, path_jets
 from opl.cell.inverse_jets import FlangeJets, joint_derivatives
 from opl.cell.inverse_kinematics import inverse_kinematics
-from opl.cell.wheel_distance import PartTree
+from opl.cell.part_tree import PartTree
 from opl.cell.workcell import WorkCell
 from opl.geometry import frames
 from opl.geometry.frames import Array

@@ -12,7 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from opl.cell.wheel_distance import PartTree, signed_wheel_distance
+from opl.cell.part_tree import PartTree
+from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.wheel_triangle import TOLERANCE
 from opl.cell.workcell import WorkCell
 from opl.geometry import frames

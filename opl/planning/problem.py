@@ -142,34 +142,58 @@ def build_problem(
     return GrindingProblem(scene, points, field, layer, interpolation, process)
 
 
-def wheel_distances(
+def wheel_distances(scene: PlanningScene, points: CutterPoints, contact_positions: Array) -> Array:
+    """Return the signed distance of the part to the wheel at all nodes in [m], shape (N, M).
+
+    As in `signed_wheel_distance`: exact where it is less than the belt penetration permits.
+    Contact positions are for all cutter points, shape (M,).
+    """
+    shape = len(points), len(contact_positions)
+    allowed = np.full((len(points), 1), -scene.cell.planned_penetration)
+    return _measured(scene, points, contact_positions, np.ones(shape, dtype=bool), allowed, -np.inf)
+
+
+def nearer_nodes(
     scene: PlanningScene,
     points: CutterPoints,
     contact_positions: Array,
-    at: np.ndarray | None = None,
+    asked: np.ndarray,
     needed: Array | None = None,
-) -> Array:
-    """Return the signed distance of the part to the wheel at nodes in [m], shape (N, M).
+) -> np.ndarray:
+    """Return at which nodes the part is nearer to the wheel than needed, shape (N, M).
 
-    As in `signed_wheel_distance`: exact where it is less than the belt penetration permits.
-
-    Contact positions are for all cutter points, shape (M,), or of each, shape (N, M). If `at` is
-    given, shape (N, M), all other nodes are minus infinity, not free. If `needed` is given, shape
-    (N, 1), distances of each cutter point are exact where they are less than that.
+    Args:
+        scene: The part and the wheel.
+        points: The cutter points.
+        contact_positions: Of each, shape (N, M).
+        asked: Which nodes are looked at, shape (N, M); of all others it is said that it is not.
+        needed: In [m], of each cutter point, shape (N, 1); if not given what the belt permits.
     """
-    cell = scene.cell
-    if at is None:
-        at = np.ones((len(points), contact_positions.shape[-1]), dtype=bool)
-    layer = np.full(at.shape, -np.inf)
-    allowed = np.full((len(at), 1), -cell.planned_penetration) if needed is None else needed
+    if needed is None:
+        needed = np.full((len(points), 1), -scene.cell.planned_penetration)
+    layer = _measured(scene, points, contact_positions, asked, needed, needed)
+    return np.asarray(asked & (layer < needed))
+
+
+def _measured(
+    scene: PlanningScene,
+    points: CutterPoints,
+    contact_positions: Array,
+    asked: np.ndarray,
+    needed: Array,
+    enough: Array | float,
+) -> Array:
+    """Return distances as `signed_wheel_distance` does of nodes asked about, any of all others."""
+    wheel = scene.cell.wheel
+    layer = np.empty(asked.shape)
     Ts_cutter_workpiece = inverse(points.Ts_workpiece_cutter)
-    t = np.broadcast_to(contact_positions, at.shape)
-    for block in blocks_of(*at.shape):
-        asked = at[block]
-        columns, _ = np.nonzero(asked)
+    t = np.broadcast_to(contact_positions, asked.shape)
+    stops = np.broadcast_to(enough, needed.shape)
+    for block in blocks_of(*asked.shape):
+        now = asked[block]
+        columns, _ = np.nonzero(now)
         # cutter and contact coincide, whatever robot brings the part there
-        Ts = cell.wheel.T_contact0_contact(t[block][asked]) @ Ts_cutter_workpiece[block][columns]
-        layer[block][asked] = signed_wheel_distance(
-            scene.part, cell.wheel, Ts, allowed[block][columns, 0]
-        )
+        Ts = wheel.T_contact0_contact(t[block][now]) @ Ts_cutter_workpiece[block][columns]
+        told = needed[block][columns, 0], stops[block][columns, 0]
+        layer[block][now] = signed_wheel_distance(scene.part, wheel, Ts, *told)
     return layer

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from opl.cell.collision import CollisionScene
-from opl.cell.wheel_distance import PartTree, part_tree
+from opl.cell.part_tree import PartTree, part_tree
 from opl.cell.workcell import WorkCell
 from opl.motion.collision_check import MoveCheck
 from opl.motion.free_leads import FreeLeads

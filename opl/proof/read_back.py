@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opl.cell.part_tree import PartTree
 from opl.cell.robot import SAME_CONFIGURATION, forward_kinematics
-from opl.cell.wheel_distance import PartTree
 from opl.files.beside import Beside
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, transform

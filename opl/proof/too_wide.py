@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from opl.cell.part_tree import PartTree
 from opl.cell.robot import forward_kinematics
-from opl.cell.wheel_distance import PartTree, signed_wheel_distance
+from opl.cell.wheel_distance import signed_wheel_distance
 from opl.geometry.frames import inverse
 from opl.geometry.toolpath import CutterPoints
 from opl.job.load import Job

@@ -10,8 +10,9 @@ from hypothesis.extra.numpy import arrays
 
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.part_tree import part_tree
 from opl.cell.robot import forward_kinematics
-from opl.cell.wheel_distance import part_tree, signed_wheel_distance
+from opl.cell.wheel_distance import signed_wheel_distance
 from opl.motion.collision_check import RESOLUTION, MoveCheck, colliding_moves, densify
 from opl.motion.motion import MoveKind
 from tests.support.bare_cells import bare_cell, block, free_move, with_obstacle

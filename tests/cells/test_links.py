@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from opl.cell.collision import CollisionScene
+from opl.cell.part_tree import part_tree
 from opl.cell.robot import forward_kinematics
-from opl.cell.wheel_distance import part_tree
 from opl.geometry.frames import pose, transform
 from opl.geometry.shapes import Body, Box
 from opl.motion.collision_check import RESOLUTION, densify

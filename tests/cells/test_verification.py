@@ -10,8 +10,9 @@ import pytest
 
 import opl
 from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.part_tree import part_tree
 from opl.cell.robot import forward_kinematics
-from opl.cell.wheel_distance import part_tree, signed_wheel_distance
+from opl.cell.wheel_distance import signed_wheel_distance
 from opl.findings import Level
 from opl.geometry.frames import pose
 from opl.geometry.shapes import Body, Cylinder

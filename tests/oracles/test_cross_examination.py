@@ -12,8 +12,9 @@ import pytest
 
 from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.cell.part_tree import part_tree
 from opl.cell.robot import forward_kinematics
-from opl.cell.wheel_distance import part_tree, signed_wheel_distance
+from opl.cell.wheel_distance import signed_wheel_distance
 from opl.files.resources import folder
 from opl.job.load import load_job
 from opl.run.surfacing import cut_surface

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from opl.cell.wheel_distance import part_tree, signed_wheel_distance
+from opl.cell.part_tree import part_tree
+from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.wheel_triangle import TOLERANCE
 from opl.geometry.frames import pose
 from opl.geometry.mesh import TriangleMesh
@@ -232,12 +233,16 @@ def test_poses_need_not_be_contiguous():
     np.testing.assert_array_equal(signed_wheel_distance(part, wheel, Ts[::2], EXACT), expected[::2])
 
 
-def test_every_sphere_holds_its_triangles_and_every_triangle_is_there():
+def test_every_sphere_and_slab_holds_its_triangles_and_every_triangle_is_there():
     mesh = random_mesh(np.random.default_rng(0), 333, 0.3)
     tree = part_tree(mesh)
-    for (x, y, z, radius), first, end in zip(tree.spheres, tree.first, tree.end, strict=True):
-        away = np.linalg.norm(tree.triangles[first:end] - [x, y, z], axis=2)
-        assert away.max() <= radius * (1 + 1e-12)
+    nodes = zip(tree.spheres, tree.slabs, tree.first, tree.end, strict=True)
+    for (x, y, z, radius), (*normal, low, high), first, end in nodes:
+        from_centre = tree.triangles[first:end] - [x, y, z]
+        assert np.linalg.norm(from_centre, axis=2).max() <= radius * (1 + 1e-12)
+        assert abs(np.linalg.norm(normal) - 1.0) < 1e-12
+        assert low - 1e-12 <= (from_centre @ normal).min()
+        assert (from_centre @ normal).max() <= high + 1e-12
     wanted = sorted(map(tuple, mesh.triangles.reshape(-1, 9)))
     assert sorted(map(tuple, tree.triangles.reshape(-1, 9))) == wanted
     leaves = tree.child == 0
