@@ -8,11 +8,12 @@ reach, nothing is known there of the derivatives that it concerns, only where th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.inverse_kinematics import N_IK_BRANCHES, Arm
+from opl.cell.inverse_kinematics import Arm
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.geometry.frames import Array
@@ -20,12 +21,12 @@ from opl.geometry.jets import Jet, Turning, turning
 
 SURELY = 1e-6  # of cosines and square metres: more than what the closed form takes for round-off
 Axes = tuple[Jet, Jet, Jet]  # coordinates of a vector in the base frame
-Slot = tuple[tuple[Turning, ...], np.ndarray]  # theta1 to theta6, and where there is none of it
+Solutions = tuple[tuple[Turning, ...], np.ndarray]  # theta1 to theta6; where there is none of them
 
 
 @dataclass(frozen=True)
 class FlangeJets:
-    """A motion of the flange over cells of its variable.
+    """A motion of the flange over n cells of its variable.
 
     Attributes:
         x: Axis of the flange in the base frame.
@@ -42,15 +43,15 @@ class FlangeJets:
 
 @dataclass(frozen=True)
 class JointDerivatives:
-    """Enclosures over n cells, not finite where nothing is known.
+    """Enclosures of s inverse solutions over n cells, not finite where nothing is known.
 
     Attributes:
-        middle: Middle of what holds the angle in [rad], up to full turns, shape (8, 6, n).
-        radius: Half of what holds it, shape (8, 6, n).
-        first: Largest size of the first derivative in [rad] per unit, shape (8, 6, n).
-        second_low: Least second derivative, shape (8, 6, n).
-        second_high: Greatest second derivative, shape (8, 6, n).
-        none: Where there is certainly no posture in the whole cell, shape (8, n).
+        middle: Middle of what holds the angle in [rad], up to full turns, shape (s, 6, n).
+        radius: Half of what holds it, shape (s, 6, n).
+        first: Largest size of the first derivative in [rad] per unit, shape (s, 6, n).
+        second_low: Least second derivative, shape (s, 6, n).
+        second_high: Greatest second derivative, shape (s, 6, n).
+        none: Where there is certainly no posture in the whole cell, shape (s, n).
     """
 
     middle: Array
@@ -61,91 +62,75 @@ class JointDerivatives:
     none: np.ndarray
 
 
-def joint_derivatives(arm: Arm, flange: FlangeJets) -> JointDerivatives:
-    """Enclose the derivatives of every inverse solution, slots as in `opl.cell.inverse`."""
-    if isinstance(arm, SphericalWristArm):
-        slots = _spherical_wrist(arm, flange)
-    else:
-        slots = _parallel_axes(arm, flange)
-    shape = (N_IK_BRANCHES, 6, *np.shape(flange.p[0].value.middle))
+def joint_derivatives(arm: Arm, flange: FlangeJets, slots: Sequence[int]) -> JointDerivatives:
+    """Enclose the derivatives of inverse solutions, those of slots as in `inverse_kinematics`."""
+    number = np.array(slots)[:, None]
+    back, elbow, flip = (np.where(number & bit, -1.0, 1.0) for bit in (2, 1, 4))
+    solve = _spherical_wrist if isinstance(arm, SphericalWristArm) else _parallel_axes
+    joints, none = solve(arm, flange, back, elbow, flip)
+    shape = len(slots), 6, *np.shape(flange.p[0].value.middle)
     middle, radius, first, low, high = (np.empty(shape) for _ in range(5))
-    none = np.empty((N_IK_BRANCHES, *shape[2:]), dtype=bool)
-    for slot, (joints, out_of_reach) in enumerate(slots):
-        none[slot] = out_of_reach
-        for joint, (theta, offset, sign) in enumerate(
-            zip(joints, arm.offsets, arm.signs, strict=True)
-        ):
-            second = theta.second.times(float(sign))
-            middle[slot, joint] = sign * (theta.angle.middle + offset)
-            radius[slot, joint] = theta.angle.radius
-            first[slot, joint] = np.abs(theta.first.middle) + theta.first.radius
-            low[slot, joint], high[slot, joint] = second.low, second.high
+    for joint, (theta, offset, sign) in enumerate(zip(joints, arm.offsets, arm.signs, strict=True)):
+        second = theta.second.times(float(sign))
+        middle[:, joint] = sign * (theta.angle.middle + offset)
+        radius[:, joint] = theta.angle.radius
+        first[:, joint] = np.abs(theta.first.middle) + theta.first.radius
+        low[:, joint], high[:, joint] = second.low, second.high
     return JointDerivatives(middle, radius, first, low, high, none)
 
 
-def _spherical_wrist(arm: SphericalWristArm, flange: FlangeJets) -> list[Slot]:
+# back, elbow and flip of each slot: 1, or -1 where they turn the other way, shape (s, 1)
+
+
+def _spherical_wrist(
+    arm: SphericalWristArm, flange: FlangeJets, back: Array, elbow: Array, flip: Array
+) -> Solutions:
     forearm, tilt_zero = float(np.hypot(arm.a2, arm.c3)), float(np.arctan2(arm.a2, arm.c3))
     wrist = _moved(flange.p, flange.z, -arm.c4)
     up = wrist[2].plus(-arm.c1)
-    slots: dict[int, Slot] = {}
-    for back in (0, 1):
-        cos1, sin1, ahead, theta1, beside = _heading(wrist, arm.b, back)
-        forward = ahead.plus(-arm.a1)
-        z_ahead, z_left = _turned(flange.z, cos1, sin1)
-        x_ahead, _ = _turned(flange.x, cos1, sin1)
-        y_ahead, _ = _turned(flange.y, cos1, sin1)
-        for elbow in (0, 1):
-            theta2, bend, (cos_link, sin_link), beyond = _triangle(
-                forward, up, arm.c2, forearm, elbow
-            )
-            theta3 = bend.plus(-tilt_zero)
-            none = beside | beyond
-            # the forearm axis stands off the line to the wrist by the angle of its offset
-            c, s = float(np.cos(tilt_zero)), float(np.sin(tilt_zero))
-            cos_tilt = cos_link.times(c) + sin_link.times(s)
-            sin_tilt = sin_link.times(c) - cos_link.times(s)
-            z1 = cos_tilt * z_ahead - sin_tilt * flange.z[2]
-            z3 = sin_tilt * z_ahead + cos_tilt * flange.z[2]
-            x3 = sin_tilt * x_ahead + cos_tilt * flange.x[2]
-            y3 = sin_tilt * y_ahead + cos_tilt * flange.y[2]
-            theta4 = turning(z_left, z1)
-            theta5 = turning((z1 * z1 + z_left * z_left).root(), z3)
-            theta6 = turning(y3, -x3)
-            slot = 2 * back + elbow
-            slots[slot] = (theta1, theta2, theta3, theta4, theta5, theta6), none
-            turned = theta4.plus(np.pi), -theta5, theta6.plus(np.pi)
-            slots[slot + 4] = (theta1, theta2, theta3, *turned), none
-    return [slots[slot] for slot in range(N_IK_BRANCHES)]
+    cos1, sin1, ahead, theta1, beside = _heading(wrist, arm.b, back)
+    forward = ahead.plus(-arm.a1)
+    z_ahead, z_left = _turned(flange.z, cos1, sin1)
+    x_ahead, _ = _turned(flange.x, cos1, sin1)
+    y_ahead, _ = _turned(flange.y, cos1, sin1)
+    theta2, bend, (cos_link, sin_link), beyond = _triangle(forward, up, arm.c2, forearm, elbow)
+    theta3 = bend.plus(-tilt_zero)
+    # the forearm axis stands off the line to the wrist by the angle of its offset
+    c, s = float(np.cos(tilt_zero)), float(np.sin(tilt_zero))
+    cos_tilt = cos_link.times(c) + sin_link.times(s)
+    sin_tilt = sin_link.times(c) - cos_link.times(s)
+    z1 = cos_tilt * z_ahead - sin_tilt * flange.z[2]
+    z3 = sin_tilt * z_ahead + cos_tilt * flange.z[2]
+    x3 = sin_tilt * x_ahead + cos_tilt * flange.x[2]
+    y3 = sin_tilt * y_ahead + cos_tilt * flange.y[2]
+    turned = np.where(flip < 0.0, np.pi, 0.0)
+    theta4 = turning(z_left, z1).plus(turned)
+    theta5 = turning((z1 * z1 + z_left * z_left).root(), z3).scaled(flip)
+    theta6 = turning(y3, -x3).plus(turned)
+    return (theta1, theta2, theta3, theta4, theta5, theta6), beside | beyond
 
 
-def _parallel_axes(arm: ParallelAxesArm, flange: FlangeJets) -> list[Slot]:
+def _parallel_axes(
+    arm: ParallelAxesArm, flange: FlangeJets, back: Array, elbow: Array, flip: Array
+) -> Solutions:
     w = _moved(flange.p, flange.z, -arm.c5)
-    slots: dict[int, Slot] = {}
-    for back in (0, 1):
-        cos1, sin1, ahead, theta1, beside = _heading(w, arm.b, back)
-        z_ahead, z_left = _turned(flange.z, cos1, sin1)
-        x_ahead, _ = _turned(flange.x, cos1, sin1)
-        y_ahead, _ = _turned(flange.y, cos1, sin1)
-        sin5 = (z_ahead * z_ahead + flange.z[2] * flange.z[2]).root()
-        theta5 = turning(sin5, z_left)
-        for flip in (0, 1):
-            sign = -1.0 if flip else 1.0
-            cos_tilt = (z_ahead / sin5).times(-sign)
-            sin_tilt = (flange.z[2] / sin5).times(sign)
-            theta6 = turning(
-                -(sin_tilt * x_ahead + cos_tilt * flange.x[2]),
-                -(sin_tilt * y_ahead + cos_tilt * flange.y[2]),
-            )
-            forward = ahead.plus(-arm.a1) - sin_tilt.times(arm.c4)
-            up = w[2].plus(-arm.c1) - cos_tilt.times(arm.c4)
-            tilt = turning(sin_tilt, cos_tilt)
-            for elbow in (0, 1):
-                theta2, theta3, _, beyond = _triangle(forward, up, arm.c2, arm.c3, elbow)
-                theta4 = tilt - theta2 - theta3
-                flipped = -theta5 if flip else theta5
-                joints = (theta1, theta2, theta3, theta4, flipped, theta6)
-                slots[4 * flip + 2 * back + elbow] = joints, beside | beyond
-    return [slots[slot] for slot in range(N_IK_BRANCHES)]
+    cos1, sin1, ahead, theta1, beside = _heading(w, arm.b, back)
+    z_ahead, z_left = _turned(flange.z, cos1, sin1)
+    x_ahead, _ = _turned(flange.x, cos1, sin1)
+    y_ahead, _ = _turned(flange.y, cos1, sin1)
+    sin5 = (z_ahead * z_ahead + flange.z[2] * flange.z[2]).root()
+    theta5 = turning(sin5, z_left).scaled(flip)
+    cos_tilt = (z_ahead / sin5).scaled(-flip)
+    sin_tilt = (flange.z[2] / sin5).scaled(flip)
+    theta6 = turning(
+        -(sin_tilt * x_ahead + cos_tilt * flange.x[2]),
+        -(sin_tilt * y_ahead + cos_tilt * flange.y[2]),
+    )
+    forward = ahead.plus(-arm.a1) - sin_tilt.times(arm.c4)
+    up = w[2].plus(-arm.c1) - cos_tilt.times(arm.c4)
+    theta2, theta3, _, beyond = _triangle(forward, up, arm.c2, arm.c3, elbow)
+    theta4 = turning(sin_tilt, cos_tilt) - theta2 - theta3
+    return (theta1, theta2, theta3, theta4, theta5, theta6), beside | beyond
 
 
 def _moved(p: Axes, along: Axes, length: float) -> Axes:
@@ -158,14 +143,13 @@ def _turned(v: Axes, cos1: Jet, sin1: Jet) -> tuple[Jet, Jet]:
     return cos1 * v[0] + sin1 * v[1], cos1 * v[1] - sin1 * v[0]
 
 
-def _heading(p: Axes, lateral: float, back: int) -> tuple[Jet, Jet, Jet, Turning, np.ndarray]:
+def _heading(p: Axes, lateral: float, back: Array) -> tuple[Jet, Jet, Jet, Turning, np.ndarray]:
     """Return cosine and sine of theta1, how far ahead of axis 1 the point lies, and theta1.
 
     And where it is nearer to axis 1 than the plane of the arm passes by.
     """
     away = p[0] * p[0] + p[1] * p[1]
-    ahead = away.plus(-lateral * lateral).root()
-    ahead = -ahead if back else ahead
+    ahead = away.plus(-lateral * lateral).root().scaled(back)
     cos1 = (p[0] * ahead + p[1].times(lateral)) / away
     sin1 = (p[1] * ahead - p[0].times(lateral)) / away
     beside = away.value.high < lateral * lateral - SURELY
@@ -173,7 +157,7 @@ def _heading(p: Axes, lateral: float, back: int) -> tuple[Jet, Jet, Jet, Turning
 
 
 def _triangle(
-    forward: Jet, up: Jet, upper_arm: float, forearm: float, elbow: int
+    forward: Jet, up: Jet, upper_arm: float, forearm: float, elbow: Array
 ) -> tuple[Turning, Turning, tuple[Jet, Jet], np.ndarray]:
     """Return theta2, the bend at axis 3, cosine and sine of the tilt of the forearm.
 
@@ -183,8 +167,7 @@ def _triangle(
     double = 2.0 * upper_arm * forearm
     cos_bend = away.plus(-(upper_arm**2) - forearm**2).times(1.0 / double)
     beyond = (cos_bend.value.low > 1.0 + SURELY) | (cos_bend.value.high < -1.0 - SURELY)
-    sin_bend = (-(cos_bend * cos_bend)).plus(1.0).root()
-    sin_bend = -sin_bend if elbow else sin_bend
+    sin_bend = (-(cos_bend * cos_bend)).plus(1.0).root().scaled(elbow)
     bend = turning(sin_bend, cos_bend)
     # seen from axis 2: along the upper arm, and across it
     along, across = cos_bend.times(forearm).plus(upper_arm), sin_bend.times(forearm)

@@ -102,7 +102,7 @@ def _part_distance(T, tree, half_width, radius, needed, enough):  # type: ignore
         node = waiting[n_waiting]
         if child[node] == 0:
             best = nearest_on_triangle(
-                T, triangles, first[node], half_width, radius, needed, best, room
+                T, triangles, first[node], half_width, radius, needed, enough, best, room
             )
             continue
         one, other = child[node], child[node] + 1

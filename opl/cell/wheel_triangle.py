@@ -160,12 +160,16 @@ def _mean_bound(beside0, beside1, beside2, beyond0, beyond1, beyond2):  # type: 
 
 
 @kernel(
-    "float64(float64[:,::1],float64[:,:,::1],int64,float64,float64,float64,float64,float64[:,::1])"
+    "float64(float64[:,::1],float64[:,:,::1],int64,float64,float64,float64,float64,float64,"
+    "float64[:,::1])"
 )
 def nearest_on_triangle(  # type: ignore[no-untyped-def]
-    T, triangles, index, half_width, radius, needed, best, room
+    T, triangles, index, half_width, radius, needed, stop, best, room
 ):
     """Return the distance of a triangle, or ``best`` if it is not nearer than that.
+
+    One that is nearer than ``stop`` need not be known to be nearer still: a point of it tells that
+    at once, as no way out of the triangle is shorter than one out of the point.
 
     Below the distance lie its own tangent plane, the plane of the wheel's side, the tangent plane
     of its rim, and every mean of the last two: at an edge only such a mean is flat along the part.
@@ -180,9 +184,14 @@ def nearest_on_triangle(  # type: ignore[no-untyped-def]
                 + T[i, 2] * triangles[index, k, 2]
                 + T[i, 3]
             )
+    for k in range(3):
+        value, _, _, _ = distance_of_point(
+            room[0, 3 * k], room[0, 3 * k + 1], room[0, 3 * k + 2], half_width, radius
+        )
+        best = min(best, value)
     n = 1
     whole = True
-    while n > 0:
+    while n > 0 and best >= stop:
         n -= 1
         ax, ay, az = room[n, 0], room[n, 1], room[n, 2]
         bx, by, bz = room[n, 3], room[n, 4], room[n, 5]
@@ -190,6 +199,8 @@ def nearest_on_triangle(  # type: ignore[no-untyped-def]
         x, y, z = (ax + bx + cx) / 3.0, (ay + by + cy) / 3.0, (az + bz + cz) / 3.0
         value, gx, gy, gz = distance_of_point(x, y, z, half_width, radius)
         best = min(best, value)
+        if best < stop:
+            break
         slope_a = gx * (ax - x) + gy * (ay - y) + gz * (az - z)
         slope_b = gx * (bx - x) + gy * (by - y) + gz * (bz - z)
         slope_c = gx * (cx - x) + gy * (cy - y) + gz * (cz - z)
@@ -219,13 +230,7 @@ def nearest_on_triangle(  # type: ignore[no-untyped-def]
                     return out if out < enough else best
         if bound >= enough or n + 2 > DEEPEST:
             continue
-        if whole:  # it has to be halved: its corners may be the nearest points
-            whole = False
-            for k in range(3):
-                value, _, _, _ = distance_of_point(
-                    room[0, 3 * k], room[0, 3 * k + 1], room[0, 3 * k + 2], half_width, radius
-                )
-                best = min(best, value)
+        whole = False
         ab = (ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2
         bc = (bx - cx) ** 2 + (by - cy) ** 2 + (bz - cz) ** 2
         ca = (cx - ax) ** 2 + (cy - ay) ** 2 + (cz - az) ** 2

@@ -55,6 +55,10 @@ class Interval:
         """Return the multiples by an exact number."""
         return Interval(factor * self.middle, abs(factor) * self.radius)
 
+    def scaled(self, factors: Array) -> Interval:
+        """Return the multiples by exact numbers that broadcast with these."""
+        return Interval(factors * self.middle, np.abs(factors) * self.radius)
+
     def __truediv__(self, other: Interval) -> Interval:
         product = (other.middle - other.radius) * (other.middle + other.radius)
         apart = np.where(product > 0.0, product, np.nan)
@@ -106,13 +110,10 @@ class Jet:
         return Jet(self.value.times(factor), self.first.times(factor), self.second.times(factor))
 
     def scaled(self, factors: Array) -> Jet:
-        """Return the multiples by exact numbers, one for each cell."""
-        size = np.abs(factors)
-        value, first, second = (
-            Interval(factors * part.middle, size * part.radius)
-            for part in (self.value, self.first, self.second)
+        """Return the multiples by exact numbers that broadcast with the cells."""
+        return Jet(
+            self.value.scaled(factors), self.first.scaled(factors), self.second.scaled(factors)
         )
-        return Jet(value, first, second)
 
     def plus(self, number: Array | float) -> Jet:
         """Return the sum with an exact number."""
@@ -152,8 +153,14 @@ class Turning:
     def __neg__(self) -> Turning:
         return Turning(-self.angle, -self.first, -self.second)
 
-    def plus(self, angle: float) -> Turning:
-        """Return it turned by an exact angle in [rad]."""
+    def scaled(self, factors: Array) -> Turning:
+        """Return the multiples by exact numbers that broadcast with the cells."""
+        return Turning(
+            self.angle.scaled(factors), self.first.scaled(factors), self.second.scaled(factors)
+        )
+
+    def plus(self, angle: Array | float) -> Turning:
+        """Return it turned by exact angles in [rad]."""
         turned = Interval(self.angle.middle + angle, self.angle.radius)
         return Turning(turned, self.first, self.second)
 

@@ -253,7 +253,7 @@ class ColumnWalls:
         Ts_workpiece_cutter: Array,
     ) -> EnclosedCells:
         """Return cells, the motion of the flange over each of them enclosed."""
-        found = joint_derivatives(self._cell.robot.arm, flange)
+        found = joint_derivatives(self._cell.robot.arm, flange, self.images.families)
         counts = np.array([len(t) - 1 for t in grids])
         eighth = (2.0 * radius) ** 2 / 8.0
         pad_low = np.minimum(0.0, -eighth * found.second_high) - ROUND_OFF
@@ -263,7 +263,7 @@ class ColumnWalls:
         first = np.concatenate([[0], np.cumsum(counts)[:-1]])
         return EnclosedCells(
             Ts_workpiece_cutter, grids, cuts, first, corners, pad_low, pad_high, known,
-            found.middle, found.radius, found.none, np.array(self.images.families),
+            found.middle, found.radius, found.none,
         )  # fmt: skip
 
 

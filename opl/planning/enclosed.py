@@ -25,13 +25,12 @@ class EnclosedCells:
         cuts: In which cells of each the part surely cuts into the wheel.
         first: First cell of each, shape (k,).
         q: Postures at the ends, principal angles in [rad], shape (n + k, 8, 6).
-        pad_low: As in `Piece`, shape (8, 6, n).
+        pad_low: As in `Piece`, of the s families that matter, shape (s, 6, n).
         pad_high: As in `Piece`.
-        known: Which pads are, shape (8, 6, n).
-        middle: Middle of what holds the angle all over a cell in [rad], shape (8, 6, n).
-        radius: Half of what holds it, shape (8, 6, n).
-        none: Where there is certainly no posture, shape (8, n).
-        families: Those that matter.
+        known: Which pads are, shape (s, 6, n).
+        middle: Middle of what holds the angle all over a cell in [rad], shape (s, 6, n).
+        radius: Half of what holds it, shape (s, 6, n).
+        none: Where there is certainly no posture, shape (s, n).
     """
 
     Ts_workpiece_cutter: Array
@@ -45,17 +44,16 @@ class EnclosedCells:
     middle: Array
     radius: Array
     none: np.ndarray
-    families: np.ndarray
 
     def parts(self) -> list[np.ndarray]:
         """Return into how many parts each cell of each place should be cut."""
-        bent = np.where(self.known, self.pad_high - self.pad_low, np.nan)[self.families]
-        about = 2.0 * self.radius[self.families]
+        bent = np.where(self.known, self.pad_high - self.pad_low, np.nan)
+        about = 2.0 * self.radius
         pads = np.fmin(bent, about).sum(axis=1)
         # what is known of the bend falls with the square
         wanted = np.where((bent <= about).all(axis=1), np.ceil(np.sqrt(pads / COARSE)), MOST_PARTS)
         wanted = np.where(pads <= COARSE, 1, wanted)
-        wanted = np.where(self.none[self.families], 1, wanted)
+        wanted = np.where(self.none, 1, wanted)
         parts = np.minimum(wanted.max(axis=0), MOST_PARTS).astype(int)
         return np.split(parts, self.first[1:])
 

@@ -200,9 +200,9 @@ class _Cells:
         Ts_cutter_flange = frames.inverse(cell.T_flange_workpiece @ Ts_workpiece_cutter)
         middle, radius = np.tile(self._middle, k), np.tile(self._radius, k)
         flange = contact_jets(cell.wheel, np.repeat(Ts_cutter_flange, n, axis=0), middle, radius)
-        found = joint_derivatives(arm, flange)
-        turned = found.first[self._family].T * radius[:, None] + ROUND_OFF
-        return q, turned.reshape(k, n, 6), found.none[self._family].reshape(k, n)
+        found = joint_derivatives(arm, flange, [self._family])
+        turned = found.first[0].T * radius[:, None] + ROUND_OFF
+        return q, turned.reshape(k, n, 6), found.none[0].reshape(k, n)
 
     def _out_of_limits(self, contact: tuple[Array, Array], lead: tuple[Array, Array]) -> np.ndarray:
         """Return which postures no full turns bring within the limits, those of contact and lead.
