@@ -66,8 +66,10 @@ def joint_derivatives(arm: Arm, flange: FlangeJets, slots: Sequence[int]) -> Joi
     """Enclose the derivatives of inverse solutions, those of slots as in `inverse_kinematics`."""
     number = np.array(slots)[:, None]
     back, elbow, flip = (np.where(number & bit, -1.0, 1.0) for bit in (2, 1, 4))
-    solve = _spherical_wrist if isinstance(arm, SphericalWristArm) else _parallel_axes
-    joints, none = solve(arm, flange, back, elbow, flip)
+    if isinstance(arm, SphericalWristArm):
+        joints, none = _spherical_wrist(arm, flange, back, elbow, flip)
+    else:
+        joints, none = _parallel_axes(arm, flange, back, elbow, flip)
     shape = len(slots), 6, *np.shape(flange.p[0].value.middle)
     middle, radius, first, low, high = (np.empty(shape) for _ in range(5))
     for joint, (theta, offset, sign) in enumerate(zip(joints, arm.offsets, arm.signs, strict=True)):

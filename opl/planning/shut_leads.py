@@ -160,45 +160,53 @@ class _Cells:
 
     def shut(self, T_workpiece_cutter: Array, lead: Array) -> np.ndarray:
         """Return in which cells a lead from a place fails before a free move may begin, (n,)."""
-        contact, turned, none = (of[0] for of in self._postures(T_workpiece_cutter[None]))
-        before, turned_before = contact, turned
+        every = np.arange(len(self._low))
+        contact, turned, none = (of[0] for of in self._postures(T_workpiece_cutter[None], every))
+        before, turned_before = contact.copy(), turned.copy()
         # over all of a cell the joints make as many full turns on their way as at its middle
         alike = np.ones(contact.shape, dtype=bool)
         shut, begun = np.zeros(len(contact), dtype=bool), none | np.isnan(contact[:, 0])
         for first in range(0, len(lead), AT_ONCE):
-            if (shut | begun).all():
+            left = np.flatnonzero(~shut & ~begun)
+            if not len(left):
                 break
             Ts = lead[first : first + AT_ONCE]
-            for T, q, now, none in zip(Ts, *self._postures(Ts), strict=True):
-                step = principal(q - before)
-                q = before + step
-                alike &= np.abs(step) + turned_before + now < np.pi
-                before, turned_before = q, now
-                left = np.flatnonzero(~shut & ~begun)
-                out = none[left] | self._out_of_limits(
-                    (contact[left], turned[left]), (q[left], np.where(alike, now, np.inf)[left])
-                )
-                out |= self._nearer(T, left, -self._cell.planned_penetration)
-                rest = ~out & ~np.isnan(q[left, 0]) & np.isfinite(now[left]).all(axis=1)
-                out[rest] = self._collides(q[left[rest]], now[left[rest]])
-                shut[left] = out
-                left = left[~out]
-                begun[left] = ~self._nearer(T, left, self._cell.part_from_wheel)
+            q, now, none = self._postures(Ts, left)
+            steps = principal(np.diff(q, axis=0, prepend=before[None, left]))
+            q = before[left] + np.cumsum(steps, axis=0)
+            way = np.abs(steps) + now + np.concatenate([turned_before[None, left], now[:-1]])
+            same = alike[left] & np.logical_and.accumulate(way < np.pi, axis=0)
+            before[left], turned_before[left], alike[left] = q[-1], now[-1], same[-1]
+            there = q, np.where(same, now, np.inf)
+            out = none | self._out_of_limits((contact[left], turned[left]), there)
+            out |= self._nearer(Ts, left, -self._cell.planned_penetration)
+            away = ~self._nearer(Ts, left, self._cell.part_from_wheel)
+            known = ~out & ~np.isnan(q[..., 0]) & np.isfinite(now).all(axis=-1)
+            on = np.ones(len(left), dtype=bool)  # neither shut nor begun so far
+            for k in range(len(Ts)):
+                asked = np.flatnonzero(on & known[k])
+                out[k, asked] = self._collides(q[k, asked], now[k, asked])
+                shut[left[on & out[k]]] = True
+                begun[left[on & ~out[k] & away[k]]] = True
+                on &= ~out[k] & ~away[k]
         return np.asarray(~begun)
 
-    def _postures(self, Ts_workpiece_cutter: Array) -> tuple[Array, Array, np.ndarray]:
+    def _postures(
+        self, Ts_workpiece_cutter: Array, asked: np.ndarray
+    ) -> tuple[Array, Array, np.ndarray]:
         """Return postures at the middle, how far joints turn in the cell, and where none is.
 
-        Of places of shape (k, 4, 4): principal angles in [rad], NaN where there is none, shape (k,
-        n, 6); not finite where it is not known, shape (k, n, 6); shape (k, n).
+        Of places of shape (k, 4, 4) and n cells asked about: principal angles in [rad], NaN where
+        there is none, shape (k, n, 6); not finite where it is not known, shape (k, n, 6); shape
+        (k, n).
         """
-        cell, arm, k, n = self._cell, self._cell.robot.arm, len(Ts_workpiece_cutter), len(self._low)
-        Ts = cell.Ts_base_flange(self._middle, Ts_workpiece_cutter[:, None])
+        cell, arm, k, n = self._cell, self._cell.robot.arm, len(Ts_workpiece_cutter), len(asked)
+        Ts = cell.Ts_base_flange(self._middle[asked], Ts_workpiece_cutter[:, None])
         q = np.ascontiguousarray(inverse_kinematics(arm, Ts)[:, :, self._family])
         if not self._radius.any():
             return q, np.zeros_like(q), np.isnan(q[..., 0])
         Ts_cutter_flange = frames.inverse(cell.T_flange_workpiece @ Ts_workpiece_cutter)
-        middle, radius = np.tile(self._middle, k), np.tile(self._radius, k)
+        middle, radius = np.tile(self._middle[asked], k), np.tile(self._radius[asked], k)
         flange = contact_jets(cell.wheel, np.repeat(Ts_cutter_flange, n, axis=0), middle, radius)
         found = joint_derivatives(arm, flange, [self._family])
         turned = found.first[0].T * radius[:, None] + ROUND_OFF
@@ -207,7 +215,8 @@ class _Cells:
     def _out_of_limits(self, contact: tuple[Array, Array], lead: tuple[Array, Array]) -> np.ndarray:
         """Return which postures no full turns bring within the limits, those of contact and lead.
 
-        The same full turns both, each given by its middle and how far joints turn, shape (n, 6).
+        The same full turns both, each given by its middle and how far joints turn, shape (n, 6) of
+        contact, (k, n, 6) of a lead. Shape (k, n).
         """
         robot, (sign, shift) = self._cell.robot, self._flip
         fewest, most = np.full(6, -np.inf), np.full(6, np.inf)
@@ -219,13 +228,15 @@ class _Cells:
             )
             fewest = np.maximum(fewest, np.ceil(low - TOUCHING))
             most = np.minimum(most, np.floor(high + TOUCHING))
-        return np.asarray((fewest > most).any(axis=1))
+        return np.asarray((fewest > most).any(axis=-1))
 
-    def _nearer(self, T_workpiece_cutter: Array, asked: np.ndarray, distance: float) -> np.ndarray:
-        """Return in which cells asked about the part is nearer to the wheel all over, (n,)."""
-        Ts = np.broadcast_to(T_workpiece_cutter, (len(asked), 4, 4))
-        at = self._low[asked], self._high[asked]
-        return surely_nearer(self._cell, self._scene.part, Ts, *at, distance)[0]
+    def _nearer(self, Ts_workpiece_cutter: Array, asked: np.ndarray, distance: float) -> np.ndarray:
+        """Return in which cells asked about the part is nearer to the wheel all over, (k, n)."""
+        k, n = len(Ts_workpiece_cutter), len(asked)
+        at = np.tile(self._low[asked], k), np.tile(self._high[asked], k)
+        Ts = np.repeat(Ts_workpiece_cutter, n, axis=0)
+        nearer, _ = surely_nearer(self._cell, self._scene.part, Ts, *at, distance)
+        return nearer.reshape(k, n)
 
     def _collides(self, q: Array, turned: Array) -> np.ndarray:
         """Return which postures collide, however far joints turn, shape (n,)."""
