@@ -18,7 +18,7 @@ import numpy as np
 
 from opl.files.kernels import kernel
 
-TOLERANCE = 2e-6  # [m] distances returned are at most this much too large
+TOLERANCE = 1e-7  # [m] distances returned are at most this much too large
 DEEPEST = 96  # pieces that wait at once; halving to a micrometre needs far fewer
 # Square to an edge, evenly. Between two the way out can be shorter than about both only if it is
 # a least one there, and then by no more than a thousandth.
