@@ -6,6 +6,7 @@ import numpy as np
 
 from opl.files.kernels import kernel
 
+APART = 1e-9  # belt units between two bands of contact positions
 JUMP = 0.5  # [rad] between neighbouring contact positions; more is no motion
 BEND = 2.0  # times the sagitta that second differences tell: how far postures stand off a chord
 STILL = 1e-12  # [rad] that a joint turns along a chord, no less
@@ -117,12 +118,26 @@ def sample(t, q, free, low, high, share, whole, found, spacing):  # type: ignore
             )
             count = 1
         length[0] = 0.0
+        bands = 1
         for k in range(count):
             length[k + 1] = length[k] + (last[k] - first[k])
+            bands += k > 0 and first[k] > last[k - 1] + APART
+        # beside wide ones a narrow band has no sample but one at its end: each has its middle
+        middles = bands if 1 < bands <= len(share) // 2 else 0
+        even = len(share) - middles
         at = 0
-        for k in range(len(share)):
-            along = share[k] * length[count]
+        for k in range(even):
+            along = (share[k] if middles == 0 else k / (even - 1.0)) * length[count]
             while at < count - 1 and length[at + 1] <= along:
                 at += 1
             found[column, k] = first[at] + min(along - length[at], last[at] - first[at])
-        spacing[column] = length[count] / (len(share) - 1)
+        if middles > 0:
+            band, begin = even, first[0]
+            for k in range(1, count + 1):
+                if k == count or first[k] > last[k - 1] + APART:
+                    found[column, band] = (begin + last[k - 1]) / 2.0
+                    band += 1
+                    if k < count:
+                        begin = first[k]
+            found[column].sort()
+        spacing[column] = length[count] / (even - 1)

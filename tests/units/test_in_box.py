@@ -42,3 +42,14 @@ def test_columns_may_be_read_only():
     assert sampled(t, q, free, box, 2)[0][0] == pytest.approx([0.3, 0.6])
     assert (np.diff(clipped(q, box), axis=0) >= 0.0).sum() == 2
     assert nearest_points(q, free, box)[0] == pytest.approx(0.0)
+
+
+def test_a_narrow_band_beside_a_wide_one_has_a_sample():
+    q = np.zeros((1, len(ROWS), 6))
+    q[0, 5:, 0] = [0.1, 0.1, -0.1, -0.1]  # in the box up to the middle, then once more on the way
+    free = np.ones((1, len(ROWS)), dtype=bool)
+    box = JointBox(np.full(6, -0.001), np.full(6, 0.001))
+    t, _ = sampled(ROWS[None], q, free, box, 9)
+    bands = np.split(t[0], np.flatnonzero(np.diff(t[0]) > 0.5) + 1)
+    assert [len(band) for band in bands] == [7, 2]
+    assert bands[1][0] == np.mean([0.5, 0.75])
