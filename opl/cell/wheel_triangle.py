@@ -19,7 +19,7 @@ import numpy as np
 from opl.files.kernels import kernel
 
 TOLERANCE = 1e-7  # [m] distances returned are at most this much too large
-DEEPEST = 96  # pieces that wait at once; halving to a micrometre needs far fewer
+DEEPEST = 96  # pieces that wait at once; halving to the tolerance needs far fewer
 # Square to an edge, evenly. Between two the way out can be shorter than about both only if it is
 # a least one there, and then by no more than a thousandth.
 DIRECTIONS = 64

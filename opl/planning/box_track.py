@@ -108,7 +108,8 @@ class BoxTracks:
         track: Track | None = coarse.smoothest()
         if track is None:
             ladders = [matrix.ladder_within(self._max_contact_change) for matrix in coarse.matrices]
-            if learn(bars(places, ladders)):
+            blocked = [matrix.blocked_edges for matrix in coarse.matrices]
+            if learn(bars(places, ladders, blocked)):
                 return None
             return self.plan(columns, NO_PASSAGES, box, room, learn) if rows else None
         bulges = coarse.bulges(track, box.widened(BULGE * room))

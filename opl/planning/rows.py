@@ -131,19 +131,22 @@ def bulging(places: Array, t: Array, edge: np.ndarray, excess: Array) -> list[Bu
     return found
 
 
-def bars(places: Array, ladders: Sequence[Ladder]) -> list[Bulge]:
+def bars(
+    places: Array, ladders: Sequence[Ladder], blocked_edges: Sequence[np.ndarray]
+) -> list[Bulge]:
     """Return after which places no track gets further, the first in each ladder.
 
-    It would get past what is shut, or joints would turn further than an edge may.
+    It would get past what is shut, or joints would turn further than an edge may. The edges that
+    are blocked in each ladder are sorted keys, as of `shut_edges`.
     """
     found: list[Bulge] = []
-    for ladder in ladders:
+    for ladder, blocked in zip(ladders, blocked_edges, strict=True):
         reached = ladder.free[0]
         for k, there in enumerate(ladder.free[1:]):
             if ladder.off_wheel[k]:
                 reached = there
                 continue
-            turned = _turned(ladder, k, reached, there)
+            turned = _turned(ladder, k, blocked)[reached][:, there]
             reached = there.copy()
             reached[there] = (turned <= 1.0).any(axis=0)
             if not reached.any():
@@ -155,17 +158,18 @@ def bars(places: Array, ladders: Sequence[Ladder]) -> list[Bulge]:
     return found
 
 
-def _turned(ladder: Ladder, k: int, here: np.ndarray, there: np.ndarray) -> Array:
-    """Return how far joints turn over edges from a place, in what they may, shape (a, b).
+def _turned(ladder: Ladder, k: int, blocked: np.ndarray) -> Array:
+    """Return how far joints turn over the edges from a place, in what they may, shape (m, m).
 
-    From some rows of the place to some of the next, flags of shape (m,); infinite where something
-    is shut in between.
+    Infinite where something is shut in between.
     """
     t, q = ladder.t_of_nodes, ladder.q
-    change = np.abs(t[k + 1, there] - t[k, here][:, None])
+    change = np.abs(t[k + 1] - t[k][:, None])
     steps = np.maximum(np.ceil(change / ladder.max_contact_step - 1e-9), 1.0)
-    largest = np.abs(q[k + 1, there] - q[k, here][:, None]).max(axis=-1)
+    largest = np.abs(q[k + 1] - q[k][:, None]).max(axis=-1)
     turned = largest / (steps * ladder.max_joint_step)
     if ladder.sides is not None:
-        turned[ladder.sides[k, 0, here][:, None] != ladder.sides[k, 1, there]] = np.inf
+        turned[ladder.sides[k, 0][:, None] != ladder.sides[k, 1]] = np.inf
+    first, end = np.searchsorted(blocked, [k * turned.size, (k + 1) * turned.size])
+    turned.flat[blocked[first:end] - k * turned.size] = np.inf
     return np.asarray(np.where(change <= ladder.contact_changes[k] + 1e-9, turned, np.inf))

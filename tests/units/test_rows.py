@@ -1,0 +1,46 @@
+"""Where tracks get no further, held against every track of small ladders."""
+
+import itertools
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from opl.planning.rows import bars
+from opl.search.ladder import Ladder
+
+COLUMNS, ROWS = 4, 3
+EDGES = (COLUMNS - 1) * ROWS * ROWS
+
+
+@settings(deadline=None)
+@given(
+    st.sets(st.integers(0, EDGES - 1)),
+    st.lists(st.booleans(), min_size=COLUMNS * ROWS, max_size=COLUMNS * ROWS),
+)
+def test_bars_are_where_the_longest_tracks_end(blocked, free):
+    free = np.array(free).reshape(COLUMNS, ROWS)
+    free[0, 0] = True
+    ladder = Ladder(
+        np.zeros((COLUMNS, ROWS, 6)),
+        free,
+        np.arange(3.0),
+        np.zeros(COLUMNS - 1, dtype=bool),
+        1.0,
+        1.0,
+    )
+    shut = np.isin(np.arange(EDGES), sorted(blocked)).reshape(COLUMNS - 1, ROWS, ROWS)
+
+    def goes(track):
+        return all(free[k, row] for k, row in enumerate(track)) and not any(
+            shut[k, row, after] for k, (row, after) in enumerate(itertools.pairwise(track))
+        )
+
+    longest = max(
+        length
+        for length in range(1, COLUMNS + 1)
+        if any(goes(track) for track in itertools.product(range(ROWS), repeat=length))
+    )
+    found = bars(np.arange(COLUMNS) / 10.0, [ladder], [np.flatnonzero(shut)])
+    expected = [] if longest == COLUMNS else [(longest - 1) / 10.0]
+    assert [bar.first for bar in found] == expected
