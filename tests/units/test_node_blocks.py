@@ -12,7 +12,7 @@ from opl.planning.images import Images, seams_of
 from opl.planning.multi_start import tracks_from_best_start
 from opl.planning.nodes import build_nodes
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
-from opl.planning.problem import wheel_distances
+from opl.planning.problem import nearer_nodes, wheel_distances
 from opl.planning.sides import ANY_SIDE
 from opl.planning.symmetry import twins
 from opl.planning.turned import Kept
@@ -34,11 +34,13 @@ def test_blocks_change_nothing(monkeypatch, at_once):
         np.testing.assert_array_equal(one.q, other.q)
         np.testing.assert_array_equal(one.position_index, other.position_index)
         np.testing.assert_array_equal(one.ik_branch, other.ik_branch)
+    layer = wheel_distances(problem.scene, points, t)
+    np.testing.assert_array_equal(layer, problem.wheel_distance)
     few = np.arange(len(points)) % 3 == 0
-    at = np.broadcast_to(few[:, None], problem.wheel_distance.shape)
-    layer = wheel_distances(problem.scene, points, t, at)
-    np.testing.assert_array_equal(layer[few], problem.wheel_distance[few])
-    assert np.isneginf(layer[~few]).all()
+    at, needed = np.broadcast_to(few[:, None], layer.shape), np.full((len(points), 1), 1e-6)
+    nearer = nearer_nodes(problem.scene, points, t, np.ones(at.shape, dtype=bool), needed)
+    assert 0 < nearer[few].sum() < at.sum()
+    np.testing.assert_array_equal(nearer_nodes(problem.scene, points, t, at, needed), nearer & at)
 
 
 def test_searches_read_nodes_where_they_lie():

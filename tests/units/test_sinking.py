@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import PART, WHEEL
+from opl.geometry.frames import inverse
 from opl.motion.collision_check import CollidingMove
 from opl.motion.motion import Phase
 from opl.planning import box_track
@@ -12,7 +14,6 @@ from opl.planning.box_track import BoxTracks
 from opl.planning.multi_start import tracks_from_best_start
 from opl.planning.open_matrix import open_matrices
 from opl.planning.passages import NO_PASSAGES
-from opl.planning.problem import wheel_distances
 from opl.planning.sinking import MORE, places_for, shallower, spare_for, sunk_between
 from opl.planning.track_check import Collides, check_track
 from opl.search.smooth import Travel
@@ -52,8 +53,9 @@ def test_depth_is_spared_at_both_ends_and_where_it_is_of_no_use_places_are_taken
 def distances(columns):
     """Return the distance of the part to the wheel in [m], far away too, shape (n, m)."""
     problem = small_problem()
-    far = np.full((len(columns.places), 1), 1.0)
-    return wheel_distances(problem.scene, problem.points, columns.t, None, far)
+    wheel, frames = problem.cell.wheel, problem.points.frames_at(columns.places)
+    Ts = wheel.T_contact0_contact(columns.t) @ inverse(frames)[:, None]
+    return signed_wheel_distance(problem.scene.part, wheel, Ts, 1.0)
 
 
 def test_nodes_leave_the_depth_that_is_spared():
