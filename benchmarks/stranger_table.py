@@ -12,6 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import opl
+from opl.planning.plan import AT_REST
 
 CLOSED = 0.002  # gap that counts as closed
 QUICK = 10.0  # [s] of processor that a search should take at the most
@@ -60,7 +61,7 @@ class Outcome:
         """Fraction by which the sum may exceed the least there is; None if nothing is proven."""
         if self.sum_rad is None or self.bound_rad is None:
             return None
-        return 1.0 - self.bound_rad / self.sum_rad
+        return 0.0 if self.sum_rad <= AT_REST else 1.0 - self.bound_rad / self.sum_rad
 
     @property
     def closed(self) -> bool:

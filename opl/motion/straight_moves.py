@@ -21,6 +21,7 @@ from opl.motion.collision_check import RESOLUTION, densify
 # [m] a piece may be as long as to move no point farther than this from its middle; what would need
 # a distance beyond the clearance smaller than the last is taken to be too near
 RESERVES = (0.064, 0.016, 0.004, 0.001, 0.00025, 0.00005)
+WHERE_BEGUN = SECOND_OPINION + RESERVES[-1]  # [m] beyond the clearance: there free moves begin
 # the part as spheres around its pieces and as corners of it, to see soon that it is far from the
 # wheel, or near
 MOST_SPHERES = 32

@@ -11,6 +11,7 @@ from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.cut_cells import shut_along
 from opl.planning.families import GROWN
+from opl.planning.field_at_places import FieldAtPlaces
 from opl.planning.images import Seams, image_within_limits, wrist_flips
 from opl.planning.nodes import inverse_solutions
 from opl.planning.placement import Placement
@@ -27,6 +28,7 @@ WITHIN = 6  # halvings of the way between places that is too deep in the wheel, 
 CLOSER = 2  # times that places are sampled closer where collisions begin
 HIDDEN = 5e-5  # of the box: what a chord that meets it may stand off the postures
 BORDER = 1e-2  # belt units to look beyond what lies in the box
+BESIDE = 0.02  # cutter points: what is so near to a place that is missed as well is beside it
 
 
 @dataclass(frozen=True)
@@ -50,15 +52,20 @@ class Columns:
     q: Array
     free: np.ndarray
 
-    def missed(self, box: JointBox, known: Collection[float], allowed: float) -> list[float]:
+    def missed(
+        self, box: JointBox, known: Collection[float], allowed: float
+    ) -> tuple[list[float], list[float]]:
         """Return the places that a box misses by more than allowed in [rad], the worst first.
 
-        Those in ``known`` are left out.
+        Those in ``known``, which may be shut all over the box; and others, but for those beside
+        them, which tell no more.
         """
         missing = missing_chords(self.q, self.free, box)
-        missing[np.isin(self.places, list(known))] = 0.0
         worst = np.argsort(-missing, kind="stable")
-        return [float(self.places[k]) for k in worst if missing[k] > allowed]
+        places = [float(self.places[k]) for k in worst if missing[k] > allowed]
+        shut = [place for place in places if place in known]
+        new = [place for place in places if all(abs(place - wall) > BESIDE for wall in shut)]
+        return shut, new
 
 
 class ColumnSampler:
@@ -73,6 +80,7 @@ class ColumnSampler:
     def __init__(self, problem: GrindingProblem, seams: Seams, limits: Sequence[JointBox]) -> None:
         self._problem = problem
         self._seams = seams
+        self._field = FieldAtPlaces(problem)
         self.collisions = False  # whether postures that collide are left out
         self.mirrored = False  # whether they are those with the wrist flipped that may not collide
         self.reserve = RESERVE  # [m] beyond the clearance needed that postures leave
@@ -161,21 +169,13 @@ class ColumnSampler:
         return replace(columns, free=free)
 
     def _coarse(self, places: Array, placements: Sequence[Placement]) -> Array:
-        """Return postures of places at the field's contact positions, shape (n, M, 6).
-
-        Between cutter points near enough to see where a box may be met.
-        """
-        before, after = places.astype(int), np.ceil(places).astype(int)
-        columns = np.union1d(before, after)
-        pass_index = self._problem.points.pass_index[columns]
-        field = np.empty((len(columns), len(self._problem.field.contact_positions), 6))
+        """Return postures of places at the field's contact positions, shape (n, M, 6)."""
+        pass_index = self._problem.points.pass_index[places.astype(int)]
+        found = np.empty((len(places), len(self._problem.field.contact_positions), 6))
         for index, placement in enumerate(placements):
             own = pass_index == index
-            angles = self._problem.angles(placement.family, columns[own])
-            field[own] = self._placed(angles, placement)
-        here = field[np.searchsorted(columns, before)]
-        there = field[np.searchsorted(columns, after)]
-        return np.asarray(here + (places - before)[:, None, None] * (there - here))
+            found[own] = self._placed(self._field.at(places[own], placement.family), placement)
+        return found
 
     def _leave_out_collisions(self, columns: Columns, box: JointBox) -> None:
         """Leave postures that collide out of columns, until those nearest to a box are free."""

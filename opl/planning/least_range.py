@@ -64,5 +64,15 @@ def plan_optimal(
     if search.plan is None:
         robot, least = problem.cell.robot, search.lower_bound
         raise NoMotionError(least, least > float((robot.upper - robot.lower).sum()))
-    bound, why, held = search.lower_bound, search.open_because, search.holders()
-    return replace(search.plan, lower_bound=bound, open_because=why, holders=held)
+    found = replace(search.plan, lower_bound=search.lower_bound, holders=search.holders())
+    return replace(found, open_because=_open_because(found, settings, search.work_share))
+
+
+def _open_because(plan: Plan, settings: OptimalSettings, work_share: float) -> str | None:
+    """Return why the bound is further off than wanted, None if it is not."""
+    assert plan.gap is not None
+    if plan.gap <= settings.widen:
+        return None
+    if work_share < 1.0:
+        return "no motion was found nearer to the bound"
+    return "the work allowed for the proof was done before it was complete"

@@ -18,11 +18,12 @@ from opl.planning.columns import ColumnWalls
 from opl.planning.cut_cells import whole_cells
 from opl.planning.families import Families, few_columns, grown
 from opl.planning.holders import Holder, holders
+from opl.planning.hope import Hope
 from opl.planning.images import Images, seams_of
 from opl.planning.obstructed import Obstructions
 from opl.planning.passages import NO_PASSAGES, Passages, Rectangles
 from opl.planning.placement import Placement
-from opl.planning.plan import Plan
+from opl.planning.plan import AT_REST, Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulge
 from opl.planning.settings import OptimalSettings
@@ -36,16 +37,12 @@ from opl.search.walls import Chain
 PROOF_SHARE = 0.9  # of the widening: how far the bound may stay below the path
 ROOM_SHARE = 0.4  # of the widening: how much larger than its box the path may be
 MISSED = 0.05  # of the widening: what a box may miss a cutter point by and still hold it
-RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for next
-GUESSED = 1.5  # times what is proven: what is hoped for where no box tells
-FIRST_GUESS = 0.5  # [rad] what is hoped for where nothing is proven either
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
 EARLY_SHARE = 0.3  # of the work: motions in boxes that are not proven to be the least
 FIRST_WORK = 300  # units that may be spent on those at once
 CLEARLY_LESS = 0.005  # of the best: what a motion in such a box should be better by
 MOST_IN_VAIN = 2  # such boxes in which no motion is free: what collides is left out from then on
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
-MOST_REFINED = 12  # times that rectangles are cut finer for one box
 MOST_ADDED = 3  # walls at once
 
 
@@ -81,11 +78,9 @@ class OptimalSearch:
         self._tracks = BoxTracks(problem, self._sampler, costs, most_change, most)
         self.plan = fallback
         self._largest = largest
-        self._proven = self._least_hope = 0.0
-        self._told = fallback is not None  # whether a motion or a box tells what to hope for
-        self._raised = RAISED  # grows as long as neither a motion nor a new box tells
-        self._given_up = self._refined = 0
-        self._refined_for = 0.0  # size of the box for which rectangles were cut finer last
+        self._proven = 0.0
+        self._hoped = Hope(fallback is not None)
+        self._given_up = 0
         self.forbidden: Forbidden | None = None  # of collisions, once they are known to matter
         self._early = 0.0  # work on early motions
         self._in_vain = 0  # boxes in which none of these was free
@@ -95,7 +90,8 @@ class OptimalSearch:
         self._work.begin_again(self.proof)
         self._rectangles = Rectangles(self._sampler, points, whole_cells(problem.cell.wheel))
         self._hope(self._families.smallest_grown())
-        self.proof.threshold = min(self.proof.threshold, self._guess)
+        guess = self._hoped.guess(self.lower_bound, largest)
+        self.proof.threshold = min(self.proof.threshold, guess)
         first = [0.0, float(len(points) // 2), float(len(points) - 1)]
         self._add(list(dict.fromkeys(first + self._families.unreached())))
 
@@ -103,21 +99,13 @@ class OptimalSearch:
     def finished(self) -> bool:
         """Whether there is nothing left to do."""
         done = self.proof.closed and self.proof.threshold >= self._value
+        done |= self._value <= AT_REST
         return done or self._given_up >= MOST_GIVEN_UP or self.work_share >= 1.0
 
     @property
     def work_share(self) -> float:
         """How much of the work allowed is done."""
         return self._work.done / self._settings.max_subproblems
-
-    @property
-    def open_because(self) -> str | None:
-        """Why the bound is further off than wanted, None if it is not."""
-        if self.lower_bound >= self._value * (1.0 - self._settings.widen):
-            return None
-        if self.work_share < 1.0:
-            return "no motion was found nearer to the bound"
-        return "the work allowed for the proof was done before it was complete"
 
     @property
     def _value(self) -> float:
@@ -148,42 +136,56 @@ class OptimalSearch:
         placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
         missed = missed[:MOST_ADDED]
         if not candidate.settled:
-            if placements:
-                self._look_for_more(box, placements)
-                if self._in_vain >= MOST_IN_VAIN and not self._sampler.collisions:
-                    self._mind_collisions()
-                    return
-            if missed:
-                self.proof.show_soon()
-                self._add(missed)
-                self.proof.put_back()
-            else:
-                self.proof.split()
+            self._go_into(box, placements, missed)
+        elif self._learn(box, placements, missed) or self.proof.outdated:
+            self.proof.put_back()
+        elif candidate.bound >= self.proof.closing:
             return
-        looked_at = None
+        elif not self._sampler.collisions:
+            self._mind_collisions()
+        elif self.proof.look_closer():
+            self.proof.put_back()
+        else:
+            self._given_up += 1
+            self.proof.give_up()
+
+    def _go_into(self, box: JointBox, placements: Sequence[Placement], missed: list[float]) -> None:
+        """Look for a motion in a box that is not settled; add walls that it misses, or split it."""
         if placements:
-            columns, passages, inner = looked_at = self._look(box, placements)
-            self._hope(inner)
-            allowed = MISSED * self._settings.widen * self.proof.threshold
-            missed = missed or columns.missed(box, self._places, allowed)[:MOST_ADDED]
-            if not missed and passages.walls:
-                self._stand_in_the_way(passages.walls[:MOST_ADDED])
-                self.proof.put_back()
+            self._look_for_more(box, placements)
+            if self._in_vain >= MOST_IN_VAIN and not self._sampler.collisions:
+                self._mind_collisions()
                 return
         if missed:
             self._add(missed)
-            self.proof.put_back()
+        elif not placements or not self._shut(box, placements):
+            self.proof.split()
             return
-        learnt = looked_at is not None and self._try(*looked_at)
-        if learnt or self.proof.outdated:
-            self.proof.put_back()
-        elif candidate.bound < self.proof.closing and not self._sampler.collisions:
-            self._mind_collisions()
-        elif candidate.bound < self.proof.closing and self.proof.look_closer():
-            self.proof.put_back()
-        elif candidate.bound < self.proof.closing:
-            self._given_up += 1
-            self.proof.give_up()
+        self.proof.show_soon()
+        self.proof.put_back()
+
+    def _learn(self, box: JointBox, placements: Sequence[Placement], missed: list[float]) -> bool:
+        """Add walls that a box misses, or look for a motion in it; return whether it can tell more.
+
+        Otherwise nothing was learnt of the box: there is a motion, or nothing more to be found.
+        """
+        if placements:
+            columns, passages, inner = self._look(box, placements)
+            self._hope(inner)
+            allowed = MISSED * self._settings.widen * self.proof.threshold
+            known, new = columns.missed(box, self._places, allowed)
+            if not missed and self._sampler.collisions and self.proof.clear(known):
+                return True
+            missed = missed or new[:MOST_ADDED]
+        if missed:
+            self._add(missed)
+            return True
+        if not placements:
+            return False
+        if passages.walls:
+            self._stand_in_the_way(passages.walls[:MOST_ADDED])
+            return True
+        return self._try(columns, passages, inner)
 
     def _look(
         self, box: JointBox, placements: Sequence[Placement]
@@ -195,12 +197,21 @@ class OptimalSearch:
         passages = self._rectangles.held(inner or box, placements, allowed, self._room(box))
         return columns, passages, None if inner is None else passages.grown(inner)
 
+    def _shut(self, box: JointBox, placements: Sequence[Placement]) -> bool:
+        """Look at walls that seem shut all over a box; return whether any part of one surely is."""
+        if not self._sampler.collisions:
+            return False
+        few = few_columns(self._problem.points.pass_index)  # of every pass, so that each has some
+        places = np.union1d(list(self._places), few.astype(float))
+        columns = self._sampler.columns(box, placements, places)
+        known, _ = columns.missed(box, self._places, CLEARLY_MISSED * self.proof.threshold)
+        return self.proof.clear(known)
+
     def _look_for_more(self, box: JointBox, placements: Sequence[Placement]) -> None:
         """Grow a box that is not settled until it holds all; look for a motion in it, if small."""
         larger, threshold = self._families.grown(box, placements), self.proof.threshold
-        self._hope(larger)
-        if self.proof.threshold < threshold:
-            self.proof.show_soon()
+        if not self._sampler.collisions:
+            self._hope(larger)
         before = self._work.done
         least = self._value * (1.0 - CLEARLY_LESS)
         if larger is None or larger.size > least:
@@ -208,19 +219,20 @@ class OptimalSearch:
         if self._early < FIRST_WORK + EARLY_SHARE * before:
             columns, _, inner = self._look(larger, placements)
             if inner is not None:
+                self._hope(inner)
                 room, collided = self._room(inner), self._tracks.collided
                 found = self._tracks.plan(columns, NO_PASSAGES, inner, room, lambda _: False)
                 self.keep(found)
                 self._in_vain += int(found is None and self._tracks.collided > collided)
             self._early += self._work.done - before
+        if self.proof.threshold < threshold:
+            self.proof.show_soon()
 
     def _hope(self, box: JointBox | None) -> None:
         """Look only for what is as good as a motion in a box would be."""
         if box is not None:
-            self._told = True
-            hoped = max(box.size * (1.0 + self._settings.widen), self._least_hope)
-            if hoped < self.proof.threshold:
-                self.proof.threshold, self._raised = hoped, RAISED
+            size = box.size * (1.0 + self._settings.widen)
+            self.proof.threshold = self._hoped.told(size, self.proof.threshold)
 
     def _mind_collisions(self) -> None:
         """Leave out where the robot collides: it does wherever a motion might have been."""
@@ -229,11 +241,11 @@ class OptimalSearch:
         self._sampler.collisions = True
         self._places.clear()
         self.proof.put_back()  # before what is proven is noted
-        self._told = self.plan is not None
+        self._hoped = Hope(self.plan is not None)
         minding = self._new_proof(self._value)
         for wall in self.proof.walls:
             minding.add(wall)
-        self._begin_again(minding, self._guess, 0.0)
+        self._begin_again(minding, self._hoped.guess(self.lower_bound, self._value))
 
     def _new_proof(self, threshold: float) -> BoxProof:
         """Return a proof without walls, for boxes below a size."""
@@ -241,23 +253,14 @@ class OptimalSearch:
         kept = self.forbidden, images.limits
         return BoxProof(images.of, self._walls.finer, threshold, gap, *kept)
 
-    @property
-    def _guess(self) -> float:
-        """What to hope for where nothing is told: all images of all walls are many."""
-        least = max(GUESSED * self.lower_bound, FIRST_GUESS)
-        return self._value if self._told else min(least, self._value)
-
     def _hope_for_less(self) -> None:
         """Begin the proof again: no motion is as good as was hoped."""
-        raised = self._raised if self._told else GUESSED
-        self._raised = RAISED if self.plan else min(self._raised**2, GUESSED)
-        hope = min(self._value, self.proof.threshold * raised)
-        self._begin_again(self.proof, hope, hope)
+        more = self._hoped.more(self.proof.threshold, self._value, self.plan is not None)
+        self._begin_again(self.proof, more)
 
-    def _begin_again(self, proof: BoxProof, threshold: float, least_hope: float) -> None:
+    def _begin_again(self, proof: BoxProof, threshold: float) -> None:
         """Begin a proof again: boxes up to another size are of interest."""
         self._proven = self.lower_bound
-        self._least_hope = least_hope
         self.proof = proof.again(threshold)
         self._work.begin_again(self.proof)
 
@@ -280,9 +283,7 @@ class OptimalSearch:
 
         def learn(bulges: Sequence[Bulge]) -> bool:
             nonlocal learnt
-            self._refined = self._refined + 1 if box.size == self._refined_for else 0
-            self._refined_for = box.size
-            learnt = self._refined < MOST_REFINED and self._rectangles.refine(bulges)
+            learnt = self._rectangles.refine(bulges, box)
             return learnt
 
         self.keep(self._tracks.plan(columns, passages, box, self._room(box), learn))

@@ -26,6 +26,7 @@ from opl.search.walls import Chain
 PARTS = 8  # into which a stretch between two places is cut
 SHORTEST = 1.0 / 500.0  # of the stretch between cutter points that is still cut
 AROUND = 12  # cutter points on either side of what is cut
+MOST_REFINED = 12  # times that rectangles are cut finer for one box
 LESS = 0.5  # of what all ways miss a box by: what each edge of a wall should miss it by
 
 
@@ -77,26 +78,45 @@ class Rectangles:
         self._walls: set[Chain] = set()
         self._known: dict[tuple[float, ...], Rectangle] = {}
         self.places = np.arange(len(points), dtype=float)
+        self._refined, self._refined_for = 0, 0.0  # how often for a box of that size
 
-    def refine(self, bulges: Sequence[Bulge]) -> bool:
+    def refine(self, bulges: Sequence[Bulge], box: JointBox) -> bool:
         """Cut rectangles finer where a track leaves its box; return whether anything is new."""
+        self._refined = self._refined + 1 if box.size == self._refined_for else 0
+        self._refined_for = box.size
+        if self._refined >= MOST_REFINED:
+            return False
         more = [np.empty(0)]
-        known = np.union1d(np.arange(len(self._points), dtype=float), self._between)
         for bulge in bulges:
             more.append(np.linspace(bulge.first, bulge.last, bulge.parts + 1)[1:-1])
-            if not bulge.steep and bulge.last - bulge.first == 1.0:
-                continue
-            first = int(np.searchsorted(known, bulge.first, side="right")) - 1
-            last = int(np.searchsorted(known, bulge.last))
-            for one, other in zip(known[first:last], known[first + 1 : last + 1], strict=True):
-                if other - one > SHORTEST:
-                    finer = np.linspace(one, other, PARTS + 1)[1:-1]
-                    self._between = np.union1d(self._between, finer)
+            if bulge.steep or bulge.last - bulge.first != 1.0:
+                more.append(self._cut(bulge.first, bulge.last))
         places = np.union1d(self.places, np.concatenate(more))
-        places = np.union1d(places, self._between)
         new = len(places) > len(self.places)
         self.places = places
         return new
+
+    def _cut(self, begin: float, end: float) -> Array:
+        """Cut rectangles finer between two places; return the new ones."""
+        more = [np.empty(0)]
+        known = np.union1d(np.arange(len(self._points), dtype=float), self._between)
+        first = int(np.searchsorted(known, begin, side="right")) - 1
+        last = int(np.searchsorted(known, end))
+        for one, other in zip(known[first:last], known[first + 1 : last + 1], strict=True):
+            if other - one > SHORTEST:
+                more.append(np.linspace(one, other, PARTS + 1)[1:-1])
+        finer = np.concatenate(more)
+        self._between = np.union1d(self._between, finer)
+        return finer
+
+    def _cut_along(
+        self, rectangle: Rectangle, corners: Sequence[Corner], box: JointBox, most: float
+    ) -> bool:
+        """Cut rectangles finer where a chain misses a box less than its corners tell."""
+        before = len(self._between)
+        for one, other in rectangle.nearer_between(corners, box, LESS * most):
+            self._cut(one, other)
+        return len(self._between) > before
 
     def held(
         self, box: JointBox, placements: Sequence[Placement], allowed: float, room: float
@@ -131,6 +151,8 @@ class Rectangles:
                     walls.append((most, wall))
                 # a wall that the proof has says less than these nodes: they are too few, unless it
                 # is by a hair
+                elif most > room and corners and self._cut_along(rectangle, corners, box, most):
+                    return self.held(box, placements, allowed, room)
                 if walls or most > room:
                     continue
             ends = np.array(passage(up, along, max(most, allowed)))

@@ -22,6 +22,7 @@ from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import no_path
 from opl.planning.track_check import Collides, Free, check_track
 
+AT_REST = 1e-6  # [rad] what joints turn all together at the most where the robot counts as at rest
 WORK_OF_A_CHECK = 0.1  # units, for each of the places of a motion, beside what the scene is asked
 
 
@@ -68,9 +69,11 @@ class Plan:
 
     @property
     def gap(self) -> float | None:
-        """Fraction by which the joint range sum may miss the least there is."""
+        """Fraction by which the joint range sum may miss the least there is; 0 at rest."""
         if self.lower_bound is None:
             return None
+        if self.path.joint_range_sum <= AT_REST:
+            return 0.0
         return 1.0 - self.lower_bound / self.path.joint_range_sum
 
     def at_places(self, places: Array) -> Plan:

@@ -103,6 +103,22 @@ class Rectangle:
         self._sure[place, line], self._doubted[place, line] = shut, ~shut
         return bool(self._doubted[k, j][asked].any())
 
+    def nearer_between(
+        self, corners: Sequence[Corner], box: JointBox, missed: float
+    ) -> list[tuple[float, float]]:
+        """Return the stretches along a chain that a box misses less between places than so much."""
+        k, j = _steps(corners).T
+        if not len(k):
+            return []
+        places = (self._places[k] + self._places[k + 1]) / 2.0
+        at = self._sampler.at(
+            places, self._sampler.there(places), [self._image], self._t[j][:, None]
+        )
+        halves = np.stack([self._q[k, j], at.q[:, 0], self._q[k + 1, j]], axis=1)
+        free = np.repeat(at.free, 3, axis=1)
+        near = missing_chords(halves, free, box) < missed
+        return list(zip(self._places[k[near]], self._places[k[near] + 1], strict=True))
+
     def ends_of(self, edges: np.ndarray) -> Array:
         """Return the ends in [rad] of those edges of which two are known that may be used.
 

@@ -18,6 +18,7 @@ from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.motion.free_leads import SHARES
 from opl.motion.motion import MoveKind
+from opl.motion.straight_moves import WHERE_BEGUN
 from opl.planning.cut_cells import surely_nearer
 from opl.planning.enclosed import ROUND_OFF
 from opl.planning.images import TOUCHING, wrist_flips
@@ -180,7 +181,7 @@ class _Cells:
             there = q, np.where(same, now, np.inf)
             out = none | self._out_of_limits((contact[left], turned[left]), there)
             out |= self._nearer(Ts, left, -self._cell.planned_penetration)
-            away = ~self._nearer(Ts, left, self._cell.part_from_wheel)
+            away = ~self._nearer(Ts, left, self._cell.part_from_wheel + WHERE_BEGUN)
             known = ~out & ~np.isnan(q[..., 0]) & np.isfinite(now).all(axis=-1)
             on = np.ones(len(left), dtype=bool)  # neither shut nor begun so far
             for k in range(len(Ts)):

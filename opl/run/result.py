@@ -85,7 +85,7 @@ class PathReport:
     intermediate_nodes: int
     lower_bound_rad: float | None  # no motion kept as clear has a smaller sum
     held_by: Sequence[HolderReport]
-    gap: float | None  # fraction by which the sum may be above the least there is
+    gap: float | None  # fraction by which the sum may be above the least there is; 0 at rest (1e-6)
     open_because: str | None  # why the gap is wider than wanted
     weighted: ObjectiveReport | None
     objective_value: ObjectiveReport | None  # of travel, time or weighted sum

@@ -1,0 +1,49 @@
+"""What joint range sum is hoped for: the proof of the least looks at smaller boxes only.
+
+What a box that holds a posture of every place tells, or a motion; a guess where neither does. When
+it is proven that nothing is as good, a little more is hoped for, soon much more.
+"""
+
+from __future__ import annotations
+
+RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for next
+GUESSED = 1.5  # times what is proven: what is hoped for where no box tells
+FIRST_GUESS = 0.5  # [rad] what is hoped for where nothing is proven either
+
+
+class Hope:
+    """What is hoped for.
+
+    Args:
+        told: Whether a motion tells.
+    """
+
+    def __init__(self, told: bool) -> None:
+        self._told = told
+        self._raised = RAISED  # grows as long as neither a motion nor a new box tells
+        self._least = 0.0  # what is proven not to exist
+
+    def told(self, size: float, hoped: float) -> float:
+        """Return what is hoped for in [rad] where a box of a size tells; so much was before."""
+        self._told = True
+        if max(size, self._least) >= hoped:
+            return hoped
+        self._raised = RAISED
+        return max(size, self._least)
+
+    def guess(self, proven: float, best: float) -> float:
+        """Return what to hope for at first, in [rad]: all images of all walls are many."""
+        return best if self._told else min(max(GUESSED * proven, FIRST_GUESS), best)
+
+    def more(self, hoped: float, best: float, found: bool) -> float:
+        """Return what is hoped for next where what was does not exist, in [rad].
+
+        Args:
+            hoped: What was hoped for.
+            best: The best motion known, or more than any has.
+            found: Whether a motion is known.
+        """
+        raised = self._raised if self._told else GUESSED
+        self._raised = RAISED if found else min(self._raised**2, GUESSED)
+        self._least = min(best, hoped * raised)
+        return self._least

@@ -1,0 +1,36 @@
+"""What is hoped for: never what is proven not to exist, and in the end as much as the best has."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from opl.planning.hope import FIRST_GUESS, Hope
+
+
+def test_nothing_is_guessed_where_a_motion_tells():
+    assert Hope(True).guess(0.2, 3.0) == 3.0
+    assert Hope(False).guess(0.2, 3.0) == FIRST_GUESS
+    assert Hope(False).guess(2.0, 2.5) == 2.5
+
+
+@given(st.lists(st.floats(0.1, 9.0), max_size=12), st.floats(0.1, 1.0), st.booleans())
+def test_hopes_rise_above_all_that_is_proven_not_to_exist(sizes, first, found):
+    hope, best, hoped = Hope(found), 10.0, first
+    for size in sizes:
+        before, proven = hoped, hope.more(hoped, best, found)
+        assert before < proven or proven == best
+        hoped = hope.told(size, proven)
+        assert hoped == proven
+    for _ in range(3000):
+        hoped = hope.more(hoped, best, found)
+    assert hoped == best
+
+
+def test_hopes_rise_faster_as_long_as_nothing_new_tells():
+    def rises(told):
+        hope, hoped = Hope(True), 1.0
+        for _ in range(6):
+            before, hoped = hoped, hope.more(hoped, 99.0, False)
+            hope.told(told, hoped)
+        return hoped / before
+
+    assert rises(told=98.0) > 1.1
