@@ -32,7 +32,6 @@ from opl.search.box import JointBox
 from opl.search.forbidden import Forbidden
 from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
-from opl.search.walls import Chain
 
 PROOF_SHARE = 0.9  # of the widening: how far the bound may stay below the path
 ROOM_SHARE = 0.4  # of the widening: how much larger than its box the path may be
@@ -90,8 +89,7 @@ class OptimalSearch:
         self._work.begin_again(self.proof)
         self._rectangles = Rectangles(self._sampler, points, whole_cells(problem.cell.wheel))
         self._hope(self._families.smallest_grown())
-        guess = self._hoped.guess(self.lower_bound, largest)
-        self.proof.threshold = min(self.proof.threshold, guess)
+        self.proof.threshold = min(self.proof.threshold, self._hoped.guess(0.0, largest))
         first = [0.0, float(len(points) // 2), float(len(points) - 1)]
         self._add(list(dict.fromkeys(first + self._families.unreached())))
 
@@ -137,9 +135,14 @@ class OptimalSearch:
         missed = missed[:MOST_ADDED]
         if not candidate.settled:
             self._go_into(box, placements, missed)
-        elif self._learn(box, placements, missed) or self.proof.outdated:
+            return
+        best, collided = self.plan, self._tracks.collided
+        learnt = self._learn(box, placements, missed)
+        in_vain = self.plan is best and self._tracks.collided > collided
+        in_vain &= not self._sampler.collisions
+        if learnt or (self.proof.outdated and not in_vain):
             self.proof.put_back()
-        elif candidate.bound >= self.proof.closing:
+        elif candidate.bound >= self.proof.closing and not in_vain:
             return
         elif not self._sampler.collisions:
             self._mind_collisions()
@@ -183,7 +186,10 @@ class OptimalSearch:
         if not placements:
             return False
         if passages.walls:
-            self._stand_in_the_way(passages.walls[:MOST_ADDED])
+            chains = passages.walls[:MOST_ADDED]
+            self._rectangles.take_in(chains)
+            for wall in self._walls.walls(chains):
+                self.proof.add(wall)
             return True
         return self._try(columns, passages, inner)
 
@@ -268,12 +274,6 @@ class OptimalSearch:
         for wall in self._walls.columns(places):
             self.proof.add(wall)
             self._places.add(wall.place)
-
-    def _stand_in_the_way(self, chains: list[Chain]) -> None:
-        """Add chains that no motion in a box gets past."""
-        self._rectangles.take_in(chains)
-        for wall in self._walls.walls(chains):
-            self.proof.add(wall)
 
     def _try(self, columns: Columns, passages: Passages, box: JointBox | None) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
