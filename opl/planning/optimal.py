@@ -97,8 +97,8 @@ class OptimalSearch:
     def finished(self) -> bool:
         """Whether there is nothing left to do."""
         done = self.proof.closed and self.proof.threshold >= self._value
-        done |= self._value <= AT_REST
-        return done or self._given_up >= MOST_GIVEN_UP or self.work_share >= 1.0
+        ended = self._given_up >= MOST_GIVEN_UP or self.work_share >= 1.0
+        return done or ended or self._value <= AT_REST
 
     @property
     def work_share(self) -> float:
@@ -177,7 +177,7 @@ class OptimalSearch:
             self._hope(inner)
             allowed = MISSED * self._settings.widen * self.proof.threshold
             known, new = columns.missed(box, self._places, allowed)
-            if not missed and self._sampler.collisions and self.proof.clear(known):
+            if not missed and (self.proof.clear(known) or self.proof.split_keys(known)):
                 return True
             missed = missed or new[:MOST_ADDED]
         if missed:

@@ -112,11 +112,11 @@ class Rectangles:
     def _cut_along(
         self, rectangle: Rectangle, corners: Sequence[Corner], box: JointBox, most: float
     ) -> bool:
-        """Cut rectangles finer where a chain misses a box less than its corners tell."""
-        before = len(self._between)
-        for one, other in rectangle.nearer_between(corners, box, LESS * most):
-            self._cut(one, other)
-        return len(self._between) > before
+        """Halve the stretches where a chain misses a box less than its corners tell."""
+        nearer = rectangle.nearer_between(corners, box, LESS * most)
+        halves = [(one + other) / 2.0 for one, other in nearer if other - one > SHORTEST]
+        self._between = np.union1d(self._between, np.array(halves))
+        return bool(halves)
 
     def held(
         self, box: JointBox, placements: Sequence[Placement], allowed: float, room: float

@@ -155,7 +155,7 @@ def bars(
                     parts = 2 if shut else int(np.clip(np.ceil(least), 2, MOST_PARTS))
                     found.append(Bulge(float(places[k]), float(places[k + 1]), parts, shut))
                 break
-    return found
+    return list(dict.fromkeys(found))  # the same in each image
 
 
 def _turned(ladder: Ladder, k: int, blocked: np.ndarray) -> Array:

@@ -172,12 +172,8 @@ class BoxProof:
         assert node.found is not None
         # against a core turned inside out, so that no face is held by it
         n, low, high = node.n_walls, node.found.high, node.found.low
-        box, place, lost, prices = (
-            np.empty((2, 6)),
-            np.empty((n, 2)),
-            np.empty(n),
-            np.empty((n, 12)),
-        )
+        box, place, lost = np.empty((2, 6)), np.empty((n, 2)), np.empty(n)
+        prices = np.empty((n, 12))
         size = float((low - high).sum())
         least_box(self._cells.table, node.spans, n, low, high, size, box, place, lost, prices)
         return np.asarray(prices[:, :6] - prices[:, 6:])
@@ -196,11 +192,8 @@ class BoxProof:
         Closely where nothing is gained by splitting it; until any is. Return whether any is.
         """
         spans, looks = self._kept.spans, 1 if self._branch is not None else 2
-        of = [np.isin(spans[:, WALL], self._walls_at(place)) for place in places]
-        return any(self._cells.cleared(spans[own], looks) for own in of)
-
-    def _walls_at(self, place: float) -> list[int]:
-        return [number for number, wall in enumerate(self.walls) if wall.place == place]
+        of = [[n for n, wall in enumerate(self.walls) if wall.place == place] for place in places]
+        return any(self._cells.cleared(spans[np.isin(spans[:, WALL], own)], looks) for own in of)
 
     def split(self) -> None:
         """Split the subproblem of the last candidate."""
@@ -208,6 +201,23 @@ class BoxProof:
             node = self._kept
             for spans in parts(node, self._cells, self._branch):
                 self._push(node.bound, spans, node.n_walls, node.low, node.high)
+
+    def split_keys(self, places: Sequence[float]) -> bool:
+        """Split the subproblem of the last candidate between keys at one of some walls, if any can.
+
+        The box meets the walls of its pass, but perhaps not with one key. One part is put back.
+        """
+        node = self._kept
+        for number, wall in enumerate(self.walls):
+            own = node.spans[node.spans[:, WALL] == number, KEY]
+            if wall.place in places and len(own) and (own != own[0]).any():
+                one, other = parts(node, self._cells, number)
+                self._push(node.bound, other, node.n_walls, node.low, node.high)
+                low, high = node.low, node.high
+                self._kept = Subproblem(node.bound, self._count, one, node.n_walls, low, high)
+                self._count += 1
+                return True
+        return False
 
     def put_back(self) -> None:
         """Leave the subproblem of the last candidate open."""

@@ -201,7 +201,7 @@ def test_a_joint_at_its_top_speed_is_blamed_for_it():
 
 
 def test_a_run_tells_the_feed_and_the_cycle_time_and_refuses_too_long_a_dwell(tmp_path):
-    changes = {"process.max_acceleration_deg_s2": [20, 20, 20, 40, 40, 60]}
+    changes = {"process.max_acceleration_deg_s2": [30, 30, 30, 60, 60, 90]}
     told = opl("run", write_job(tmp_path, changes), "--out", tmp_path / "out")
     assert told.status == 0, told.err
     assert "feed: 20 mm/s, less on" in told.out and "acceleration of joint" in told.out

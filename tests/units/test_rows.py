@@ -44,3 +44,12 @@ def test_bars_are_where_the_longest_tracks_end(blocked, free):
     found = bars(np.arange(COLUMNS) / 10.0, [ladder], [np.flatnonzero(shut)])
     expected = [] if longest == COLUMNS else [(longest - 1) / 10.0]
     assert [bar.first for bar in found] == expected
+
+
+def test_a_bar_is_told_once_though_tracks_of_several_images_end_there():
+    free = np.ones((COLUMNS, ROWS), dtype=bool)
+    free[2] = False
+    q, t, on = np.zeros((COLUMNS, ROWS, 6)), np.arange(3.0), np.zeros(COLUMNS - 1, dtype=bool)
+    ladders = [Ladder(q + turn, free, t, on, 1.0, 1.0) for turn in (0.0, 2.0 * np.pi)]
+    found = bars(np.arange(COLUMNS, dtype=float), ladders, [np.empty(0, dtype=int)] * 2)
+    assert [(bar.first, bar.last) for bar in found] == [(1.0, 2.0)]
