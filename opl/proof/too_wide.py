@@ -18,6 +18,10 @@ from opl.motion.motion import Motion
 from opl.proof.corners import contact_errors, looked_at
 from opl.proof.roundings import Rounding, roundings, tool_points_of
 
+# of the error allowed: the proof of the file recognises the places of its moves anew, and finds a
+# little more
+USED = 0.99
+
 
 class TooWide:
     """Tells them of one motion after the other; corners of the last one are not looked at again.
@@ -60,7 +64,7 @@ class TooWide:
             return
         errors = contact_errors(job, self._points, motion, corners)[:, -1]
         for corner, error, deep in zip(corners, errors, self._deep(corners), strict=True):
-            if deep or error > job.search.max_contact_error:
+            if deep or error > USED * job.search.max_contact_error:
                 yield corner.k
 
     def _deep(self, corners: list[Rounding]) -> NDArray[np.bool_]:

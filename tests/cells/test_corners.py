@@ -175,6 +175,21 @@ def test_what_is_known_of_the_last_motion_changes_no_corner(monkeypatch):
     assert len(set(found)) > 1
 
 
+@pytest.mark.parametrize(("share", "wide"), [(0.985, False), (0.995, True)])
+def test_corners_leave_a_little_of_the_error_to_the_proof_of_the_file(monkeypatch, share, wide):
+    job, points, part = small_job(), small_problem().points, small_problem().scene.part
+
+    def errors(_job, _points, _motion, corners):
+        return np.full((len(corners), 1), share * job.search.max_contact_error)
+
+    monkeypatch.setattr(opl.proof.too_wide, "contact_errors", errors)
+    monkeypatch.setattr(
+        opl.proof.too_wide.TooWide, "_deep", lambda _self, corners: np.zeros(len(corners), bool)
+    )
+    found = list(opl.proof.too_wide.TooWide(job, points, part, np.inf)(few_positions()))
+    assert bool(found) == wide
+
+
 def straight_moves(radius, count):
     """Return straight moves, each with an arc at its end."""
     corner = Corner(1e3 * radius, f"CR={1e3 * radius:.1f}", radius, arc=True)
