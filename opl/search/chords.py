@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from opl.files.kernels import kernel
+from opl.search.outside import nearest_on_chord
 
 APART = 1e-9  # belt units between two bands of contact positions
 JUMP = 0.5  # [rad] between neighbouring contact positions; more is no motion
 BEND = 2.0  # times the sagitta that second differences tell: how far postures stand off a chord
 STILL = 1e-12  # [rad] that a joint turns along a chord, no less
+TOUCHED = 1e-9  # [rad] that a box misses a chord that it holds a point of, no more
 
 
 @kernel("float64(float64[:,::1],int64,int64)")
@@ -47,6 +49,32 @@ def clipped_chord(q, row, low, high):  # type: ignore[no-untyped-def]
             enter, leave = min(one, other), max(one, other)
         first, last = max(first, enter), min(last, leave)
     return first, last
+
+
+@kernel("int64(float64[:,::1],boolean[::1],float64[::1],float64[::1])")
+def nearest_chord(q, free, low, high):  # type: ignore[no-untyped-def]
+    """Return at which row the chord begins that a box misses least, -1 where it holds one or none.
+
+    Args:
+        q: A column of postures in [rad], NaN for none, shape (m, 6).
+        free: Which may be used: both ends of the chord must be, shape (m,).
+        low: Lower faces of the box in [rad], shape (6,).
+        high: Upper faces in [rad], shape (6,).
+    """
+    nearest, best = -1, np.inf
+    for row in range(len(q) - 1):
+        if not (free[row] and free[row + 1]):
+            continue
+        jump = False
+        for joint in range(q.shape[1]):
+            jump = jump or not abs(q[row + 1, joint] - q[row, joint]) <= JUMP
+        if not jump:
+            best, place = nearest_on_chord(q[row], q[row + 1], low, high, best)
+            if best <= TOUCHED:
+                return -1
+            if place >= 0.0:
+                nearest = row
+    return nearest
 
 
 @kernel("void(float64[:,:,::1],float64[::1],float64[::1],float64[:,::1],float64[:,::1])")
@@ -94,6 +122,10 @@ def sample(t, q, free, low, high, share, whole, found, spacing):  # type: ignore
             ends = clipped_chord(q[column], row, low, high)
             start[row], end[row] = ends
             met[row] = (free[column, row] or free[column, row + 1]) and ends[1] >= ends[0]
+        # others may be met for the bend allowed alone: the nearest is nearest whatever the bend
+        nearest = nearest_chord(q[column], free[column], low, high) if met.any() else -1
+        if nearest >= 0 and not met[nearest]:
+            met[nearest], start[nearest], end[nearest] = True, 0.0, 1.0
         count = 0
         for row in range(n_rows - 1):
             beside = (row > 0 and met[row - 1]) or (row < n_rows - 2 and met[row + 1])

@@ -53,3 +53,14 @@ def test_a_narrow_band_beside_a_wide_one_has_a_sample():
     bands = np.split(t[0], np.flatnonzero(np.diff(t[0]) > 0.5) + 1)
     assert [len(band) for band in bands] == [7, 2]
     assert bands[1][0] == np.mean([0.5, 0.75])
+
+
+def test_the_nearest_chord_is_sampled_where_another_is_met_for_its_bend_alone():
+    q = np.zeros((1, len(ROWS), 6))
+    # straight and nearest to the box, then a jump, then farther but bent
+    q[0, :, 0] = [0.126, 0.126, 0.126, 0.126, 0.9, 0.2, 0.139, 0.139, 0.2]
+    free = np.ones((1, len(ROWS)), dtype=bool)
+    box = JointBox(np.full(6, -0.125), np.full(6, 0.125))
+    t, _ = sampled(ROWS[None], q, free, box, 9)
+    assert (t[0] <= ROWS[3]).any()
+    assert ((t[0] >= ROWS[5]) & (t[0] <= ROWS[8])).any()
