@@ -82,12 +82,15 @@ def levels(places: Array, rows: Sequence[Row], box: JointBox, otherwise: Array) 
 def crossed(places: Array, crossings: Array, otherwise: Array) -> Array:
     """Return at which contact position a way crosses each place, shape (n, 1).
 
-    ``otherwise``, shape (n, 1), where it does not; crossings of shape (k, 2) as of `Passages`.
+    Straight on from crossing to crossing, which is a guess where nothing is cut finer between them;
+    ``otherwise``, shape (n, 1), before the first and past the last. Crossings of shape (k, 2) as of
+    `Passages`.
     """
     t: Array = otherwise.copy()
-    at = np.minimum(np.searchsorted(places, crossings[:, 0] - SAME), len(places) - 1)
-    there = np.abs(places[at] - crossings[:, 0]) < SAME
-    t[at[there], 0] = crossings[there, 1]
+    if len(crossings):
+        known, first = np.unique(crossings[:, 0], return_index=True)
+        inside = (places > known[0] - SAME) & (places < known[-1] + SAME)
+        t[inside, 0] = np.interp(places[inside], known, crossings[first, 1])
     return t
 
 
@@ -134,28 +137,39 @@ def bulging(places: Array, t: Array, edge: np.ndarray, excess: Array) -> list[Bu
 def bars(
     places: Array, ladders: Sequence[Ladder], blocked_edges: Sequence[np.ndarray]
 ) -> list[Bulge]:
-    """Return after which places no track gets further, the first in each ladder.
+    """Return between which places no track of a ladder gets further, from its start or its end.
 
     It would get past what is shut, or joints would turn further than an edge may. The edges that
     are blocked in each ladder are sorted keys, as of `shut_edges`.
     """
     found: list[Bulge] = []
     for ladder, blocked in zip(ladders, blocked_edges, strict=True):
-        reached = ladder.free[0]
-        for k, there in enumerate(ladder.free[1:]):
-            if ladder.off_wheel[k]:
-                reached = there
-                continue
-            turned = _turned(ladder, k, blocked)[reached][:, there]
-            reached = there.copy()
-            reached[there] = (turned <= 1.0).any(axis=0)
-            if not reached.any():
-                if places[k + 1] - places[k] > SMALLEST_EDGE:
-                    shut, least = not np.isfinite(turned).any(), turned.min(initial=np.inf)
-                    parts = 2 if shut else int(np.clip(np.ceil(least), 2, MOST_PARTS))
-                    found.append(Bulge(float(places[k]), float(places[k + 1]), parts, shut))
-                break
+        for k, turned in (_ends(ladder, blocked, way) for way in (1, -1)):
+            if k >= 0 and places[k + 1] - places[k] > SMALLEST_EDGE:
+                shut, least = not np.isfinite(turned).any(), turned.min(initial=np.inf)
+                parts = 2 if shut else int(np.clip(np.ceil(least), 2, MOST_PARTS))
+                found.append(Bulge(float(places[k]), float(places[k + 1]), parts, shut))
     return list(dict.fromkeys(found))  # the same in each image
+
+
+def _ends(ladder: Ladder, blocked: np.ndarray, way: int) -> tuple[int, Array]:
+    """Return over which edge tracks get no further, and how far joints would turn over it.
+
+    From the start onwards with a way of 1, from the end back with -1; -1 where they get through.
+    """
+    reached = ladder.free[0 if way > 0 else -1]
+    for k in range(len(ladder.free) - 1)[::way]:
+        there = ladder.free[k + 1 if way > 0 else k]
+        if ladder.off_wheel[k]:
+            reached = there
+            continue
+        turned = _turned(ladder, k, blocked)
+        turned = (turned if way > 0 else turned.T)[reached][:, there]
+        reached = there.copy()
+        reached[there] = (turned <= 1.0).any(axis=0)
+        if not reached.any():
+            return k, turned
+    return -1, np.empty(0)
 
 
 def _turned(ladder: Ladder, k: int, blocked: np.ndarray) -> Array:

@@ -3,10 +3,11 @@
 import itertools
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opl.planning.rows import bars
+from opl.planning.rows import bars, crossed
 from opl.search.ladder import Ladder
 
 COLUMNS, ROWS = 4, 3
@@ -18,9 +19,9 @@ EDGES = (COLUMNS - 1) * ROWS * ROWS
     st.sets(st.integers(0, EDGES - 1)),
     st.lists(st.booleans(), min_size=COLUMNS * ROWS, max_size=COLUMNS * ROWS),
 )
-def test_bars_are_where_the_longest_tracks_end(blocked, free):
+def test_bars_are_where_the_longest_tracks_from_either_end_stop(blocked, free):
     free = np.array(free).reshape(COLUMNS, ROWS)
-    free[0, 0] = True
+    free[0, 0] = free[-1, 0] = True
     ladder = Ladder(
         np.zeros((COLUMNS, ROWS, 6)),
         free,
@@ -31,19 +32,22 @@ def test_bars_are_where_the_longest_tracks_end(blocked, free):
     )
     shut = np.isin(np.arange(EDGES), sorted(blocked)).reshape(COLUMNS - 1, ROWS, ROWS)
 
-    def goes(track):
-        return all(free[k, row] for k, row in enumerate(track)) and not any(
-            shut[k, row, after] for k, (row, after) in enumerate(itertools.pairwise(track))
+    def goes(track, first=0):
+        return all(free[k, row] for k, row in enumerate(track, first)) and not any(
+            shut[k, row, after] for k, (row, after) in enumerate(itertools.pairwise(track), first)
         )
 
-    longest = max(
-        length
-        for length in range(1, COLUMNS + 1)
-        if any(goes(track) for track in itertools.product(range(ROWS), repeat=length))
-    )
+    def longest(most):
+        return max(
+            length
+            for length in range(1, COLUMNS + 1)
+            if any(most(track) for track in itertools.product(range(ROWS), repeat=length))
+        )
+
+    on, back = longest(goes), longest(lambda track: goes(track, COLUMNS - len(track)))
     found = bars(np.arange(COLUMNS) / 10.0, [ladder], [np.flatnonzero(shut)])
-    expected = [] if longest == COLUMNS else [(longest - 1) / 10.0]
-    assert [bar.first for bar in found] == expected
+    expected = [] if on == COLUMNS else sorted({(on - 1) / 10.0, (COLUMNS - 1 - back) / 10.0})
+    assert sorted(bar.first for bar in found) == pytest.approx(expected)
 
 
 def test_a_bar_is_told_once_though_tracks_of_several_images_end_there():
@@ -52,4 +56,14 @@ def test_a_bar_is_told_once_though_tracks_of_several_images_end_there():
     q, t, on = np.zeros((COLUMNS, ROWS, 6)), np.arange(3.0), np.zeros(COLUMNS - 1, dtype=bool)
     ladders = [Ladder(q + turn, free, t, on, 1.0, 1.0) for turn in (0.0, 2.0 * np.pi)]
     found = bars(np.arange(COLUMNS, dtype=float), ladders, [np.empty(0, dtype=int)] * 2)
-    assert [(bar.first, bar.last) for bar in found] == [(1.0, 2.0)]
+    assert {(bar.first, bar.last) for bar in found} == {(1.0, 2.0), (2.0, 3.0)}
+    assert len(found) == 2
+
+
+def test_a_way_is_crossed_straight_on_from_crossing_to_crossing():
+    crossings = np.array([[2.0, 4.0], [2.5, 6.0], [3.0, 6.0], [7.0, -2.0]])
+    places = np.array([1.0, 2.0, 2.25, 2.75, 3.0, 5.0, 7.0, 7.5])
+    otherwise = np.full((len(places), 1), 9.0)
+    t = crossed(places, crossings, otherwise)
+    assert t[:, 0] == pytest.approx([9.0, 4.0, 5.0, 6.0, 6.0, 2.0, -2.0, 9.0])
+    assert (crossed(places, np.empty((0, 2)), otherwise) == otherwise).all()
