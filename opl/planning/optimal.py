@@ -37,9 +37,7 @@ PROOF_SHARE = 0.9  # of the widening: how far the bound may stay below the path
 ROOM_SHARE = 0.4  # of the widening: how much larger than its box the path may be
 MISSED = 0.05  # of the widening: what a box may miss a cutter point by and still hold it
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
-EARLY_SHARE = 0.3  # of the work: motions in boxes that are not proven to be the least
-FIRST_WORK = 300  # units that may be spent on those at once
-CLEARLY_LESS = 0.005  # of the best: what a motion in such a box should be better by
+CLEARLY_LESS = 0.005  # of the best: what a motion in a box not settled should be better by
 MOST_IN_VAIN = 2  # such boxes in which no motion is free: what collides is left out from then on
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
@@ -81,7 +79,6 @@ class OptimalSearch:
         self._hoped = Hope(fallback is not None)
         self._given_up = 0
         self.forbidden: Forbidden | None = None  # of collisions, once they are known to matter
-        self._early = 0.0  # work on early motions
         self._in_vain = 0  # boxes in which none of these was free
         self.proof = self._new_proof(largest)
         self._places: set[float] = set()
@@ -186,6 +183,11 @@ class OptimalSearch:
         if not placements:
             return False
         if passages.walls:
+            if passages.open and self._work.left_for_early:
+                best = self.plan
+                with self._work.early():
+                    if self._try(columns, passages, inner) or self.plan is not best:
+                        return True
             chains = passages.walls[:MOST_ADDED]
             self._rectangles.take_in(chains)
             for wall in self._walls.walls(chains):
@@ -218,19 +220,18 @@ class OptimalSearch:
         larger, threshold = self._families.grown(box, placements), self.proof.threshold
         if not self._sampler.collisions:
             self._hope(larger)
-        before = self._work.done
         least = self._value * (1.0 - CLEARLY_LESS)
         if larger is None or larger.size > least:
             return
-        if self._early < FIRST_WORK + EARLY_SHARE * before:
-            columns, _, inner = self._look(larger, placements)
-            if inner is not None:
-                self._hope(inner)
-                room, collided = self._room(inner), self._tracks.collided
-                found = self._tracks.plan(columns, NO_PASSAGES, inner, room, lambda _: False)
-                self.keep(found)
-                self._in_vain += int(found is None and self._tracks.collided > collided)
-            self._early += self._work.done - before
+        if self._work.left_for_early:
+            with self._work.early():
+                columns, _, inner = self._look(larger, placements)
+                if inner is not None:
+                    self._hope(inner)
+                    room, collided = self._room(inner), self._tracks.collided
+                    found = self._tracks.plan(columns, NO_PASSAGES, inner, room, lambda _: False)
+                    self.keep(found)
+                    self._in_vain += int(found is None and self._tracks.collided > collided)
         if self.proof.threshold < threshold:
             self.proof.show_soon()
 

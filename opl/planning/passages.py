@@ -39,12 +39,14 @@ class Passages:
         rows: Contact positions that it passes only where they lie in the box.
         edges: Ends of the edges that its way crosses in [rad], both free, shape (n, 2, 6).
         crossings: Places, and the contact positions at which its way crosses them, shape (k, 2).
+        open: Whether it may be passed by what leaves the box by the room of a motion.
     """
 
     walls: list[Chain]
     rows: list[Row]
     edges: Array
     crossings: Array
+    open: bool
 
     def grown(self, box: JointBox) -> JointBox:
         """Return a box grown until it holds a posture of each edge crossed."""
@@ -53,7 +55,7 @@ class Passages:
         return grown(self.edges, np.ones(self.edges.shape[:2], dtype=bool), box) or box
 
 
-NO_PASSAGES = Passages([], [], np.empty((0, 2, 6)), np.empty((0, 2)))
+NO_PASSAGES = Passages([], [], np.empty((0, 2, 6)), np.empty((0, 2)), True)
 
 
 class Rectangles:
@@ -132,6 +134,7 @@ class Rectangles:
         walls: list[tuple[float, Chain]] = []
         rows: list[Row] = []
         edges, crossings = [np.empty((0, 2, 6))], [np.empty((0, 2))]
+        passed = True
         for places in self._windows():
             rectangle = self._rectangle(places, placements)
             rectangle.leave_out_collisions(box)
@@ -153,7 +156,8 @@ class Rectangles:
                 # is by a hair
                 elif most > room and corners and self._cut_along(rectangle, corners, box, most):
                     return self.held(box, placements, allowed, room)
-                if walls or most > room:
+                if most > room:
+                    passed = False
                     continue
             ends = np.array(passage(up, along, max(most, allowed)))
             edges.append(rectangle.ends_of(ends))
@@ -161,7 +165,7 @@ class Rectangles:
             rows += rectangle.rows(box, room)
         walls.sort(key=lambda one: -one[0])
         hardest = [wall for _, wall in walls]
-        return Passages(hardest, rows, np.concatenate(edges), np.concatenate(crossings))
+        return Passages(hardest, rows, np.concatenate(edges), np.concatenate(crossings), passed)
 
     def take_in(self, walls: Sequence[Chain]) -> None:
         """Note chains that are walls of the proof now."""

@@ -5,6 +5,9 @@ A unit is what takes about a millisecond.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from opl.planning.box_track import BoxTracks
 from opl.planning.columns import ColumnWalls
 from opl.planning.families import Families
@@ -16,6 +19,8 @@ from opl.search.least_box import BoxProof
 NUMBERS = 2.5e6  # worked on in linear programs
 SUBPROBLEMS = 8
 WORK_OF_A_WALL = 25.0
+EARLY_SHARE = 0.3  # of the work: motions in boxes that are not proven to be the least
+FIRST_WORK = 300  # units that may be spent on those at once
 
 
 def work_of_proof(proof: BoxProof) -> float:
@@ -42,6 +47,7 @@ class Work:
         self._scene, self._walls = scene, walls
         self._families, self._tracks = families, tracks
         self._before = -self._counted()
+        self._early = 0.0  # work on early motions
         self.proof: BoxProof | None = None
 
     @property
@@ -49,6 +55,18 @@ class Work:
         """All of it, in units."""
         proof = 0.0 if self.proof is None else work_of_proof(self.proof)
         return self._before + self._counted() + proof
+
+    @property
+    def left_for_early(self) -> bool:
+        """Whether motions may be sought in boxes that are not proven to be the least."""
+        return self._early < FIRST_WORK + EARLY_SHARE * self.done
+
+    @contextmanager
+    def early(self) -> Iterator[None]:
+        """Count what is done meanwhile as work on such motions."""
+        before = self.done
+        yield
+        self._early += self.done - before
 
     def begin_again(self, proof: BoxProof) -> None:
         """Go on with another proof."""
