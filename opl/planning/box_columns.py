@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.planning.cut_cells import shut_along
-from opl.planning.families import GROWN
+from opl.planning.families import GROWN, grown
 from opl.planning.field_at_places import FieldAtPlaces
 from opl.planning.images import Seams, image_within_limits, wrist_flips
 from opl.planning.nodes import inverse_solutions
 from opl.planning.placement import Placement
+from opl.planning.postures import Columns
 from opl.planning.problem import GrindingProblem, nearer_nodes
 from opl.planning.shut_leads import RESERVE, ShutLeads
 from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
-from opl.search.in_box import hidden, missing, missing_chords, nearest_points, sampled
+from opl.search.in_box import hidden, missing, nearest_points, sampled
 from opl.search.joint_limits import about
 
 FINE = 33  # contact positions of a place at which a box is held against it
@@ -27,45 +28,9 @@ POSTURES_OF_WORK = 400  # that cost a unit of work
 WITHIN = 6  # halvings of the way between places that is too deep in the wheel, but hardly
 CLOSER = 2  # times that places are sampled closer where collisions begin
 HIDDEN = 5e-5  # of the box: what a chord that meets it may stand off the postures
+LESS = 1e-4, 3e-5  # [m] beyond the clearance needed, where all of the reserve costs too much
+SPENT = 3e-4  # of the box: what a reserve may cost
 BORDER = 1e-2  # belt units to look beyond what lies in the box
-BESIDE = 0.02  # cutter points: what is so near to a place that is missed as well is beside it
-
-
-@dataclass(frozen=True)
-class Columns:
-    """The postures of places near to a box.
-
-    Attributes:
-        places: Fractional cutter points, shape (n,).
-        points: The places as points of their own.
-        placements: The image that each pass uses.
-        t: Contact positions, shape (n, m).
-        q: Placed postures in [rad], NaN where there are none, shape (n, m, 6).
-        free: Which are within reach and limits and do not cut into the wheel, as far as the field
-            tells, shape (n, m).
-    """
-
-    places: Array
-    points: CutterPoints
-    placements: tuple[Placement, ...]
-    t: Array
-    q: Array
-    free: np.ndarray
-
-    def missed(
-        self, box: JointBox, known: Collection[float], allowed: float
-    ) -> tuple[list[float], list[float]]:
-        """Return the places that a box misses by more than allowed in [rad], the worst first.
-
-        Those in ``known``, which may be shut all over the box; and others, but for those beside
-        them, which tell no more.
-        """
-        missing = missing_chords(self.q, self.free, box)
-        worst = np.argsort(-missing, kind="stable")
-        places = [float(self.places[k]) for k in worst if missing[k] > allowed]
-        shut = [place for place in places if place in known]
-        new = [place for place in places if all(abs(place - wall) > BESIDE for wall in shut)]
-        return shut, new
 
 
 class ColumnSampler:
@@ -126,20 +91,42 @@ class ColumnSampler:
         # where the part begins to cut is known to a hair only
         last = problem.cell.wheel.last_position
         t = np.clip(np.concatenate([t[:, :1] - BORDER, t, t[:, -1:] + BORDER], axis=1), -last, last)
-        # what is left of a place may leave the clearance needed, and hardly more
-        for reserve in (RESERVE, 0.0):
-            self.reserve = reserve
-            columns = self._within(box, self.spared(self.at(places, there, placements, t), spare))
-            columns = self._closer(columns, box, spare)
-            if not self.collisions:
-                break
+        self.reserve = RESERVE
+        return self._as_far_as_needed(box, self.at(places, there, placements, t), spare)
+
+    def _as_far_as_needed(self, box: JointBox, columns: Columns, spare: Array) -> Columns:
+        """Leave out what collides, with as large a reserve as costs hardly more than none.
+
+        What is left of a place may leave the clearance needed, and hardly more.
+        """
+        found = self._left(box, columns, spare)
+        if not self.collisions or (most := _size(found, box)) <= (1.0 + SPENT) * box.size:
+            return found
+        self.reserve = 0.0
+        without = self._left(box, columns, spare)
+        least = _size(without, box)
+        if most - least <= SPENT * box.size:
+            self.reserve = RESERVE
+            return found
+        for self.reserve in LESS:
+            found = self._left(box, columns, spare)
+            if _size(found, box) - least <= SPENT * box.size:
+                return found
+        self.reserve = 0.0
+        return without
+
+    def _left(self, box: JointBox, columns: Columns, spare: Array) -> Columns:
+        """Return what is left of columns with the reserve, sampled closer where a box needs it."""
+        if self.reserve != RESERVE:  # with which they were sampled
+            columns = self.at(columns.places, columns.points, columns.placements, columns.t)
+        columns = self._within(box, self.spared(columns, spare))
+        columns = self._closer(columns, box, spare)
+        if self.collisions:
             self._leave_out_collisions(columns, box)
             # where collisions begin is seen at the samples only
             for _ in range(CLOSER):
                 columns = self._closer(columns, box, spare)
                 self._leave_out_collisions(columns, box)
-            if columns.free.any(axis=1).all():
-                break
         return columns
 
     def _closer(self, columns: Columns, box: JointBox, spare: Array) -> Columns:
@@ -149,7 +136,8 @@ class ColumnSampler:
         held = np.where(columns.free, missing(columns.q, box), np.inf).min(axis=1) <= GROWN
         met = np.flatnonzero(~held & (missed <= GROWN))  # by a chord alone
         poor[met] = hidden(columns.q[met], row[met]) > HIDDEN * box.size
-        t, last = columns.t, columns.t.shape[1] - 1
+        t, q, free = columns.t.copy(), columns.q.copy(), columns.free.copy()
+        last = t.shape[1] - 1
         for index, placement in enumerate(columns.placements):
             own = np.flatnonzero((columns.points.pass_index == index) & poor)
             if not len(own):
@@ -160,8 +148,8 @@ class ColumnSampler:
             places = columns.places[own]
             found = self.at(places, self.there(places), [placement], finer)
             found = self._within(box, self.spared(found, spare[own]))
-            t[own], columns.q[own], columns.free[own] = finer, found.q, found.free
-        return columns
+            t[own], q[own], free[own] = finer, found.q, found.free
+        return replace(columns, t=t, q=q, free=free)
 
     def _within(self, box: JointBox, columns: Columns) -> Columns:
         """Return columns without the postures beyond the limits where a box is within them."""
@@ -283,6 +271,12 @@ class ColumnSampler:
         """Return postures as placed, of principal angles of their family, shape (n, m, 6)."""
         start = self._seams.start[placement.family]
         return placement.of(start + np.remainder(angles - start, 2.0 * np.pi))
+
+
+def _size(columns: Columns, box: JointBox) -> float:
+    """Return the size of a box grown until it holds a posture of each column, in [rad]."""
+    larger = grown(columns.q, columns.free, box)
+    return np.inf if larger is None else larger.size
 
 
 def _allowed(

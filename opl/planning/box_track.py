@@ -12,20 +12,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from opl.cell.collision import CollisionScene
 from opl.geometry.frames import Array
-from opl.planning.box_columns import Columns, ColumnSampler
-from opl.planning.costs import track_cost
+from opl.planning.box_columns import ColumnSampler
+from opl.planning.costs import PushAway, track_cost
 from opl.planning.families import grown
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.nodes import NodeField
 from opl.planning.open_matrix import Track, close_collisions, open_matrices
 from opl.planning.passages import NO_PASSAGES, Passages
 from opl.planning.plan import Found, Plan, Same, propose_and_check
+from opl.planning.postures import Columns
 from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulge, Row, bars, bulging, crossed, levels, shut_edges
 from opl.planning.settings import CostWeights
-from opl.planning.sinking import first_sunk, places_for, shallower, spare_for, until_sunk
+from opl.planning.sinking import (
+    first_sunk,
+    places_for,
+    shallower,
+    spare_for,
+    struck_between,
+    until_sunk,
+)
 from opl.planning.symmetry import everywhere, twins
 from opl.planning.track_check import Collides
 from opl.search.box import JointBox
@@ -43,6 +50,8 @@ MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
 MOST_WORK = 5000.0  # units on them, most of them spent on free moves that are not there
 MOST_SPARED = 4  # times that depth is spared in one box for what sinks between places
 MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
+
+Learn = Callable[[Sequence[Bulge]], bool]  # told where places are wanted; whether that is new
 
 
 class BoxTracks:
@@ -69,19 +78,8 @@ class BoxTracks:
         self._costs = costs
         self._max_contact_change = max_contact_change
         self._most = most
-        self._wider = CollisionScene(problem.cell.widened(costs.push_away))
+        self.push_away = PushAway(problem.cell, costs)
         self.checks = self.places_checked = self.collided = 0  # those that sink aside
-
-    @property
-    def queries(self) -> int:
-        """How many configurations were asked about for more than the clearance needed."""
-        return self._wider.queries
-
-    def push_charge(self, q: Array) -> Array:
-        """Return what nodes are charged for little clearance, q in [rad], shape (n, 6)."""
-        if self._costs.push_away == 0.0 or self._costs.push_weight == 0.0:
-            return np.zeros(len(q))
-        return self._costs.push_weight * self._wider.collides(q)
 
     def plan(
         self,
@@ -89,7 +87,7 @@ class BoxTracks:
         passages: Passages,
         box: JointBox,
         room: float,
-        learn: Callable[[Sequence[Bulge]], bool],
+        learn: Learn,
     ) -> Plan | None:
         """Return the motion of the smoothest free track in a box.
 
@@ -98,7 +96,7 @@ class BoxTracks:
             passages: Contact positions that are passed only where they lie in the box, and ways.
             box: The box.
             room: By how much the motion may leave it, in [rad] of its size.
-            learn: Given where tracks leave the box, or end; whether that is new.
+            learn: Told where tracks leave the box, end or collide.
 
         Returns:
             The motion; None if nothing is free, or if something was learnt instead.
@@ -122,8 +120,8 @@ class BoxTracks:
             closest, track = sampled.closest(track)
             if (bulges := closest.bulges(track, box.widened(BULGE * room))) and learn(bulges):
                 return None
-            plan, sunk = closest.check(track)
-            if plan is not None:
+            plan, sunk, learnt = closest.check(track, learn)
+            if plan is not None or learnt:
                 return plan
             if sunk is None or not shallower(sunk, before):
                 break
@@ -137,7 +135,7 @@ class BoxTracks:
             return None
         coarse.sweep()
         around = coarse.smoothest()
-        return None if around is None else coarse.check(around)[0]
+        return None if around is None else coarse.check(around, learn)[0]
 
     def _sampled(
         self, columns: Columns, passages: Passages, box: JointBox, room: float, spare: Array
@@ -222,13 +220,13 @@ class _Sampled:
                     break
                 # only along the track, and all over columns where something is nearer than wanted
                 new = ~asked[columns, found.rows]
-                charge = search.push_charge(matrix.nodes.q[columns[new], found.rows[new]])
+                charge = search.push_away.charge(matrix.nodes.q[columns[new], found.rows[new]])
                 now = np.zeros_like(asked)
                 now[columns[new][charge > 0.0]] = True
                 now &= matrix.free & ~asked
                 if asking == MOST_ROUNDS or not now.any():
                     return Track(index, found.rows)
-                cost.node_cost[now] += search.push_charge(matrix.nodes.q[now])
+                cost.node_cost[now] += search.push_away.charge(matrix.nodes.q[now])
                 asked |= now
         return None
 
@@ -268,33 +266,34 @@ class _Sampled:
         where = path.cutter_point.astype(int), excess / box.size
         return bulging(self._columns.places, nodes.t_along(track.rows), *where)
 
-    def check(self, track: Track) -> tuple[Plan | None, Array | None]:
+    def check(self, track: Track, learn: Learn) -> tuple[Plan | None, Array | None, bool]:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free.
 
-        One that sinks is the last: others do so as well. `sunk_between` of it, if it does.
+        One that sinks is the last: others do so as well. `sunk_between` of it, if it does; and
+        whether something was learnt of where motions collide instead.
         """
-        search, places = self._search, self._columns.places
-        scene = self.problem.scene
+        search, places, problem = self._search, self._columns.places, self.problem
+        scene, robot = problem.scene, problem.cell.robot
         most, end = search.checks + MOST_CHECKS, scene.work + MOST_WORK
         while search.checks < most and scene.work < end:
-            tracks = twins(self.matrices, track, self.problem.cell.robot)
             before, hits = search.checks, dict[Same, Collides]()
-            tries = until_sunk(self.problem, tracks, hits)
-            outcome = propose_and_check(
-                self.problem, self.matrices, tries, before, None, end - scene.work, hits
-            )
+            tries = until_sunk(problem, twins(self.matrices, track, robot), hits)
+            left = end - scene.work
+            outcome = propose_and_check(problem, self.matrices, tries, before, None, left, hits)
             now = outcome.plan if isinstance(outcome, Found) else outcome
             search.checks = now.checks
             search.places_checked += (search.checks - before) * len(places)
             if isinstance(outcome, Found):
-                return outcome.plan.at_places(places), None
-            if (sunk := first_sunk(self.problem, hits)) is not None:
-                return None, sunk
+                return outcome.plan.at_places(places), None, False
+            if (sunk := first_sunk(problem, hits)) is not None:
+                return None, sunk, False
             search.collided += 1
+            struck = places_for(places, struck_between(problem, hits))
+            if struck and learn(struck):
+                return None, None, True
             if not self._swept:
                 self.sweep()
-            following = self.smoothest()
-            if following is None:
+            if (following := self.smoothest()) is None:
                 break
             track = following
-        return None, None
+        return None, None, False

@@ -17,8 +17,8 @@ from opl.planning.cut_cells import halved
 from opl.planning.shut_leads import ShutLeads
 from opl.search.walls import Piece
 
-# halvings of a cell all in collision, but not deep enough to be sure, at the first look and second
-WITHIN = (2, 6)
+# halvings of a cell all in collision, but not deep enough to be sure, at each look
+WITHIN = (2, 6, 10)
 AROUND = 16  # cells on either side of those asked about that are looked at as well, at first
 
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from opl.planning.barriers import all_sides
-from opl.planning.box_columns import Columns, ColumnSampler
+from opl.planning.box_columns import ColumnSampler
 from opl.planning.box_track import BoxTracks
 from opl.planning.columns import ColumnWalls
 from opl.planning.cut_cells import whole_cells
@@ -24,6 +24,7 @@ from opl.planning.obstructed import Obstructions
 from opl.planning.passages import NO_PASSAGES, Passages, Rectangles
 from opl.planning.placement import Placement
 from opl.planning.plan import AT_REST, Plan
+from opl.planning.postures import Columns
 from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulge
 from opl.planning.settings import OptimalSettings

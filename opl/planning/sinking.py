@@ -3,7 +3,8 @@
 Flat triangles stand in for a curved part, and a joint line leads past its contact: on the way from
 place to place the part is a few micrometres deeper than at the places themselves. Tracks that run
 where the part is as deep as allowed are shut by that, one after the other; so places are left a
-spare depth, as much as was seen to be too little.
+spare depth, as much as was seen to be too little. Where other bodies collide between two places,
+more places are taken in.
 """
 
 from __future__ import annotations
@@ -57,6 +58,25 @@ def sunk_between(problem: GrindingProblem, blocked: Collides) -> Array:
     return sunk
 
 
+def struck_between(problem: GrindingProblem, collided: Mapping[Same, Collides]) -> np.ndarray:
+    """Return between which columns bodies collide, part and wheel aside, shape (n - 1,).
+
+    Args:
+        problem: What is to be planned, of n columns.
+        collided: Motions that collide; where they do so at a column, it is not between two.
+    """
+    struck = np.zeros(len(problem.points) - 1, dtype=bool)
+    for blocked in collided.values():
+        motion = blocked.motion
+        for fault in blocked.faults:
+            place = motion.cutter_point[fault.move]
+            at_column = fault.at_end and place == np.rint(place)
+            grinding = motion.phase[fault.move] is Phase.GRINDING
+            if grinding and not at_column and fault.pair != (PART, WHEEL):
+                struck[int(np.ceil(place)) - 1] = True
+    return struck
+
+
 def first_sunk(problem: GrindingProblem, collided: Mapping[Same, Collides]) -> Array | None:
     """Return `sunk_between` of the first motion that sinks, None if none does."""
     for blocked in collided.values():
@@ -95,7 +115,7 @@ def spare_for(spare: Array, sunk: Array) -> Array:
     return np.asarray(spare + MORE * here)
 
 
-def places_for(places: Array, sunk: Array) -> Sequence[Bulge]:
-    """Return where places are wanted between those that a motion sinks too deep between."""
-    edges = np.flatnonzero((sunk > 0.0) & (np.diff(places) > SMALLEST_EDGE)).tolist()
+def places_for(places: Array, wanted: np.ndarray) -> Sequence[Bulge]:
+    """Return where places are wanted: between which a motion sinks too deep, or bodies collide."""
+    edges = np.flatnonzero((wanted > 0.0) & (np.diff(places) > SMALLEST_EDGE)).tolist()
     return [Bulge(float(places[k]), float(places[k + 1]), 2, False) for k in edges]

@@ -74,7 +74,7 @@ class Work:
         self.proof = proof
 
     def _counted(self) -> float:
-        asked = self._scene.work + self._tracks.queries / QUERIES
+        asked = self._scene.work + self._tracks.push_away.queries / QUERIES
         made = self._walls.made * WORK_OF_A_WALL
         checked = self._tracks.places_checked * WORK_OF_A_CHECK
         sampler = self._tracks.sampler

@@ -158,7 +158,7 @@ class Cells:
 
         Args:
             spans: The spans.
-            looks: 1 to look at what was not looked at, 2 to look closer.
+            looks: 1 to look at what was not looked at, 2 and 3 to look closer.
         """
         if self._forbidden is None:
             return False

@@ -25,7 +25,7 @@ class Forbidden(Protocol):
             flip: Which flip of its postures.
             first: Cells from this one on are looked at,
             end: to before this one.
-            looks: 1 to look at them, 2 to look closer.
+            looks: 1 to look at them, 2 and 3 to look closer.
 
         Returns:
             Where it begins and ends in fractions of the cell, each of shape (n,); it ends before it

@@ -36,6 +36,7 @@ SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded ag
 TRIMMED = 0.9  # of the cells: more left, and trimming goes on no longer
 FEWEST_UNSEEN = 8  # subproblems split before a box is shown that is not settled
 FEWEST_BEFORE_ANEW = 256  # subproblems of a tree that is begun anew for walls added since
+CLOSER = 2, 3  # looks at what is forbidden, each closer than the one before
 MOST_UNSEEN = 256  # that many where those shown before told nothing new
 
 
@@ -184,7 +185,7 @@ class BoxProof:
 
     def look_closer(self) -> bool:
         """Look closer at what is forbidden of the last candidate's spans; return whether any is."""
-        return self._cells.cleared(self._kept.spans, 2)
+        return any(self._cells.cleared(self._kept.spans, looks) for looks in CLOSER)
 
     def clear(self, places: Sequence[float]) -> bool:
         """Look at what is forbidden of the last candidate's spans at some places, in their order.

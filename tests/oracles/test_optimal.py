@@ -235,7 +235,7 @@ def test_what_is_left_out_of_a_wall_collides_all_over():
         t = np.linspace(piece.at[0], piece.at[-1], 400)
         q = inverse_kinematics(cell.robot.arm, cell.Ts_base_flange(t, T_workpiece_cutter))
         for flip, branch in enumerate((piece.family, piece.family + 4)):
-            for looks in (1, 2):
+            for looks in (1, 2, 3):
                 low, high = obstructions.clear(piece, flip, 0, len(piece.pad_low), looks)
             step = np.diff(piece.at)
             ends = piece.at[:-1] + low * step, piece.at[:-1] + high * step

@@ -3,8 +3,8 @@
 import numpy as np
 
 from opl.cell.robot import forward_kinematics
-from opl.planning.box_columns import BESIDE
 from opl.planning.field_at_places import FieldAtPlaces
+from opl.planning.postures import BESIDE
 from opl.planning.rectangle import Rectangle
 from opl.search.box import JointBox
 from tests.support.boxes import near_a_box

@@ -1,9 +1,12 @@
 """Places sampled near a box: what the samples tell is what the postures between them do."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from opl.planning.box_columns import ColumnSampler
+from opl.planning.box_columns import LESS, ColumnSampler
+from opl.planning.shut_leads import RESERVE
 from opl.search.box import JointBox
 from opl.search.in_box import missing, missing_chords
 from tests.support.boxes import near_a_box
@@ -35,3 +38,32 @@ def test_a_box_on_a_chord_over_the_end_of_the_flat_is_missed(monkeypatch):
     away = missing(at(t), box).min()
     assert away > 4e-5
     assert missing_chords(found.q, found.free, box)[PLACE] == pytest.approx(away, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("needs", "reserve"), [(0.9, RESERVE), (2e-4, LESS[0]), (5e-5, LESS[1]), (1e-5, 0.0)]
+)
+def test_the_reserve_is_the_largest_that_costs_hardly_more_than_none(monkeypatch, needs, reserve):
+    """A place is free in the box with a reserve below what it needs, beside it with another."""
+    box, sampler, columns = near_a_box()
+    monkeypatch.setattr(sampler, "collisions", True)
+    monkeypatch.setattr(sampler, "reserve", RESERVE)
+    beside = columns.q + 0.01
+
+    def left(self, _box, found, _spare):
+        return replace(found, q=columns.q if self.reserve < needs else beside)
+
+    monkeypatch.setattr(ColumnSampler, "_left", left)
+    found = sampler.columns(box, columns.placements, columns.places)
+    assert sampler.reserve == reserve
+    assert found.q is columns.q
+
+
+def test_places_are_sampled_closer_without_a_change_of_those_there_were():
+    box, sampler, columns = near_a_box()
+    small = box.widened(-box.size / 2.0)
+    before = columns.t.copy(), columns.q.copy(), columns.free.copy()
+    closer = sampler._closer(columns, small, np.zeros(len(columns.places)))
+    assert not np.array_equal(closer.t, columns.t)
+    for one, other in zip(before, (columns.t, columns.q, columns.free), strict=True):
+        np.testing.assert_array_equal(one, other)

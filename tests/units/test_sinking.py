@@ -14,28 +14,58 @@ from opl.planning.box_track import BoxTracks
 from opl.planning.multi_start import tracks_from_best_start
 from opl.planning.open_matrix import open_matrices
 from opl.planning.passages import NO_PASSAGES
-from opl.planning.sinking import MORE, places_for, shallower, spare_for, sunk_between
+from opl.planning.sinking import (
+    MORE,
+    places_for,
+    shallower,
+    spare_for,
+    struck_between,
+    sunk_between,
+)
 from opl.planning.track_check import Collides, check_track
 from opl.search.smooth import Travel
 from tests.support.boxes import near_a_box
 from tests.support.planned import small_problem, v_job
 
 
-def test_moves_that_sink_are_those_between_their_columns():
+def motion_of_a_track():
+    """Return a problem, the motion of a track, and its moves along the passes."""
     problem = small_problem()
     matrices = open_matrices(problem)
     for track in tracks_from_best_start(matrices):
         found = check_track(problem, matrices[track.matrix].nodes, track.rows)
         if hasattr(found, "motion"):
             break
-    grinding = [k for k, phase in enumerate(found.motion.phase) if phase is Phase.GRINDING]
+    phases = found.motion.phase
+    return problem, found.motion, [k for k, one in enumerate(phases) if one is Phase.GRINDING]
+
+
+def test_moves_that_sink_are_those_between_their_columns():
+    problem, motion, grinding = motion_of_a_track()
     approach = grinding[0] - 1
     faults = [CollidingMove(k, (PART, WHEEL), False) for k in [approach, *grinding]]
-    sunk = sunk_between(problem, Collides(found.motion, tuple(faults)))
+    sunk = sunk_between(problem, Collides(motion, tuple(faults)))
     assert (sunk[~problem.off_wheel] > 0.0).all()
     assert (sunk[problem.off_wheel] == 0.0).all()
     others = [CollidingMove(k, ("R_link", WHEEL), False) for k in grinding]
-    assert not sunk_between(problem, Collides(found.motion, tuple(others))).any()
+    assert not sunk_between(problem, Collides(motion, tuple(others))).any()
+
+
+def test_bodies_are_struck_between_two_columns_not_at_them_and_not_off_the_wheel():
+    problem, motion, grinding = motion_of_a_track()
+    there = motion.cutter_point[grinding]
+    between = [k for k, place in zip(grinding, there, strict=True) if place != np.rint(place)]
+    assert between
+    pair = ("R_link", WHEEL)
+    at_columns = [CollidingMove(k, pair, True) for k in grinding if k not in between]
+    off = CollidingMove(grinding[0] - 1, pair, False)
+    sinks = CollidingMove(between[0], (PART, WHEEL), False)
+    none = Collides(motion, (*at_columns, off, sinks))
+    assert not struck_between(problem, {(b"", b""): none}).any()
+    faults = [CollidingMove(between[0], pair, True), CollidingMove(grinding[-1], pair, False)]
+    each = {(b"", bytes([k])): Collides(motion, (fault,)) for k, fault in enumerate(faults)}
+    struck = np.flatnonzero(struck_between(problem, each))
+    assert struck.tolist() == [int(motion.cutter_point[between[0]]), len(problem.points) - 2]
 
 
 def test_depth_is_spared_at_both_ends_and_where_it_is_of_no_use_places_are_taken_in():
@@ -79,12 +109,12 @@ def test_where_a_box_leaves_no_depth_to_spare_tracks_are_sought_in_the_next_that
     assert not sampler.spared(columns, spare).free[edge].any()
     checked = []
 
-    def check(sampled, track):
+    def check(sampled, track, learn):
         q = sampled.matrices[track.matrix].nodes.along(track.rows)
         t = sampled.matrices[track.matrix].nodes.t_along(track.rows)
         at = replace(columns, t=t[:, None])
         checked.append((q, distances(at)[edge : edge + 2] + problem.cell.planned_penetration))
-        return None, sunk if len(checked) == 1 else None
+        return None, sunk if len(checked) == 1 else None, False
 
     monkeypatch.setattr(box_track._Sampled, "check", check)
     tracks = BoxTracks(problem, sampler, settings.costs, np.inf, Travel(np.inf, np.inf))
