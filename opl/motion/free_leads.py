@@ -3,7 +3,8 @@
 Beyond the end of a pass the surface may rise, or the part may end in a corner. There the run along
 the pass is halved, twice at the most; the least leaves the wheel as steeply as a lead ever does.
 Where no run makes the whole lead free, because the robot folds up or comes to a limit on its way
-off the wheel, the lead ends before: at the last configuration from which a free move may begin.
+off the wheel, or no free move may begin at its end, the lead ends before: at the last configuration
+from which one may.
 """
 
 from __future__ import annotations
@@ -58,8 +59,9 @@ class FreeLeads:
     def find(self, points: CutterPoints, process: ProcessSettings, end: PassEnd) -> Array:
         """Return configurations from just off the wheel to the far end of a lead, shape (k, 6).
 
-        The lead with the longest run that is free as a whole; where none is, what is free of the
-        one that comes farthest; where none comes anywhere, that of the shortest run.
+        The lead with the longest run that is free as a whole, with a free move that may begin at
+        its end; where none is, as much of the one that comes farthest; where none comes anywhere,
+        that of the shortest run.
 
         Args:
             points: The cutter points.
@@ -80,11 +82,11 @@ class FreeLeads:
             for run in np.array(SHARES) * process.approach_run:
                 q, cause = reachable_lead(self._cell, points, process, end, run)
                 free = self._free_moves_of(end, q)
+                while free and self._free_moves.blocked_at(q[free - 1]) is not None:
+                    free -= 1
                 if cause is None and free == len(q):
                     best = q
                     break
-                while free and self._free_moves.blocked_at(q[free - 1]) is not None:
-                    free -= 1
                 away = process.lead_shape(run).places()[free - 1] if free else 0.0
                 if away > farthest:
                     best, farthest = q[:free], float(away)

@@ -1,15 +1,17 @@
 """Where a pass cannot begin or end, whatever the posture within a cell: its lead is surely shut.
 
 A part comes to the wheel and leaves it as `opl.motion.free_leads` says, and at the least until a
-free move may begin. Where each of these leads fails before, as it is out of reach, beyond the
-limits, in collision or too deep in the wheel all over a cell of contact positions, no motion of opl
-grinds the first or last cutter point of a pass in that cell.
+free move may begin: part and links are farther from all that stands still than a clearance asks.
+Where each of these leads fails before, as it is out of reach, beyond the limits, in collision or
+too deep in the wheel all over a cell of contact positions, no motion of opl grinds the first or
+last cutter point of a pass in that cell.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from opl.cell.collision import CollisionScene
 from opl.cell.flange_jets import contact_jets
 from opl.cell.full_turns import FULL_TURN, principal
 from opl.cell.inverse_jets import joint_derivatives
@@ -48,6 +50,7 @@ class ShutLeads:
         self.work = 0.0
         self._problem = problem
         self._flips = wrist_flips(problem.cell.robot.arm)
+        self._scenes: dict[float, tuple[CollisionScene, CollisionScene]] = {}  # by the reserve
         self._leads: dict[bytes, list[Leads]] = {}  # by the place
         self._known: dict[tuple[bytes, int, int, float], tuple[bool, Array]] = {}
         points = problem.points
@@ -119,13 +122,17 @@ class ShutLeads:
         self, T: Array, family: int, flip: int, low: Array, high: Array, reserve: float
     ) -> np.ndarray:
         """Return in which cells every lead is shut, whatever the contact position, shape (n,)."""
+        if reserve not in self._scenes:
+            scene = self._problem.scene.collision.wider(reserve)
+            self._scenes[reserve] = scene, scene.against_surroundings(WHERE_BEGUN)
         shut = np.zeros(len(low), dtype=bool)
         for leads in self._leads.get(T.tobytes(), ()):
             # only those of which all leads before are shut
             left = np.flatnonzero(~shut)
             for lead in leads:
                 ends = low[left], high[left]
-                cells = _Cells(self._problem, family, self._flips[flip], *ends, reserve)
+                scenes = self._scenes[reserve]
+                cells = _Cells(self._problem, family, self._flips[flip], *ends, *scenes)
                 self.work += len(left) / (CELLS_OF_WORK if (low < high).any() else NODES_OF_WORK)
                 left = left[cells.shut(T, lead)]
             shut[left] = True
@@ -141,7 +148,8 @@ class _Cells:
         flip: Sign and shift of its flip.
         low: Least contact position of each, shape (n,).
         high: Greatest; those of no width are looked at where they are.
-        reserve: What leads leave beyond the clearance needed, in [m].
+        collision: In which a lead collides.
+        begun: In which it does not, links and all that stands still, where a free move may begin.
     """
 
     def __init__(
@@ -151,9 +159,10 @@ class _Cells:
         flip: tuple[Array, Array],
         low: Array,
         high: Array,
-        reserve: float,
+        collision: CollisionScene,
+        begun: CollisionScene,
     ) -> None:
-        self._collision = problem.scene.collision.wider(reserve)
+        self._collision, self._begun = collision, begun
         self._cell, self._scene = problem.cell, problem.scene
         self._family, self._flip = family, flip
         self._low, self._high = low, high
@@ -186,8 +195,10 @@ class _Cells:
             on = np.ones(len(left), dtype=bool)  # neither shut nor begun so far
             for k in range(len(Ts)):
                 asked = np.flatnonzero(on & known[k])
-                out[k, asked] = self._collides(q[k, asked], now[k, asked])
+                out[k, asked] = self._collides(self._collision, q[k, asked], now[k, asked])
                 shut[left[on & out[k]]] = True
+                asked = np.flatnonzero(on & known[k] & ~out[k] & away[k])
+                away[k, asked] = ~self._collides(self._begun, q[k, asked], now[k, asked])
                 begun[left[on & ~out[k] & away[k]]] = True
                 on &= ~out[k] & ~away[k]
         return np.asarray(~begun)
@@ -239,13 +250,13 @@ class _Cells:
         nearer, _ = surely_nearer(self._cell, self._scene.part, Ts, *at, distance)
         return nearer.reshape(k, n)
 
-    def _collides(self, q: Array, turned: Array) -> np.ndarray:
-        """Return which postures collide, however far joints turn, shape (n,)."""
+    def _collides(self, scene: CollisionScene, q: Array, turned: Array) -> np.ndarray:
+        """Return which postures collide in a scene, however far joints turn, shape (n,)."""
         sign, shift = self._flip
         placed = q * sign + shift
-        hits = self._collision.collides(placed)
+        hits = scene.collides(placed)
         if turned.any():
-            hits[hits] = self._collision.collides_throughout(placed[hits], turned[hits])
+            hits[hits] = scene.collides_throughout(placed[hits], turned[hits])
         return np.asarray(hits)
 
 

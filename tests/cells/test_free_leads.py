@@ -56,6 +56,21 @@ def test_a_lead_ends_before_a_limit_where_a_free_move_may_begin():
     np.testing.assert_array_equal(np.array(retract[-len(found) :]), found)
 
 
+def test_a_free_lead_at_whose_end_no_free_move_may_begin_ends_before(monkeypatch):
+    problem, path = small_problem(), small_plan().path
+    fresh, whole = with_problem_cell(problem, problem.cell), whole_of(problem, path)
+    away = np.abs(whole - whole[-1]).max(axis=1)
+
+    def blocked(q):
+        near = np.abs(q - whole[-1]).max() < away[-4]  # so is the end of each shorter run
+        return ("R_link", "wheel") if near else None
+
+    monkeypatch.setattr(fresh.scene.free_moves, "blocked_at", blocked)
+    found = found_of(fresh, path)
+    assert 0 < len(found) <= len(whole) - 3
+    assert blocked(found[-1]) is None
+
+
 def test_a_lead_of_which_nothing_is_free_is_refused():
     problem, path = small_problem(), small_plan().path
     whole = whole_of(problem, path)
