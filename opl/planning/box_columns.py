@@ -46,6 +46,7 @@ class ColumnSampler:
         self._problem = problem
         self._seams = seams
         self._field = FieldAtPlaces(problem)
+        self._shut: dict[tuple[float, float, float], bool] = {}  # edges asked about, by their ends
         self.collisions = False  # whether postures that collide are left out
         self.mirrored = False  # whether they are those with the wrist flipped that may not collide
         self.reserve = RESERVE  # [m] beyond the clearance needed that postures leave
@@ -250,8 +251,14 @@ class ColumnSampler:
         Each on one contact position, between two neighbouring cutter points.
         """
         problem = self._problem
-        at = first, last, t, WITHIN
-        return shut_along(problem.cell, problem.scene.part, problem.points, *at)
+        edges = list(zip(first.tolist(), last.tolist(), t.tolist(), strict=True))
+        new = np.array([edge not in self._shut for edge in edges], dtype=bool)
+        if new.any():
+            at = first[new], last[new], t[new], WITHIN
+            found = shut_along(problem.cell, problem.scene.part, problem.points, *at)
+            asked = (edge for edge, one in zip(edges, new, strict=True) if one)
+            self._shut.update(zip(asked, found.tolist(), strict=True))
+        return np.array([self._shut[edge] for edge in edges], dtype=bool)
 
     def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m).
