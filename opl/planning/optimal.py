@@ -130,12 +130,11 @@ class OptimalSearch:
         share = MISSED * self._settings.widen if candidate.settled else CLEARLY_MISSED
         allowed = share * self.proof.threshold
         placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
-        missed = missed[:MOST_ADDED]
         if not candidate.settled:
-            self._go_into(box, placements, missed)
+            self._go_into(box, placements, missed[:MOST_ADDED])
             return
         best, collided = self.plan, self._tracks.collided
-        learnt = self._learn(box, placements, missed)
+        learnt = self._learn(box, placements, missed[:MOST_ADDED])
         in_vain = self.plan is best and self._tracks.collided > collided
         in_vain &= not self._sampler.collisions
         if learnt or (self.proof.outdated and not in_vain):
@@ -184,8 +183,8 @@ class OptimalSearch:
         if not placements:
             return False
         if passages.walls:
+            best = self.plan
             if passages.open and self._work.left_for_early:
-                best = self.plan
                 with self._work.early():
                     if self._try(columns, passages, inner) or self.plan is not best:
                         return True
