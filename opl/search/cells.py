@@ -2,7 +2,8 @@
 
 A row of the table is a cell in one image: joint positions at its two ends, how far below and above
 the chord the postures can be, and its ends along the wall. A run of cells is a span. Where parts of
-cells turn out to be forbidden, their rows are made shorter, for all subproblems at once.
+cells are beyond the limits of joints, or turn out to be forbidden, their rows are made shorter, for
+all subproblems at once.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from opl.geometry.frames import Array
+from opl.search.box import JointBox
 from opl.search.forbidden import Forbidden
+from opl.search.limit_cuts import within_limits
 from opl.search.walls import Image, Piece, Wall
 
 COLUMNS = 26  # start 0:6, end 6:12, pad_low 12:18, pad_high 18:24, places 24 and 25
@@ -33,6 +36,7 @@ class Cells:
         images: The images of each family, the family itself first.
         cut: Cuts a cell of a wall into smaller ones.
         forbidden: Tells which parts of cells are forbidden; None to allow all.
+        limits: As of `BoxProof`; what is beyond all of them is no part of a cell.
 
     Attributes:
         walls: The walls.
@@ -46,8 +50,10 @@ class Cells:
         self,
         images: Callable[[int], Sequence[Image]],
         cut: Callable[[Piece, int], Sequence[Piece]],
-        forbidden: Forbidden | None = None,
+        forbidden: Forbidden | None,
+        limits: Sequence[JointBox],
     ) -> None:
+        self._limits = limits
         self._images = images
         self._cut = cut
         self._forbidden = forbidden
@@ -254,17 +260,19 @@ class Cells:
         rows[..., 12:18] = np.where(mirrored, -piece.pad_high, piece.pad_low)
         rows[..., 18:24] = np.where(mirrored, -piece.pad_low, piece.pad_high)
         rows[..., 24], rows[..., 25] = piece.at[:-1], piece.at[1:]
+        low, high = within_limits(rows, self._limits)
         if self._forbidden is not None:
             flip = int(self._sources[sources[0], FLIP])
-            low, high = self._forbidden.clear(piece, flip, 0, 0, 1)
-            none, step, along = low > high, end - start, np.diff(piece.at)
-            begins, ends = (low > 0.0) & ~none, (high < 1.0) & ~none
-            rows[:, begins, 0:6] += (low[:, None] * step)[:, begins]
-            rows[:, ends, 6:12] = (start + high[:, None] * step)[:, ends]
-            rows[:, none, 6:12] = start[:, none]
-            rows[:, none, 12:18], rows[:, none, 18:24] = FORBIDDEN, -FORBIDDEN
-            rows[..., 24] += np.where(none, 0.0, low * along)
-            rows[..., 25] -= np.where(none, 0.0, (1.0 - high) * along)
+            begin, until = self._forbidden.clear(piece, flip, 0, 0, 1)
+            low, high = np.maximum(low, begin), np.minimum(high, until)
+        none, step, along = low > high, end - start, np.diff(piece.at)
+        begins, ends = (low > 0.0) & ~none, (high < 1.0) & ~none
+        rows[begins, 0:6] += (low[..., None] * step)[begins]
+        rows[ends, 6:12] = (start + high[..., None] * step)[ends]
+        rows[none, 6:12] = start[none]
+        rows[none, 12:18], rows[none, 18:24] = FORBIDDEN, -FORBIDDEN
+        rows[..., 24] += np.where(none, 0.0, low * along)
+        rows[..., 25] -= np.where(none, 0.0, (1.0 - high) * along)
         self.table[self._sources[sources, FIRST_CELL][:, None] + np.arange(n)] = rows
         self.entered += len(sources) * n
 

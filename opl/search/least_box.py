@@ -63,7 +63,7 @@ class BoxProof:
         forbidden: Forbidden | None = None,
         limits: Sequence[JointBox] = UNLIMITED,
     ) -> None:
-        self._cells = Cells(images, cut, forbidden)
+        self._cells = Cells(images, cut, forbidden, limits)
         self._gap = gap
         self._limits = limits
         self._tells_flips = forbidden is not None and len(limits) > 1
