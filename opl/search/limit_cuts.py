@@ -30,7 +30,7 @@ def within_limits(rows: Array, limits: Sequence[JointBox]) -> tuple[Array, Array
     low, high = np.ones(rows.shape[:-1]), np.zeros(rows.shape[:-1])
     for one in limits:
         begin, end = np.zeros(low.shape), np.ones(low.shape)
-        for joint in np.flatnonzero(one.upper - one.lower < FULL_TURN):
+        for joint in np.flatnonzero(one.upper - one.lower < FULL_TURN).tolist():
             first, last = _within(rows, joint, one.lower[joint], one.upper[joint])
             begin, end = np.maximum(begin, first), np.minimum(end, last)
         some = begin <= end
@@ -45,17 +45,17 @@ def _within(rows: Array, joint: int, lower: float, upper: float) -> tuple[Array,
     pad_low, pad_high = rows[..., 12 + joint], rows[..., 18 + joint]
     middle, step = (start + end) / 2.0, end - start
     turns = FULL_TURN * np.round((middle - (lower + upper) / 2.0) / FULL_TURN)
-    lower, upper = lower + turns - TOUCHING, upper + turns + TOUCHING
+    least, most = lower + turns - TOUCHING, upper + turns + TOUCHING
     # where a cell reaches the limits one turn further, nothing of it is cut off there
-    above = np.maximum(start, end) + pad_high >= lower + FULL_TURN
-    below = np.minimum(start, end) + pad_low <= upper - FULL_TURN
-    upper, lower = np.where(above, np.inf, upper), np.where(below, -np.inf, lower)
+    above = np.maximum(start, end) + pad_high >= least + FULL_TURN
+    below = np.minimum(start, end) + pad_low <= most - FULL_TURN
+    most, least = np.where(above, np.inf, most), np.where(below, -np.inf, least)
     with np.errstate(divide="ignore", invalid="ignore"):
-        to_upper, to_lower = (upper - pad_low - start) / step, (lower - pad_high - start) / step
+        to_most, to_least = (most - pad_low - start) / step, (least - pad_high - start) / step
     still = np.abs(step) < TOUCHING
-    inside = (start + pad_low <= upper) & (start + pad_high >= lower)
-    begin = np.where(step > 0.0, to_lower, to_upper)
-    last = np.where(step > 0.0, to_upper, to_lower)
+    inside = (start + pad_low <= most) & (start + pad_high >= least)
+    begin = np.where(step > 0.0, to_least, to_most)
+    last = np.where(step > 0.0, to_most, to_least)
     begin = np.where(still, np.where(inside, 0.0, 2.0), begin)
     last = np.where(still, np.where(inside, 1.0, -1.0), last)
     return np.maximum(begin, 0.0), np.minimum(last, 1.0)
