@@ -23,7 +23,7 @@ from opl.planning.passages import NO_PASSAGES, Passages
 from opl.planning.plan import Found, Plan, Same, propose_and_check
 from opl.planning.postures import Columns
 from opl.planning.problem import GrindingProblem
-from opl.planning.rows import Bulge, Row, bars, bulging, crossed, levels, shut_edges
+from opl.planning.rows import Bulge, Row, bars, broken_at, bulging, crossed, levels, shut_edges
 from opl.planning.settings import CostWeights
 from opl.planning.sinking import (
     first_sunk,
@@ -252,12 +252,12 @@ class _Sampled:
         return sampled, track
 
     def bulges(self, track: Track, box: JointBox) -> list[Bulge]:
-        """Return where a track leaves the box on its way from place to place."""
+        """Return where a track leaves the box on its way from place to place, or cannot be made."""
         problem, nodes = self.problem, self.matrices[track.matrix].nodes
         try:
             path = fill_in(problem.cell, problem.points, nodes, track.rows, problem.interpolation)
-        except BrokenEdgeError:
-            return []  # the check finds and blocks it
+        except BrokenEdgeError as broken:
+            return broken_at(self._columns.places, broken.column)
         if path.joint_range_sum <= box.size:
             return []
         spanned = nodes.along(track.rows)

@@ -134,6 +134,12 @@ def bulging(places: Array, t: Array, edge: np.ndarray, excess: Array) -> list[Bu
     return found
 
 
+def broken_at(places: Array, column: int) -> list[Bulge]:
+    """Return the way from a place to the next, cut further: it cannot be made as it is."""
+    first, last = places[column : column + 2].tolist()
+    return [Bulge(first, last, MOST_PARTS, True)] if last - first > SMALLEST_EDGE else []
+
+
 def bars(
     places: Array, ladders: Sequence[Ladder], blocked_edges: Sequence[np.ndarray]
 ) -> list[Bulge]:

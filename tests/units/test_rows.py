@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opl.planning.rows import bars, crossed
+from opl.planning.rows import MOST_PARTS, bars, broken_at, crossed
 from opl.search.ladder import Ladder
 
 COLUMNS, ROWS = 4, 3
@@ -67,3 +67,10 @@ def test_a_way_is_crossed_straight_on_from_crossing_to_crossing():
     t = crossed(places, crossings, otherwise)
     assert t[:, 0] == pytest.approx([9.0, 4.0, 5.0, 6.0, 6.0, 2.0, -2.0, 9.0])
     assert (crossed(places, np.empty((0, 2)), otherwise) == otherwise).all()
+
+
+def test_a_way_that_cannot_be_made_is_cut_further_until_it_is_too_short():
+    places = np.array([0.0, 1.0, 1.001, 2.0])
+    (bulge,) = broken_at(places, 0)
+    assert (bulge.first, bulge.last, bulge.parts) == (0.0, 1.0, MOST_PARTS)
+    assert broken_at(places, 1) == []
