@@ -137,9 +137,11 @@ class OptimalSearch:
         learnt = self._learn(box, placements, missed[:MOST_ADDED])
         in_vain = self.plan is best and self._tracks.collided > collided
         in_vain &= not self._sampler.collisions
-        if learnt or (self.proof.outdated and not in_vain):
+        if in_vain:
+            self._mind_collisions()
+        elif learnt or self.proof.outdated:
             self.proof.put_back()
-        elif candidate.bound >= self.proof.closing and not in_vain:
+        elif candidate.bound >= self.proof.closing:
             return
         elif not self._sampler.collisions:
             self._mind_collisions()

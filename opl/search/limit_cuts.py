@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
 
@@ -21,41 +22,60 @@ def within_limits(rows: Array, limits: Sequence[JointBox]) -> tuple[Array, Array
     """Return where cells begin and end to be within any of some limits, in fractions of them.
 
     Args:
-        rows: Cells as in the table of `Cells`, shape (..., 24 or more).
+        rows: Cells as in the table of `Cells`, shape (..., 26).
         limits: As of `BoxProof`.
 
     Returns:
         Both of shape (...); a cell ends before it begins where nothing of it is.
     """
-    low, high = np.ones(rows.shape[:-1]), np.zeros(rows.shape[:-1])
-    for one in limits:
-        begin, end = np.zeros(low.shape), np.ones(low.shape)
-        for joint in np.flatnonzero(one.upper - one.lower < FULL_TURN).tolist():
-            first, last = _within(rows, joint, one.lower[joint], one.upper[joint])
-            begin, end = np.maximum(begin, first), np.minimum(end, last)
-        some = begin <= end
-        low = np.where(some, np.minimum(low, begin), low)
-        high = np.where(some, np.maximum(high, end), high)
+    shape = rows.shape[:-1]
+    low, high = np.empty(shape), np.empty(shape)
+    least, most = (np.array([getattr(one, face) for one in limits]) for face in ("lower", "upper"))
+    _cut(rows.reshape(-1, rows.shape[-1]), least, most, low.reshape(-1), high.reshape(-1))
     return low, high
 
 
-def _within(rows: Array, joint: int, lower: float, upper: float) -> tuple[Array, Array]:
+@kernel("UniTuple(float64,2)(float64,float64,float64,float64,float64,float64)")
+def _within(start, end, pad_low, pad_high, lower, upper):  # type: ignore[no-untyped-def]
     """Return where one joint is within its limits, as `within_limits` does."""
-    start, end = rows[..., joint], rows[..., 6 + joint]
-    pad_low, pad_high = rows[..., 12 + joint], rows[..., 18 + joint]
-    middle, step = (start + end) / 2.0, end - start
-    turns = FULL_TURN * np.round((middle - (lower + upper) / 2.0) / FULL_TURN)
+    turns = FULL_TURN * np.round(((start + end) - (lower + upper)) / (2.0 * FULL_TURN))
     least, most = lower + turns - TOUCHING, upper + turns + TOUCHING
+    high, low = max(start, end) + pad_high, min(start, end) + pad_low
     # where a cell reaches the limits one turn further, nothing of it is cut off there
-    above = np.maximum(start, end) + pad_high >= least + FULL_TURN
-    below = np.minimum(start, end) + pad_low <= most - FULL_TURN
-    most, least = np.where(above, np.inf, most), np.where(below, -np.inf, least)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        to_most, to_least = (most - pad_low - start) / step, (least - pad_high - start) / step
-    still = np.abs(step) < TOUCHING
-    inside = (start + pad_low <= most) & (start + pad_high >= least)
-    begin = np.where(step > 0.0, to_least, to_most)
-    last = np.where(step > 0.0, to_most, to_least)
-    begin = np.where(still, np.where(inside, 0.0, 2.0), begin)
-    last = np.where(still, np.where(inside, 1.0, -1.0), last)
-    return np.maximum(begin, 0.0), np.minimum(last, 1.0)
+    above = high < least + FULL_TURN and max(start, end) + pad_low > most
+    below = low > most - FULL_TURN and min(start, end) + pad_high < least
+    first, last, step = 0.0, 1.0, end - start
+    if (above and min(start, end) + pad_low > most) or (
+        below and max(start, end) + pad_high < least
+    ):
+        return 2.0, -1.0
+    if above:
+        at = (most - pad_low - start) / step
+        if step > 0.0:
+            last = min(last, at)
+        else:
+            first = max(first, at)
+    if below:
+        at = (least - pad_high - start) / step
+        if step > 0.0:
+            first = max(first, at)
+        else:
+            last = min(last, at)
+    return first, last
+
+
+@kernel("void(float64[:,::1],float64[:,::1],float64[:,::1],float64[::1],float64[::1])", early=True)
+def _cut(rows, lower, upper, low, high):  # type: ignore[no-untyped-def]
+    for n in range(len(rows)):
+        low[n], high[n] = 1.0, 0.0
+        for k in range(len(lower)):
+            begin, end = 0.0, 1.0
+            for j in range(6):
+                if upper[k, j] - lower[k, j] < FULL_TURN:
+                    first, last = _within(
+                        rows[n, j], rows[n, 6 + j], rows[n, 12 + j], rows[n, 18 + j],
+                        lower[k, j], upper[k, j],
+                    )  # fmt: skip
+                    begin, end = max(begin, first), min(end, last)
+            if begin <= end:
+                low[n], high[n] = min(low[n], begin), max(high[n], end)

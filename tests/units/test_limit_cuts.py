@@ -19,7 +19,7 @@ pads = st.sampled_from([0.0, 1e-3, 0.05])
 
 def a_cell(start, step, pad):
     start, step = np.array(start), np.array(step)
-    return np.concatenate([start, start + step, np.full(6, -pad), np.full(6, pad)])
+    return np.concatenate([start, start + step, np.full(6, -pad), np.full(6, pad), [0.0, 1.0]])
 
 
 def kept(row, limits):
