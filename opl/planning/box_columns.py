@@ -106,6 +106,8 @@ class ColumnSampler:
         self.reserve = 0.0
         without = self._left(box, columns, spare)
         least = _size(without, box)
+        if np.isinf(least):
+            return without
         if most - least <= SPENT * box.size:
             self.reserve = RESERVE
             return found

@@ -105,9 +105,10 @@ class BoxTracks:
         coarse = sampled = self._sampled(columns, passages, box, room, np.zeros(len(places)))
         track: Track | None = coarse.smoothest()
         if track is None:
-            ladders = [matrix.ladder_within(self._max_contact_change) for matrix in coarse.matrices]
-            blocked = [matrix.blocked_edges for matrix in coarse.matrices]
-            if learn(bars(places, ladders, blocked)):
+            # images differ in their limits only: those with the same nodes tell the same
+            few = {(m.free.tobytes(), m.blocked_edges.tobytes()): m for m in coarse.matrices}
+            ladders = [one.ladder_within(self._max_contact_change) for one in few.values()]
+            if learn(bars(places, ladders, [one.blocked_edges for one in few.values()])):
                 return None
             return self.plan(columns, NO_PASSAGES, box, room, learn) if rows else None
         bulges = coarse.bulges(track, box.widened(BULGE * room))

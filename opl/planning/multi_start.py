@@ -12,6 +12,7 @@ from opl.geometry.frames import Array
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
 from opl.planning.plan import (
     OutOfBudget,
+    Pause,
     Plan,
     Same,
     SearchOutcome,
@@ -24,6 +25,9 @@ from opl.planning.symmetry import twins
 from opl.planning.track_check import Collides
 from opl.search.impasse import passable
 from opl.search.recursive import Descent, add_dead_ends, descend
+
+DESCENTS = 64  # of the recursive search between two pauses
+NODES_OF_WORK = 20_000  # that a descent leads past, which cost a unit of work
 
 
 def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
@@ -86,17 +90,27 @@ def only_apart(problem: GrindingProblem, matrices: list[OpenMatrix]) -> bool:
     return bool(ground.any(axis=0).all() and not ground.all(axis=1).any())
 
 
-def _tracks(problem: GrindingProblem, matrices: list[OpenMatrix], start: Start) -> Iterator[Track]:
-    """Yield tracks in the order in which the search wants them checked."""
+def _tracks(
+    problem: GrindingProblem, matrices: list[OpenMatrix], start: Start
+) -> Iterator[Track | Pause]:
+    """Yield tracks in the order in which the search wants them checked, and pauses."""
     if start is Start.NEAREST:
         yield from tracks_from_nearest_start(matrices, problem.process.home)
         return
-    for track in tracks_from_best_start(matrices):
-        yield from twins(matrices, track, problem.cell.robot)
+    for track in _from_best_start(matrices):
+        if isinstance(track, Pause):
+            yield track
+        else:
+            yield from twins(matrices, track, problem.cell.robot)
 
 
 def tracks_from_best_start(matrices: list[OpenMatrix]) -> Iterator[Track]:
-    """Yield tracks by increasing joint range sum over all start nodes of all matrices.
+    """Yield tracks by increasing joint range sum over all start nodes of all matrices."""
+    return (track for track in _from_best_start(matrices) if isinstance(track, Track))
+
+
+def _from_best_start(matrices: list[OpenMatrix]) -> Iterator[Track | Pause]:
+    """Yield tracks by increasing joint range sum, and a pause after every few descents.
 
     A start node is given up as soon as its sum is more than the best known, and is looked at again
     when no other has less. One that full turns make of another is reckoned to have the same sum at
@@ -112,6 +126,7 @@ def tracks_from_best_start(matrices: list[OpenMatrix]) -> Iterator[Track]:
     for index, matrix in enumerate(matrices):
         queue += [(0.0, index, row, None) for row in np.flatnonzero(matrix.free[0]).tolist()]
     heapq.heapify(queue)
+    descents, nodes = 0, matrices[0].free.size if matrices else 0
     while queue:
         total, index, row, rows = heapq.heappop(queue)
         matrix = matrices[index]
@@ -126,6 +141,9 @@ def tracks_from_best_start(matrices: list[OpenMatrix]) -> Iterator[Track]:
             heapq.heappush(queue, (reckoned[same], index, row, None))
             continue
         total, rows = searches[index].descend_to(row, known)
+        descents += 1
+        if descents % DESCENTS == 0:
+            yield Pause(DESCENTS * nodes / NODES_OF_WORK)
         if np.isfinite(total):
             reckoned[same] = total
             heapq.heappush(queue, (total, index, row, rows))

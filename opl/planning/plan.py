@@ -85,6 +85,17 @@ class Plan:
 
 
 @dataclass(frozen=True)
+class Pause:
+    """A search has worked, but has no track to propose so far.
+
+    Attributes:
+        work: How much since the last, in units.
+    """
+
+    work: float
+
+
+@dataclass(frozen=True)
 class Found:
     """A search ended with a free motion."""
 
@@ -118,7 +129,7 @@ SearchOutcome = Found | Exhausted | OutOfBudget
 def propose_and_check(
     problem: GrindingProblem,
     matrices: list[OpenMatrix],
-    proposals: Iterable[Track],
+    proposals: Iterable[Track | Pause],
     checks: int = 0,
     most_checks: int | None = None,
     most_work: float = np.inf,
@@ -129,7 +140,7 @@ def propose_and_check(
     Args:
         problem: What is to be planned.
         matrices: The matrices; what is blocked is noted there, for the proposer to learn from.
-        proposals: Tracks, best first.
+        proposals: Tracks, best first, with pauses.
         checks: How many motions were checked before.
         most_checks: How many to check at the most, those before included; None for no limit.
         most_work: In units, after which no other is checked.
@@ -138,7 +149,17 @@ def propose_and_check(
     first, begun = checks, problem.scene.work
     of_a_check = WORK_OF_A_CHECK * len(problem.points)
     collided = {} if collided is None else collided
+    proposing = 0.0
+
+    def done() -> float:
+        return problem.scene.work - begun + (checks - first) * of_a_check + proposing
+
     for track in proposals:
+        if isinstance(track, Pause):
+            proposing += track.work
+            if done() >= most_work:
+                return OutOfBudget(checks)
+            continue
         matrix = matrices[track.matrix]
         # full turns bring the same bodies to the same places
         same = matrix.nodes.ik_branch.tobytes(), matrix.nodes.t_along(track.rows).tobytes()
@@ -152,14 +173,13 @@ def propose_and_check(
         block(problem, matrix, track.rows, found)
         if isinstance(found, Collides):
             collided[same] = found
-        done = problem.scene.work - begun + (checks - first) * of_a_check
-        if checks == most_checks or done >= most_work:
+        if checks == most_checks or done() >= most_work:
             return OutOfBudget(checks)
     return Exhausted(checks, matrices)
 
 
 def first_free(
-    problem: GrindingProblem, matrices: list[OpenMatrix], proposals: Iterable[Track]
+    problem: GrindingProblem, matrices: list[OpenMatrix], proposals: Iterable[Track | Pause]
 ) -> Plan:
     """Return the first of the proposed tracks whose motion is free, as `propose_and_check` does.
 

@@ -104,8 +104,11 @@ def _search_range(
             "own, keeps reach, limits and the plan's clearances, with leads as the job sets them",
             explain(problem, in_turns.matrices),
         )
+    tried = f"the {last.checks} best motions of the recursive search are not free"
+    if last.checks == 0:
+        tried = "the recursive search came to no motion in the work allowed"
     raise NoPathError(
-        f"no path found: the {last.checks} best motions of the recursive search are not free, and "
+        f"no path found: {tried}, and "
         "the proof found none in the work allowed, only that none along these passes has a joint "
         f"range sum below {least:.4f} rad; more work, or more room around the robot, may help",
         lower_bound=least,

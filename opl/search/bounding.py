@@ -178,12 +178,23 @@ def distances(cells, spans, low, high):  # type: ignore[no-untyped-def]
     """Return by how much a box misses the chords of each span, shape (n, 5), in [rad]."""
     found = np.empty(len(spans))
     for k in range(len(spans)):
-        best = np.inf
+        # what is nearest by its joints, each for itself, soon rules out the others
+        nearest, least, best = -1, np.inf, np.inf
         for cell in range(spans[k, 3], spans[k, 4]):
             if cells[cell, 12] > 0.0:
                 continue  # forbidden
-            best, _ = nearest_on_chord(cells[cell, :6], cells[cell, 6:12], low, high, best)
+            away = 0.0
+            for j in range(6):
+                a, b = cells[cell, j], cells[cell, 6 + j]
+                away += max(min(a, b) - high[j], 0.0) + max(low[j] - max(a, b), 0.0)
+            if away < least:
+                nearest, least = cell, away
+        if nearest >= 0:
+            best, _ = nearest_on_chord(cells[nearest, :6], cells[nearest, 6:12], low, high, best)
+        for cell in range(spans[k, 3], spans[k, 4]):
             if best == 0.0:
                 break
+            if cells[cell, 12] <= 0.0 and cell != nearest:
+                best, _ = nearest_on_chord(cells[cell, :6], cells[cell, 6:12], low, high, best)
         found[k] = best
     return found

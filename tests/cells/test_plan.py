@@ -21,7 +21,7 @@ from opl.planning.multi_start import (
     try_recursive,
 )
 from opl.planning.open_matrix import open_matrices
-from opl.planning.plan import Exhausted, Found, OutOfBudget
+from opl.planning.plan import Exhausted, Found, OutOfBudget, Pause, propose_and_check
 from opl.planning.reasons import explain, unreachable_points
 from opl.planning.settings import Start
 from opl.planning.survey import NodeState, survey_nodes
@@ -558,3 +558,13 @@ def test_an_approach_from_out_of_reach_is_refused():
     process = replace(problem.process, approach_length=5.0)
     with pytest.raises(UnreachableApproachError, match="approach to cutter point 0: reach"):
         whole_motion(problem.cell, problem.points, plan.path, process)
+
+
+def test_work_on_proposals_counts_where_none_is_made():
+    problem = small_problem()
+    matrices, pauses = open_matrices(problem), [Pause(10.0)] * 5
+    assert propose_and_check(problem, matrices, pauses, most_work=25.0) == OutOfBudget(0)
+    assert isinstance(propose_and_check(problem, matrices, pauses, most_work=51.0), Exhausted)
+    track = next(tracks_from_best_start(matrices))
+    found = propose_and_check(problem, matrices, [Pause(10.0), track], most_work=25.0)
+    assert isinstance(found, Found)
