@@ -136,8 +136,7 @@ class OptimalSearch:
         best, collided = self.plan, self._tracks.collided
         learnt = self._learn(box, placements, missed[:MOST_ADDED])
         in_vain = self.plan is best and self._tracks.collided > collided
-        in_vain &= not self._sampler.collisions
-        if in_vain:
+        if in_vain and not self._sampler.collisions:
             self._mind_collisions()
         elif learnt or self.proof.outdated:
             self.proof.put_back()
@@ -222,8 +221,7 @@ class OptimalSearch:
         larger, threshold = self._families.grown(box, placements), self.proof.threshold
         if not self._sampler.collisions:
             self._hope(larger)
-        least = self._value * (1.0 - CLEARLY_LESS)
-        if larger is None or larger.size > least:
+        if larger is None or larger.size > self._value * (1.0 - CLEARLY_LESS):
             return
         if self._work.left_for_early:
             with self._work.early():
