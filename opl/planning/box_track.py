@@ -35,10 +35,8 @@ from opl.planning.sinking import (
 )
 from opl.planning.symmetry import everywhere, twins
 from opl.planning.track_check import Collides
+from opl.search import in_box
 from opl.search.box import JointBox
-from opl.search.in_box import missing as missing_of
-from opl.search.in_box import nearest
-from opl.search.in_box import sampled as samples_in
 from opl.search.joint_limits import cut_at
 from opl.search.smooth import Travel, smoothest_within
 
@@ -114,7 +112,7 @@ class BoxTracks:
         bulges = coarse.bulges(track, box.widened(BULGE * room))
         if any(bulge.steep for bulge in bulges) and learn(bulges):
             return None
-        sunk = before = None
+        sunk, before, most = None, None, box.size + room
         for _ in range(MOST_SPARED + 1):
             if track is None:
                 break
@@ -122,6 +120,8 @@ class BoxTracks:
             if (bulges := closest.bulges(track, box.widened(BULGE * room))) and learn(bulges):
                 return None
             plan, sunk, learnt = closest.check(track, learn)
+            if plan is not None and before is not None and plan.path.joint_range_sum > most:
+                learn(places_for(places, before))  # places may cost less than depth does
             if plan is not None or learnt:
                 return plan
             if sunk is None or not shallower(sunk, before):
@@ -143,7 +143,7 @@ class BoxTracks:
     ) -> _Sampled:
         """Return the nodes of places that a motion in a box may use."""
         inner = cut_at(box.widened(room / 2.0), self.sampler.limits)
-        t, spacing = samples_in(columns.t, columns.q, columns.free, inner, SAMPLES)
+        t, spacing = in_box.sampled(columns.t, columns.q, columns.free, inner, SAMPLES)
         places, one = columns.places, t[:, :1]
         known = levels(places, passages.rows, inner, one), crossed(places, passages.crossings, one)
         t = np.concatenate([t, *known], axis=1)
@@ -171,9 +171,8 @@ class _Sampled:
         self.spare = spare  # depth in [m] that nodes leave of what is allowed, by column
         self._spacing = spacing  # belt units between contact positions, by column
         problem = search._problem
-        q = np.where(
-            (columns.free & nearest(columns.q, columns.free, box))[..., None], columns.q, np.nan
-        )
+        near = columns.free & in_box.nearest(columns.q, columns.free, box)
+        q = np.where(near[..., None], columns.q, np.nan)
         pass_index, sampler = columns.points.pass_index, search.sampler
         flips = []
         for flip, move in enumerate(sampler.flips):
@@ -263,7 +262,7 @@ class _Sampled:
             return []
         spanned = nodes.along(track.rows)
         outer = JointBox(spanned.min(axis=0), spanned.max(axis=0))
-        excess = missing_of(path.q, outer.widened(max(box.size - outer.size, 0.0)))
+        excess = in_box.missing(path.q, outer.widened(max(box.size - outer.size, 0.0)))
         where = path.cutter_point.astype(int), excess / box.size
         return bulging(self._columns.places, nodes.t_along(track.rows), *where)
 
