@@ -26,12 +26,15 @@ from opl.planning.rows import SMALLEST_EDGE, Bulge
 from opl.planning.track_check import Collides
 
 LOOKS = 8  # along a move that sinks too deep
+ALONG = Phase.APPROACHING, Phase.GRINDING, Phase.RETRACTING
 USELESS = 0.5  # of what was too deep: where so much still is, sparing depth is of no use
 MORE = 1.25  # times what was too deep: what is spared for it
 
 
 def sunk_between(problem: GrindingProblem, blocked: Collides) -> Array:
     """Return by how much the part is too deep between columns in [m], 0 elsewhere, (n - 1,).
+
+    What it is too deep by on a lead counts between the two columns at that end of the pass.
 
     Args:
         problem: What is to be planned, of n columns.
@@ -43,7 +46,7 @@ def sunk_between(problem: GrindingProblem, blocked: Collides) -> Array:
     moves = [
         fault.move
         for fault in blocked.faults
-        if fault.pair == (PART, WHEEL) and phases[fault.move] is Phase.GRINDING
+        if fault.pair == (PART, WHEEL) and phases[fault.move] in ALONG
     ]
     if not moves:
         return sunk
@@ -53,8 +56,13 @@ def sunk_between(problem: GrindingProblem, blocked: Collides) -> Array:
     allowed = -cell.planned_penetration
     distance = signed_wheel_distance(problem.scene.part, cell.wheel, Ts, allowed)
     too_deep = np.maximum(allowed - distance.min(axis=1), 0.0) + TOLERANCE
-    edge = np.ceil(motion.cutter_point[moves]).astype(int) - 1
-    np.maximum.at(sunk, edge, too_deep)
+    last = np.cumsum(np.bincount(problem.points.pass_index)) - 1
+    ends = {Phase.APPROACHING: np.append(0, last[:-1] + 1) + 1, Phase.RETRACTING: last}
+    after = [
+        ends[phases[k]][motion.pass_index[k]] if phases[k] in ends else motion.cutter_point[k]
+        for k in moves
+    ]
+    np.maximum.at(sunk, np.clip(np.ceil(after).astype(int) - 1, 0, len(sunk) - 1), too_deep)
     return sunk
 
 

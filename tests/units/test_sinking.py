@@ -51,6 +51,18 @@ def test_moves_that_sink_are_those_between_their_columns():
     assert not sunk_between(problem, Collides(motion, tuple(others))).any()
 
 
+def test_a_lead_that_sinks_counts_beside_its_end_of_the_pass():
+    problem, motion, grinding = motion_of_a_track()
+    last = np.flatnonzero(problem.off_wheel)[0]  # of the first pass
+    leaves = grinding[np.flatnonzero(np.diff(grinding) > 1)[0]] + 1
+    assert [motion.phase[k] for k in (grinding[0] - 1, leaves)] == [
+        Phase.APPROACHING, Phase.RETRACTING,
+    ]  # fmt: skip
+    for move, edge in ((grinding[0] - 1, 0), (leaves, last - 1)):
+        faults = (CollidingMove(move, (PART, WHEEL), False),)
+        assert np.flatnonzero(sunk_between(problem, Collides(motion, faults))).tolist() == [edge]
+
+
 def test_bodies_are_struck_between_two_columns_not_at_them_and_not_off_the_wheel():
     problem, motion, grinding = motion_of_a_track()
     there = motion.cutter_point[grinding]
