@@ -67,7 +67,9 @@ class Kernel:
             known = {**function.__globals__, "prange": numba.prange}
             function = FunctionType(function.__code__, known)
         types = () if self._signature is None else (self._signature,)
-        return numba.njit(*types, cache=True, parallel=self._threads)(function)
+        # a division by 0 gives what numpy gives: to look for one at each costs up to a quarter
+        made = numba.njit(*types, cache=True, parallel=self._threads, error_model="numpy")
+        return made(function)
 
     @cached_property
     def plain(self) -> Any:

@@ -37,6 +37,15 @@ def test_a_kernel_calls_kernels_and_may_share_a_loop_among_threads(tmp_path, mon
     assert ("numba_parallel_for" in code) == threads
 
 
+@kernel("float64(float64,float64)")
+def _parted(x, y):
+    return x / y
+
+
+def test_kernels_divide_as_numpy_does():
+    assert _parted(1.0, 0.0) == np.inf and np.isnan(_parted(0.0, 0.0))
+
+
 def test_types_are_those_of_the_signature():
     with pytest.raises(TypeError, match="No matching definition"):
         _twice("two")
