@@ -9,9 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from opl.files.kernels import kernel
-from opl.motion.line_error import Run, Screws, off_target
+from opl.motion.line_error import Run, Screws, flange_at, off_target
 
-_SHARES = tuple(n / 8.0 for n in range(1, 8))  # of the way along the chord
+# of the way along the chord, those first that are mostly off the most
+_SHARES = tuple(n / 8.0 for n in (4, 3, 5, 2, 6, 1, 7))
 
 
 def corner_error(screws: Screws, run: Run, corner: tuple[int, int, int], zone: float) -> float:
@@ -25,13 +26,16 @@ def corner_error(screws: Screws, run: Run, corner: tuple[int, int, int], zone: f
             than half-way.
     """
     arm = screws.axes, screws.T_base_flange
-    found = rounded_off(*arm, *run.arrays[:4], run.tool, *corner, zone)
+    found = rounded_off(*arm, *run.arrays[:4], run.tool, *corner, zone, np.inf)
     return float(found)
 
 
 @kernel()
-def rounded_off(axes, T0, q, places, targets, freedom, tool, i, j, k, zone):  # type: ignore[no-untyped-def]
-    """Return how far along its normal the contact is off in [m] if the corner at j is cut off."""
+def rounded_off(axes, T0, q, places, targets, freedom, tool, i, j, k, zone, most):  # type: ignore[no-untyped-def]
+    """Return how far along its normal the contact is off in [m] if the corner at j is cut off.
+
+    Of a corner that is off by more than ``most`` anything that is more.
+    """
     T, point, off, other = np.empty((3, 4)), np.empty(6), np.empty(6), np.empty(6)
     left, begun = _cut(tool, j, i, zone), _cut(tool, j, k, zone)
     worst = 0.0
@@ -39,42 +43,52 @@ def rounded_off(axes, T0, q, places, targets, freedom, tool, i, j, k, zone):  # 
         for c in range(6):
             before, after = q[i, c] - q[j, c], q[k, c] - q[j, c]
             point[c] = q[j, c] + (1.0 - share) * left * before + share * begun * after
+        flange_at(axes, T0, point, T)
         # walk to the place that is nearest
         m, step = j, 0
-        _off_but(axes, T0, point, places[m], targets[m], freedom[m], T, off)
-        nearest = np.square(off).sum()
+        nearest = _off_but(T, places[m], targets[m], freedom[m], off)
         for way in (-1, 1):
             while i <= m + way <= k and step != -way:
-                _off_but(
-                    axes, T0, point, places[m + way], targets[m + way], freedom[m + way], T, other
-                )
-                found = np.square(other).sum()
+                beside = m + way
+                found = _off_but(T, places[beside], targets[beside], freedom[beside], other)
                 if found >= nearest:
                     break
-                m, nearest, step = m + way, found, way
+                m, nearest, step = beside, found, way
                 off[:] = other
         # what is passed lies between the nearest place and one beside it: where the contact slides,
         # by how the part is turned, where it rolls, by what comes to the edge
         normal, told_by = off[2], 4 - freedom[m]
         for side in (m - 1, m + 1):
             if i <= side <= k:
-                off_target(axes, T0, point, places[side], targets[m], T, other)
+                off_target(T, places[side], targets[m], other)
                 if off[told_by] * other[told_by] < 0.0:
                     s = off[told_by] / (off[told_by] - other[told_by])
                     normal = off[2] + s * (other[2] - off[2])
         worst = max(worst, abs(normal))
+        if worst > most:
+            break
     return worst
 
 
 @kernel()
-def _off_but(axes, T0, q, place, target, free, T, off):  # type: ignore[no-untyped-def]
-    """Put how far a place is from its target into off, but for what the contact may do there."""
-    off_target(axes, T0, q, place, target, T, off)
+def _off_but(T, place, target, free, off):  # type: ignore[no-untyped-def]
+    """Put how far a place is from its target into off, but for what the contact may do there.
+
+    And return the square of what that is.
+    """
+    off_target(T, place, target, off)
     off[free] = 0.0
+    total = 0.0
+    for c in range(6):
+        total += off[c] * off[c]
+    return total
 
 
 @kernel()
 def _cut(tool, corner, end, zone):  # type: ignore[no-untyped-def]
     """Return which share of a line may be cut off at a corner."""
-    length = np.sqrt(np.square(tool[end] - tool[corner]).sum())
+    square = 0.0
+    for c in range(3):
+        square += (tool[end, c] - tool[corner, c]) ** 2
+    length = np.sqrt(square)
     return 0.5 if zone >= 0.5 * length else zone / length

@@ -213,7 +213,7 @@ def _chain(  # type: ignore[no-untyped-def]
                     continue
                 if zone > 0.0 and at[k] > at[starts[ahead]] + 2:
                     corner = rounded_off(
-                        axes, T0, q, places, targets, freedom, tool, starts[ahead], j, k, zone
+                        axes, T0, q, places, targets, freedom, tool, starts[ahead], j, k, zone, most
                     )
                 refused = corner > most
                 for b in range(len(wide)):

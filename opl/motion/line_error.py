@@ -106,7 +106,7 @@ def line_errors(screws: Screws, run: Run, start: int, end: int) -> tuple[Array, 
 
 
 @kernel()
-def _flange(axes, T0, q, T):  # type: ignore[no-untyped-def]
+def flange_at(axes, T0, q, T):  # type: ignore[no-untyped-def]
     """Put the flange pose of a configuration into T, shape (3, 4)."""
     for a in range(3):
         for b in range(4):
@@ -127,9 +127,8 @@ def _flange(axes, T0, q, T):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def off_target(axes, T0, q, place, target, T, off):  # type: ignore[no-untyped-def]
-    """Put how far a place is from its target, seen from there, into off, shape (6,)."""
-    _flange(axes, T0, q, T)
+def off_target(T, place, target, off):  # type: ignore[no-untyped-def]
+    """Put how far a place of a flange at T is from its target, seen from there, into off, (6,)."""
     d0, d1, d2 = T[0, 3] - target[0, 3], T[1, 3] - target[1, 3], T[2, 3] - target[2, 3]
     for b in range(3):
         d0 += T[0, b] * place[b, 3]
@@ -169,13 +168,15 @@ def _pass_by(axes, T0, q, places, targets, freedom, room, pace, i, j, k, least, 
     for step in range(3):
         for c in range(6):
             point[c] = q[i, c] + s * (q[j, c] - q[i, c])
-        off_target(axes, T0, point, places[k], targets[k], T, off)
+        flange_at(axes, T0, point, T)
+        off_target(T, places[k], targets[k], off)
         if step == 2:
             break
         if step == 0:
             for c in range(6):
                 point[c] += _AHEAD * (q[j, c] - q[i, c])
-            off_target(axes, T0, point, places[k], targets[k], T, ahead)
+            flange_at(axes, T0, point, T)
+            off_target(T, places[k], targets[k], ahead)
             for c in range(6):
                 ahead[c] = (ahead[c] - off[c]) / _AHEAD
         along = squared = 0.0
