@@ -1,7 +1,4 @@
-"""The surface of the part in patches, and how near each can be to the wheel, a plain cylinder.
-
-The cylinder is written out from its axis, apart from `ContactWheel` and from the planner's kernels.
-"""
+"""The surface of the part in patches, and how near each can be to the wheel."""
 
 from __future__ import annotations
 
@@ -12,44 +9,9 @@ import numpy as np
 
 from opl.files.kernels import kernel
 from opl.geometry.frames import Array, transform
+from opl.verification.drum import Drum, out_of_drum
 
 MOST = 50  # triangles in a patch
-
-
-@kernel("UniTuple(float64,4)(float64,float64,float64,float64[:,::1],float64,float64)")
-def _out_of_drum(x, y, z, T, radius, width):  # type: ignore[no-untyped-def]
-    """Return the distance of a point from a `Drum` in [m], and the direction in which it grows."""
-    x, y, z = x - T[0, 3], y - T[1, 3], z - T[2, 3]
-    along = x * T[0, 2] + y * T[1, 2] + z * T[2, 2]
-    x, y, z = x - along * T[0, 2], y - along * T[1, 2], z - along * T[2, 2]
-    away = np.sqrt(x * x + y * y + z * z)
-    beside, beyond = abs(along) - width / 2.0, away - radius
-    # parts of the shortest motion out: along the axis, and away from it
-    if beside <= 0.0 and beyond <= 0.0:
-        distance = max(beside, beyond)
-        sideways, outward = (1.0, 0.0) if beside > beyond else (0.0, 1.0)
-    else:
-        sideways, outward = max(beside, 0.0), max(beyond, 0.0)
-        distance = np.sqrt(sideways * sideways + outward * outward)
-        sideways, outward = sideways / distance, outward / distance
-    if along < 0.0:
-        sideways = -sideways
-    outward /= max(away, 1e-12)
-    return (
-        distance,
-        sideways * T[0, 2] + outward * x,
-        sideways * T[1, 2] + outward * y,
-        sideways * T[2, 2] + outward * z,
-    )
-
-
-@kernel("void(float64[:,::1],float64[:,::1],float64,float64,float64[::1],float64[:,::1])")
-def _from_drum(points, T, radius, width, distance, direction):  # type: ignore[no-untyped-def]
-    """Do `Drum.distances` for points in the base frame, shape (n, 3)."""
-    for k in range(len(points)):
-        x, y, z = points[k]
-        distance[k], x, y, z = _out_of_drum(x, y, z, T, radius, width)
-        direction[k, 0], direction[k, 1], direction[k, 2] = x, y, z
 
 
 @kernel(
@@ -65,7 +27,7 @@ def _beside_drum(  # type: ignore[no-untyped-def]
         x = T[0, 0] * p + T[0, 1] * q + T[0, 2] * r + T[0, 3]
         y = T[1, 0] * p + T[1, 1] * q + T[1, 2] * r + T[1, 3]
         z = T[2, 0] * p + T[2, 1] * q + T[2, 2] * r + T[2, 3]
-        away, x, y, z = _out_of_drum(x, y, z, T_base_drum, radius, width)
+        away, x, y, z = out_of_drum(x, y, z, T_base_drum, radius, width)
         distance[k] = boxes[k] = away
         for i in range(3):
             outward[k, i] = x * T[0, i] + y * T[1, i] + z * T[2, i]
@@ -74,33 +36,6 @@ def _beside_drum(  # type: ignore[no-untyped-def]
             for i in range(3):
                 along += outward[k, i] * axes[k, i, edge]
             boxes[k] -= abs(along) * half[k, edge]
-
-
-@dataclass(frozen=True, eq=False)
-class Drum:
-    """A cylinder about z of its own frame.
-
-    Attributes:
-        T_base_drum: Its pose, the origin in the middle, shape (4, 4).
-        radius: In [m].
-        width: In [m].
-    """
-
-    T_base_drum: Array
-    radius: float
-    width: float
-
-    def distances(self, p_base: Array) -> tuple[Array, Array]:
-        """Return signed distances of points in [m] and the directions in which they grow.
-
-        The points are in the base frame in [m], shape (n, 3).
-
-        Returns:
-            Distances, negative inside, shape (n,); unit vectors, shape (n, 3).
-        """
-        distance, direction = np.empty(len(p_base)), np.empty((len(p_base), 3))
-        _from_drum(p_base, self.T_base_drum, self.radius, self.width, distance, direction)
-        return distance, direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +90,7 @@ class Patches:
         given = T_base_workpiece, self.middle, self.axes, self.half
         wheel = drum.T_base_drum, drum.radius, drum.width
         _beside_drum(*given, *wheel, distance, outward, boxes)
-        return Beside(self, distance, outward, boxes)
+        return Beside(self, drum, drum.T_drum_base @ T_base_workpiece, distance, outward, boxes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,12 +103,16 @@ class Beside:
 
     Attributes:
         patches: The patches.
+        drum: The wheel.
+        T_drum_workpiece: Where the part is in its frame, shape (4, 4).
         distance: Of the middle of each in [m], shape (p,).
         outward: In which direction it grows, in the workpiece frame, shape (p, 3).
         boxes: Bounds by the boxes around the patches, shape (p,).
     """
 
     patches: Patches
+    drum: Drum
+    T_drum_workpiece: Array
     distance: Array
     outward: Array
     boxes: Array
@@ -181,6 +120,10 @@ class Beside:
     def of_corners(self, k: int) -> float:
         """Return a bound of one patch by its triangles, no less than that of its box."""
         return float(self.distance[k] + (self.patches.corners[k] @ self.outward[k]).min())
+
+    def is_beyond(self, k: int, within: float) -> bool:
+        """Return whether one patch is certainly farther away than some distance in [m]."""
+        return self.drum.are_beyond(self.patches.triangles[k], self.T_drum_workpiece, within)
 
 
 def _halved(triangles: Array) -> Iterator[Array]:

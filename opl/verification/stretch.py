@@ -22,16 +22,12 @@ from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion, MoveKind
 from opl.verification.extremes import Least
-from opl.verification.world import World
+from opl.verification.world import GAP_ACCURACY, World
 
 STEP = 1e-3  # [m]
 TURN = np.deg2rad(0.5)
 HORIZON = 0.1  # [m] clearances beyond this are not measured, only known to be more
 AHEAD = 0.03  # [m] measured beyond what is needed: for that long a pair can be left alone after
-# Bullet's distance of a mesh from the wheel is too small by up to 0.012 mm, its depth by 0.05 mm:
-# 2000 random configurations each in the V and S cells, against the exact distance. The rest is left
-# to triangles below the surface; whether the ground point lies on the wheel is checked without it
-GAP_ACCURACY = 1e-4  # [m]
 FARTHEST_GAP = 0.005  # [m] between part and wheel that is measured while grinding
 
 # What a kind of move means for the contact is written here anew: a mistake in `MoveKind` must not
@@ -192,6 +188,8 @@ class Replaying:
         free = not grinding and motion.kind[move] not in ALONG_LEAD
         off_wheel = cell.pairs.required.get(frozenset((PART, WHEEL)), cell.required_clearance)
         needed = off_wheel if free else -cell.max_belt_penetration
+        # triangles lie below the surface; whether the ground point lies on the wheel is checked
+        # without that
         farthest = self._allowed_error + GAP_ACCURACY if grinding and not touching_down else np.inf
         # where it may touch, what is not as deep as it ever was need not be known
         counts = needed if free else max(needed, self._found.gap.amount)

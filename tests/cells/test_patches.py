@@ -8,11 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from opl.cell.robot import forward_kinematics
 from opl.files.resources import folder
-from opl.geometry.frames import pose
+from opl.geometry.frames import inverse, pose
 from opl.geometry.wheel import ContactWheel
 from opl.job.load import load_job
+from opl.verification.drum import Drum
 from opl.verification.engine import pybullet, start
-from opl.verification.patches import MOST, Drum, Patches
+from opl.verification.patches import MOST, Patches
 from opl.verification.world import MARGIN, World
 from tests.support.bare_cells import random_configurations
 
@@ -67,6 +68,22 @@ def test_patches_are_all_the_triangles_and_their_bounds_hold():
         p_base = points @ T[:3, :3].T + T[:3, 3]
         between = np.maximum(np.maximum(low - p_base, p_base - high), 0.0)
         assert np.linalg.norm(between, axis=1).min() >= bound - 1e-12
+
+
+def test_triangles_are_said_to_be_beyond_only_where_no_point_is_nearer():
+    random = np.random.default_rng(3)
+    T = at([0.5, 0.1, 1.0], [0.15, 0.2, 0.3])
+    T_drum = inverse(DRUM.T_base_drum) @ T
+    weights = np.vstack([np.eye(3), random.dirichlet(np.full(3, 0.5), 2000)])
+    told = []
+    for _ in range(1500):
+        triangle = random.normal(scale=0.1, size=3) + random.normal(scale=0.02, size=(1, 3, 3))
+        points = weights @ triangle[0]
+        nearest = DRUM.distances(points @ T[:3, :3].T + T[:3, 3])[0].min()
+        assert not DRUM.are_beyond(triangle, T_drum, nearest + 1e-9)
+        if nearest > 0.0:
+            told.append(DRUM.are_beyond(triangle, T_drum, nearest - 1e-3))
+    assert len(told) > 300 and np.mean(told) > 0.9
 
 
 def whole_mesh(client, cell):

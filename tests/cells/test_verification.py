@@ -18,8 +18,8 @@ from opl.geometry.frames import pose
 from opl.geometry.shapes import Body, Cylinder
 from opl.motion.motion import MoveKind, TimedMotion, VerifiedMotion
 from opl.verification.replay import replay
-from opl.verification.stretch import GAP_ACCURACY, HORIZON, STEP, TURN
-from opl.verification.world import World
+from opl.verification.stretch import HORIZON, STEP, TURN
+from opl.verification.world import GAP_ACCURACY, World
 from tests.support.bare_cells import (
     NO_POINTS,
     bare_cell,

@@ -18,8 +18,7 @@ from opl.cell.wheel_distance import signed_wheel_distance
 from opl.files.resources import folder
 from opl.job.load import load_job
 from opl.run.surfacing import cut_surface
-from opl.verification.stretch import GAP_ACCURACY
-from opl.verification.world import World
+from opl.verification.world import GAP_ACCURACY, World
 from tests.support.bare_cells import random_configurations
 from tests.support.fcl_scene import FclScene
 
