@@ -94,8 +94,11 @@ def run_job(
     gc.set_threshold(BETWEEN_COLLECTIONS)
     workers = workers or os.cpu_count() or 1
     with ExitStack() as stack:
+        gc.disable()  # what is loaded makes next to no garbage, and much to go through
+        stack.callback(gc.enable)
         loaded, surfaced = stack.enter_context(opl.job_ahead(job, method, workers))
         gc.freeze()  # what is loaded by now stays: no collection goes through it, here or in a copy
+        gc.enable()
         folder = out or Path("out") / loaded.name
         claim = stack.enter_context(opl.claim_folder(folder, loaded.name))
         with progress_bar(quiet or as_json) as watch:
