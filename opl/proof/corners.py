@@ -248,6 +248,7 @@ def _with_bows(values: Array) -> Array:
 
 def _too_near(triangles: Triangles, corners: Sequence[Rounding]) -> Iterator[tuple[int, str]]:
     """Yield corners that bring bodies too near to each other, and which."""
+    triangles.forget()  # whoever looked at other corners before
     for k, corner in enumerate(corners):
         found = triangles.too_near(*corner.triangle(), corner.free)
         if found is not None:

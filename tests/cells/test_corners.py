@@ -279,3 +279,29 @@ def test_a_triangle_is_free_exactly_where_all_of_it_is(seed):
         assert missing <= FINEST
     else:
         assert found.distance < found.needed and missing > -0.01
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_was_measured_at_triangles_before_hides_nothing(seed):
+    random = np.random.default_rng(seed)
+    cell = bare_cell(block((0.1, 0.06, 0.04)), clearance=0.01)
+    way = np.cumsum(random.normal(scale=0.03, size=(30, 6)), axis=0)
+    triangles = np.array([0.2, -0.3, -0.4, 0.1, 0.5, 0.0]) + way[:, None]
+    triangles = triangles + random.normal(scale=0.02, size=(30, 3, 6))
+    T = forward_kinematics(cell.robot, triangles[15].mean(axis=0)) @ cell.T_flange_workpiece
+    cell = with_obstacle(cell, T[:3, 3] + np.array([0.0, 0.0, 0.09]), (0.02, 0.02, 0.02))
+    asked = []
+    with World(cell) as world:
+        measured = world.distance
+        world.distance = lambda *given: asked.append(given) or measured(*given)
+        following, found = Triangles(world), []
+        for corners in triangles:
+            found.append(following.too_near(corners, np.zeros(6), False))
+        n_following = len(asked)
+        for corners, known in zip(triangles, found, strict=True):
+            following.forget()
+            alone = following.too_near(corners, np.zeros(6), False)
+            assert (known is None) == (alone is None)
+            assert known is None or known.names == alone.names
+    assert None in found and any(found)
+    assert n_following < len(asked) - n_following
