@@ -128,13 +128,15 @@ def _matrices(
     """
     q = np.moveaxis(by_joint, 1, 2)
     start, sheets, copies = _unrolled(q, cell.robot.lower, cell.robot.upper)
-    found = []
-    for turns in sheets[:, None] + copies:
-        within = np.empty((len(q), len(turns), q.shape[1]), dtype=bool)
-        for block in blocks_of(len(q), q.shape[1] * len(turns)):
-            lifted = q[block].copy()
-            unroll(lifted, start)
+    all_turns = sheets[:, None] + copies
+    all_within = [np.empty((len(q), len(copies), q.shape[1]), dtype=bool) for _ in sheets]
+    for block in blocks_of(len(q), q.shape[1] * len(copies)):
+        lifted = q[block].copy()
+        unroll(lifted, start)
+        for turns, within in zip(all_turns, all_within, strict=True):
             within[block] = cell.within_limits(lifted[:, None] + turns[:, None])
+    found = []
+    for turns, within in zip(all_turns, all_within, strict=True):
         copy, position_index = np.nonzero(within.any(axis=0))
         if not len(position_index):
             continue
