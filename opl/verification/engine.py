@@ -6,6 +6,7 @@ straight to the file descriptors: in front of the JSON that a caller reads from 
 
 from __future__ import annotations
 
+import ctypes
 import os
 import sys
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ def _no_banners() -> Iterator[None]:
     """Send what C code prints to nowhere."""
     sys.stdout.flush()
     sys.stderr.flush()
+    _flush_c()
     kept = [os.dup(descriptor) for descriptor in (1, 2)]
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
@@ -24,10 +26,17 @@ def _no_banners() -> Iterator[None]:
             os.dup2(nowhere, descriptor)
         yield
     finally:
+        _flush_c()
         os.close(nowhere)
         for descriptor, original in zip((1, 2), kept, strict=True):
             os.dup2(original, descriptor)
             os.close(original)
+
+
+def _flush_c() -> None:
+    """Write out what C code has printed: into files and pipes it goes when the process ends."""
+    if os.name == "posix":
+        ctypes.CDLL(None).fflush(None)
 
 
 # Bullet ends its search for the nearest point where the next one is within 0.01 of its lengths of

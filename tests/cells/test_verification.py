@@ -1,6 +1,9 @@
 """The replay in PyBullet: it agrees with the other libraries, and catches every fault put in."""
 
 import ast
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -121,6 +124,14 @@ def test_every_pair_is_asked_that_the_rules_name():
     names = [piece[0] for piece in other.pieces]
     wanted = {(frozenset([names[a], names[b]]), needed) for a, b, needed in other.pairs}
     assert found == wanted
+
+
+def test_bullet_prints_no_banners_nor_leaves_them_to_the_end():
+    """In a pipe C code prints what it has gathered when the process ends, if not before."""
+    script = "from opl.verification.engine import start; start(); print('told')"
+    told = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=told)
+    assert ended.stdout == "told\n" and ended.stderr == ""
 
 
 def test_round_links_are_round():
