@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from opl.cell.full_turns import principal
 from opl.cell.parallel_axes import ParallelAxesArm
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.geometry.frames import Array
@@ -38,21 +37,7 @@ def inverse_kinematics(arm: Arm, Ts_base_flange: Array, near: Array | None = Non
     """
     shape = np.shape(Ts_base_flange)[:-2]
     nearby = np.broadcast_to(np.zeros(6) if near is None else near, (*shape, 6)).reshape(-1, 6)
-    if isinstance(arm, SphericalWristArm):
-        q = arm.solutions(np.reshape(Ts_base_flange, (-1, 4, 4)), nearby)
-        return q.reshape(*shape, N_IK_BRANCHES, 6)
-    # axes and origin of n poses, coordinates first and contiguous: numpy is fastest along n
-    columns = np.reshape(Ts_base_flange, (-1, 4, 4))[:, :3].transpose(2, 1, 0)
-    x, y, z, p = np.ascontiguousarray(columns, dtype=float)
-    signs, offsets = np.array(arm.signs), np.array(arm.offsets)
-    angles = arm.angles(x, y, z, p, (nearby * signs - offsets).T)
-    # an elbow out of reach takes the configuration with it
-    missing = np.isnan(angles[1])
-    q = np.empty((p.shape[1], 2, 2, 2, 6))  # pose, flip, back, elbow, joint
-    poses_last = np.moveaxis(q, 0, -1)
-    for joint, theta in enumerate(angles):
-        turned = principal((theta + offsets[joint]) * signs[joint])
-        poses_last[..., joint, :] = np.where(missing, np.nan, turned)
+    q = arm.solutions(np.reshape(Ts_base_flange, (-1, 4, 4)), nearby)
     return q.reshape(*shape, N_IK_BRANCHES, 6)
 
 

@@ -26,15 +26,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.full_turns import FULL_TURN
-from opl.cell.triangle import STRETCH_TOLERANCE
-from opl.files.kernels import kernel, kernels_are_loaded, prange, threads_are_allowed
+from opl.cell.many_poses import POSES, either, principal_angle, root, solve_poses
+from opl.files.kernels import kernel, prange
 from opl.geometry.frames import Array
 
 # Below this sine of theta5, axes 4 and 6 are one axis. Taking the wrist for straight there turns
 # the flange by no more than this in [rad]; just above it theta4 still stands out of round-off.
 _WRIST_TOLERANCE = 1e-12
-FEW = 4000  # poses that are not worth more than one thread: others wait for a while in vain
 
 
 @dataclass(frozen=True)
@@ -70,33 +68,17 @@ class SphericalWristArm:
         return float(np.hypot(self.a1 + self.c2 + np.hypot(self.a2, self.c3), self.b))
 
     def solutions(self, Ts_base_flange: Array, near: Array) -> Array:
-        """Return all configurations that put the flange at poses, limits not regarded.
-
-        The same to the last digit by compiled code, on all cores where there are many poses, and by
-        numpy until any compiled code is loaded.
+        """Return all configurations that put the flange at poses, as `solve_poses` does.
 
         Args:
             Ts_base_flange: Shape (n, 4, 4).
             near: Configurations nearby in [rad], shape (n, 6): joint 4 of the straight wrist.
-
-        Returns:
-            In (-pi, pi] [rad], shape (n, 8 slots, 6); NaN out of reach.
         """
         forearm, forearm_tilt = np.hypot(self.a2, self.c3), np.arctan2(self.a2, self.c3)
         sizes = np.array([self.a1, self.b, self.c1, self.c2, self.c4, forearm, forearm_tilt])
-        offsets, signs = np.array(self.offsets), np.array(self.signs, dtype=float)
-        theta4_free = near[:, 3] * signs[3] - offsets[3]
-        if not kernels_are_loaded():
-            T = np.moveaxis(Ts_base_flange, 0, -1)
-            found = np.empty((8, 6, len(Ts_base_flange)))
-            _solve.plain(*T[:3].reshape(12, -1), theta4_free, sizes, offsets, signs, found)
-            return np.ascontiguousarray(np.moveaxis(found, -1, 0))
-        q = np.empty((len(Ts_base_flange), 8, 6))
-        kernel = _solve_all if len(q) > FEW and threads_are_allowed() else _solve_few
-        # compiled for arrays that can be written to
-        Ts = np.array(Ts_base_flange, dtype=float, order="C")
-        kernel(Ts, theta4_free, sizes, offsets, signs, q)
-        return q
+        theta4_free = near[:, 3] * self.signs[3] - self.offsets[3]
+        kernels = _solve.plain, _solve_few, _solve_all
+        return solve_poses(*kernels, Ts_base_flange, theta4_free, sizes, self.offsets, self.signs)
 
     def margins(self, theta: Array) -> Array:
         """Return the figures of `singularity_margins` for angles in [rad], shape (..., 6)."""
@@ -114,24 +96,6 @@ class SphericalWristArm:
             ],
             axis=-1,
         )
-
-
-@kernel(for_arrays=np.where)
-def _either(condition, one, other):  # type: ignore[no-untyped-def]
-    """Return one of two numbers."""
-    return one if condition else other
-
-
-@kernel()
-def _principal(angle):  # type: ignore[no-untyped-def]
-    """Turn an angle into (-pi, pi], as `opl.cell.full_turns.principal`."""
-    return np.minimum(angle - FULL_TURN * np.ceil(angle / FULL_TURN - 0.5), np.pi)
-
-
-@kernel()
-def _from_zero(value, scale):  # type: ignore[no-untyped-def]
-    """Take values below 0 by round-off for 0, and others below 0 for NaN."""
-    return _either(value < -STRETCH_TOLERANCE * scale, np.nan, np.maximum(value, 0.0))
 
 
 @kernel()
@@ -155,7 +119,7 @@ def _solve(  # type: ignore[no-untyped-def]
     a1, b, c1, c2, c4 = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4]
     forearm, forearm_tilt = sizes[5], sizes[6]
     w0, w1, w2 = p0 - c4 * z0, p1 - c4 * z1, p2 - c4 * z2
-    in_front = np.sqrt(_from_zero(w0 * w0 + w1 * w1 - b * b, b * b))
+    in_front = root(w0 * w0 + w1 * w1 - b * b, b * b)
     heading = np.arctan2(w1, w0)
     cos4_free, sin4_free = np.cos(theta4_free), np.sin(theta4_free)
     for back in range(2):
@@ -165,7 +129,7 @@ def _solve(  # type: ignore[no-untyped-def]
         # law of cosines; the bend is the angle between upper arm and forearm, 0 when in line
         apart = forward * forward + up * up
         cos_bend = (apart - c2 * c2 - forearm * forearm) / (2.0 * c2 * forearm)
-        sin_bend = np.sqrt(_from_zero(1.0 - cos_bend * cos_bend, 2.0))
+        sin_bend = root(1.0 - cos_bend * cos_bend, 2.0)
         bend = np.arctan2(sin_bend, cos_bend)
         # the end stands off the upper arm by the angle that the bent forearm subtends
         to_end = np.arctan2(forward, up)
@@ -176,7 +140,7 @@ def _solve(  # type: ignore[no-untyped-def]
         z_ahead = cos1 * z0 + sin1 * z1
         x_left, y_left = cos1 * x1 - sin1 * x0, cos1 * y1 - sin1 * y0
         z_left = cos1 * z1 - sin1 * z0
-        turned1 = _principal((theta1 + offsets[0]) * signs[0])
+        turned1 = principal_angle((theta1 + offsets[0]) * signs[0])
         for elbow in range(2):
             side = 1.0 - 2.0 * elbow
             theta2 = to_end - side * subtended
@@ -186,30 +150,30 @@ def _solve(  # type: ignore[no-untyped-def]
             z_along = cos_tilt * z_ahead - sin_tilt * z2
             sin5 = np.sqrt(z_along * z_along + z_left * z_left)
             straight = sin5 < _WRIST_TOLERANCE
-            sin5 = _either(straight, 0.0, sin5)
-            length = _either(straight, 1.0, sin5)
-            cos4 = _either(straight, cos4_free, z_along / length)
-            sin4 = _either(straight, sin4_free, z_left / length)
+            sin5 = either(straight, 0.0, sin5)
+            length = either(straight, 1.0, sin5)
+            cos4 = either(straight, cos4_free, z_along / length)
+            sin4 = either(straight, sin4_free, z_left / length)
             sin6 = cos4 * x_left - sin4 * (cos_tilt * x_ahead - sin_tilt * x2)
             cos6 = cos4 * y_left - sin4 * (cos_tilt * y_ahead - sin_tilt * y2)
             theta4, theta6 = np.arctan2(sin4, cos4), np.arctan2(sin6, cos6)
             theta5 = np.arctan2(sin5, sin_tilt * z_ahead + cos_tilt * z2)
-            half_turn = _either(straight, 0.0, np.pi)
+            half_turn = either(straight, 0.0, np.pi)
             # an elbow out of reach takes the configuration with it
             missing = np.isnan(theta2)
-            turned2 = _principal((theta2 + offsets[1]) * signs[1])
-            turned3 = _principal((theta3 + offsets[2]) * signs[2])
+            turned2 = principal_angle((theta2 + offsets[1]) * signs[1])
+            turned3 = principal_angle((theta3 + offsets[2]) * signs[2])
             for flip in range(2):
                 slot = 4 * flip + 2 * back + elbow
-                turned4 = _principal((theta4 + flip * half_turn + offsets[3]) * signs[3])
-                turned5 = _principal(((1.0 - 2.0 * flip) * theta5 + offsets[4]) * signs[4])
-                turned6 = _principal((theta6 + flip * half_turn + offsets[5]) * signs[5])
-                q[slot, 0] = _either(missing, np.nan, turned1)
-                q[slot, 1] = _either(missing, np.nan, turned2)
-                q[slot, 2] = _either(missing, np.nan, turned3)
-                q[slot, 3] = _either(missing, np.nan, turned4)
-                q[slot, 4] = _either(missing, np.nan, turned5)
-                q[slot, 5] = _either(missing, np.nan, turned6)
+                turned4 = principal_angle((theta4 + flip * half_turn + offsets[3]) * signs[3])
+                turned5 = principal_angle(((1.0 - 2.0 * flip) * theta5 + offsets[4]) * signs[4])
+                turned6 = principal_angle((theta6 + flip * half_turn + offsets[5]) * signs[5])
+                q[slot, 0] = either(missing, np.nan, turned1)
+                q[slot, 1] = either(missing, np.nan, turned2)
+                q[slot, 2] = either(missing, np.nan, turned3)
+                q[slot, 3] = either(missing, np.nan, turned4)
+                q[slot, 4] = either(missing, np.nan, turned5)
+                q[slot, 5] = either(missing, np.nan, turned6)
 
 
 @kernel()
@@ -221,18 +185,13 @@ def _solve_one(T, theta4_free, sizes, offsets, signs, q):  # type: ignore[no-unt
     )  # fmt: skip
 
 
-_POSES = (
-    "void(float64[:,:,::1],float64[::1],float64[::1],float64[::1],float64[::1],float64[:,:,::1])"
-)
-
-
-@kernel(_POSES, early=True)
+@kernel(POSES, early=True)
 def _solve_few(Ts, theta4_free, sizes, offsets, signs, q):  # type: ignore[no-untyped-def]
     for n in range(len(Ts)):
         _solve_one(Ts[n], theta4_free[n], sizes, offsets, signs, q[n])
 
 
-@kernel(_POSES, threads=True, early=True)
+@kernel(POSES, threads=True, early=True)
 def _solve_all(Ts, theta4_free, sizes, offsets, signs, q):  # type: ignore[no-untyped-def]
     for n in prange(len(Ts)):
         _solve_one(Ts[n], theta4_free[n], sizes, offsets, signs, q[n])

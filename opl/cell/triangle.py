@@ -34,20 +34,6 @@ def bend_to(forward: Array, up: Array, upper_arm: float, forearm: float) -> tupl
     return tilt, bend
 
 
-def heading_to(p: Array, lateral: float) -> tuple[Array, Array]:
-    """Return the two angles of axis 1 with points so far [m] to the left of the plane of the arm.
-
-    The points are in the base frame in [m], shape (3, n).
-
-    Returns:
-        Angle of axis 1 in [rad], and how far ahead of axis 1 the point then lies in [m], not
-        negative and negative; shape (2, 1, n), NaN out of reach.
-    """
-    ahead = np.sqrt(from_zero(p[0] ** 2 + p[1] ** 2 - lateral**2, lateral**2))
-    ahead = np.stack([ahead, -ahead])[:, None]  # front, back
-    return np.arctan2(p[1], p[0]) - np.arctan2(lateral, ahead), ahead
-
-
 def from_zero(value: Array, scale: float) -> Array:
     """Return values with those below 0 by round-off as 0, and the others below 0 as NaN."""
     return np.where(value < -STRETCH_TOLERANCE * scale, np.nan, np.maximum(value, 0.0))

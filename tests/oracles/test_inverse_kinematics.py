@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from opl.cell import spherical_wrist
+from opl.cell import many_poses
 from opl.cell.full_turns import full_turns
 from opl.cell.inverse_kinematics import N_IK_BRANCHES, ik_branch_name, inverse_kinematics
 from opl.cell.robot import forward_kinematics, load_robot
@@ -18,6 +18,7 @@ from tests.support.closed_forms import difference, opw_solutions
 
 MH24 = load_robot("mh24")
 ARM = MH24.arm
+UR10E = load_robot("ur10e").arm
 REACH = ARM.c2 + np.hypot(ARM.a2, ARM.c3)  # of the wrist centre from axis 2
 STRETCHED_U = np.pi / 2 + np.arctan2(ARM.a2, ARM.c3)  # elbow straight
 
@@ -49,7 +50,7 @@ def assert_reaches(q, T_base_flange, atol=1e-11):
 # compiled, and by numpy
 
 
-@pytest.mark.parametrize("arm", [ARM, ODD_ARM], ids=["mh24", "odd"])
+@pytest.mark.parametrize("arm", [ARM, ODD_ARM, UR10E], ids=["mh24", "odd", "ur10e"])
 def test_compiled_code_numpy_and_threads_give_the_same_to_the_last_digit(monkeypatch, arm):
     q = random_configurations(3000)
     q[:300, 4] = 0.0  # straight wrist
@@ -59,11 +60,11 @@ def test_compiled_code_numpy_and_threads_give_the_same_to_the_last_digit(monkeyp
     Ts[2500:, :3, 3] *= 1.3
     near = random_configurations(3000, seed=1)
     for nearby in (None, near):
-        monkeypatch.setattr(spherical_wrist, "kernels_are_loaded", lambda: False)
+        monkeypatch.setattr(many_poses, "kernels_are_loaded", lambda: False)
         by_numpy = inverse_kinematics(arm, Ts, nearby)
-        monkeypatch.setattr(spherical_wrist, "kernels_are_loaded", lambda: True)
+        monkeypatch.setattr(many_poses, "kernels_are_loaded", lambda: True)
         for few in (10_000, 100):
-            monkeypatch.setattr(spherical_wrist, "FEW", few)
+            monkeypatch.setattr(many_poses, "FEW", few)
             np.testing.assert_array_equal(inverse_kinematics(arm, Ts, nearby), by_numpy)
         assert 0.0 < np.isnan(by_numpy).mean() < 1.0
 
