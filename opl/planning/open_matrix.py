@@ -72,9 +72,11 @@ class OpenMatrix:
         """The blocked keys, sorted, as the searches take them."""
         count = len(self.blocked) + len(self.shut)
         if self._counted != count:
-            blocked = np.fromiter(self.blocked, np.int64, len(self.blocked))
-            both = np.union1d(self.shut, blocked) if len(blocked) else self.shut
-            self._sorted, self._counted = both, count
+            blocked = np.sort(np.fromiter(self.blocked, np.int64, len(self.blocked)))
+            # those shut may be millions: into their order, which they are in
+            at = np.searchsorted(self.shut, blocked)
+            new = np.append(self.shut, -1)[at] != blocked
+            self._sorted, self._counted = np.insert(self.shut, at[new], blocked[new]), count
         return self._sorted
 
     @property
