@@ -30,7 +30,7 @@ from opl.search.walls import Piece
 AT_ONCE = 4  # configurations of a lead that are looked at together
 CELLS_OF_WORK = 15  # enclosed along a lead, that cost a unit of work
 NODES_OF_WORK = 100  # looked at along a lead, likewise
-HALVINGS = 10  # of the way between two contact positions of the field
+PARTS, ROUNDS = 8, 3  # into which the way between two contact positions is cut, how often
 RESERVE = 3e-4  # [m] of clearance: a motion may come nearer between two samples than at both
 # places of the part that each lead goes through as if they were ground, shape (k, 4, 4)
 Leads = tuple[Array, ...]
@@ -112,10 +112,14 @@ class ShutLeads:
         shut = self._shut(T, family, flip, t, t, reserve)
         before = np.flatnonzero(shut[1:] != shut[:-1])
         low, high = t[before], t[before + 1]
-        for _ in range(HALVINGS):
-            middle = (low + high) / 2.0
-            as_before = self._shut(T, family, flip, middle, middle, reserve) == shut[before]
-            low, high = np.where(as_before, middle, low), np.where(as_before, high, middle)
+        for _ in range(ROUNDS if len(before) else 0):
+            inside = low + np.arange(1, PARTS)[:, None] / PARTS * (high - low)
+            there = self._shut(T, family, flip, inside.ravel(), inside.ravel(), reserve)
+            as_before = there.reshape(inside.shape) == shut[before]
+            # up to the first change
+            kept = np.logical_and.accumulate(as_before, axis=0).sum(axis=0)
+            ends, own = np.concatenate([low[None], inside, high[None]]), np.arange(len(before))
+            low, high = ends[kept, own], ends[kept + 1, own]
         return bool(shut[0]), np.where(shut[before], high, low)
 
     def _shut(
