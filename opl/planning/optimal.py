@@ -84,10 +84,10 @@ class OptimalSearch:
         self.proof = self._new_proof(largest)
         self._places: set[float] = set()
         self._work = Work(problem.scene, self._walls, self._families, self._tracks)
-        self._work.begin_again(self.proof)
         self._rectangles = Rectangles(self._sampler, points, whole_cells(problem.cell.wheel))
         self._hope(self._families.smallest_grown())
-        self.proof.threshold = min(self.proof.threshold, self._hoped.guess(0.0, largest))
+        hoped = min(self.proof.threshold, self._hoped.guess(0.0, largest))
+        self._begin_again(self._new_proof(hoped), hoped)
         first = [0.0, float(len(points) // 2), float(len(points) - 1)]
         self._add(list(dict.fromkeys(first + self._families.unreached())))
 
@@ -249,10 +249,11 @@ class OptimalSearch:
         self._places.clear()
         self.proof.put_back()  # before what is proven is noted
         self._hoped = Hope(self.plan is not None)
-        minding = self._new_proof(self._value)
+        hoped = self._hoped.guess(self.lower_bound, self._value)
+        minding = self._new_proof(hoped)
         for wall in self.proof.walls:
             minding.add(wall)
-        self._begin_again(minding, self._hoped.guess(self.lower_bound, self._value))
+        self._begin_again(minding, hoped)
 
     def _new_proof(self, threshold: float) -> BoxProof:
         """Return a proof without walls, for boxes below a size."""

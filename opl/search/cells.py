@@ -17,6 +17,7 @@ from opl.geometry.frames import Array
 from opl.search.box import JointBox
 from opl.search.forbidden import Forbidden
 from opl.search.limit_cuts import within_limits
+from opl.search.reach import Reach, around_families, ends_of
 from opl.search.walls import Image, Piece, Wall
 
 COLUMNS = 26  # start 0:6, end 6:12, pad_low 12:18, pad_high 18:24, places 24 and 25
@@ -37,6 +38,7 @@ class Cells:
         cut: Cuts a cell of a wall into smaller ones.
         forbidden: Tells which parts of cells are forbidden; None to allow all.
         limits: As of `BoxProof`; what is beyond all of them is no part of a cell.
+        reach: Boxes of this size or more in [rad] are not asked about.
 
     Attributes:
         walls: The walls.
@@ -44,6 +46,7 @@ class Cells:
         table: The cells, shape (capacity, 26); rows not in use are at its end.
         entered: How many cells were entered into the table, again or for the first time.
         changes: How often cells in the table became shorter.
+        reach: Tells which images are left out.
     """
 
     def __init__(
@@ -52,8 +55,10 @@ class Cells:
         cut: Callable[[Piece, int], Sequence[Piece]],
         forbidden: Forbidden | None,
         limits: Sequence[JointBox],
+        reach: float = np.inf,
     ) -> None:
         self._limits = limits
+        self.reach = Reach(reach)
         self._images = images
         self._cut = cut
         self._forbidden = forbidden
@@ -86,14 +91,15 @@ class Cells:
         """Take in a wall."""
         first, low, high = self._n_sources, [np.empty((0, 6))], [np.empty((0, 6))]
         both = np.arange(1 if self._forbidden is None else self._forbidden.n_flips)
+        around = around_families(wall.pieces)
+        near = {one: self.reach.near(around, one, *self._moves_of(one)[:2]) for one in around}
         for piece in wall.pieces:
-            sign, shift, _ = self._moves_of(piece.family)
-            ends = np.stack([piece.low.min(axis=0), piece.high.max(axis=0)])
-            moved = np.repeat(sign[:, None] * ends + shift[:, None], len(both), axis=0)
+            numbers = near[piece.family]
+            sign, shift, _ = (of[numbers] for of in self._moves_of(piece.family))
+            moved = np.repeat(sign[:, None] * ends_of(piece) + shift[:, None], len(both), axis=0)
             low.append(moved.min(axis=1))
             high.append(moved.max(axis=1))
-            numbers = np.arange(len(sign))
-            self._new_sources(piece, np.repeat(numbers, len(both)), np.tile(both, len(sign)))
+            self._new_sources(piece, np.repeat(numbers, len(both)), np.tile(both, len(numbers)))
         sources = np.arange(first, self._n_sources)
         kinds = self._sources[sources, KIND]
         self._of_wall.append((sources, kinds, np.concatenate(low), np.concatenate(high)))
@@ -185,6 +191,13 @@ class Cells:
             self._enter(same.start + np.flatnonzero(alike))
             self.changes += int((rows != known).any())
         return self.changes > before
+
+    def reaching(self, reach: float) -> Cells:
+        """Return the cells of the same walls for boxes up to another size in [rad]."""
+        others = Cells(self._images, self._cut, self._forbidden, self._limits, reach)
+        for wall in self.walls:
+            others.add(wall)
+        return others
 
     def _moves_of(self, family: int) -> tuple[Array, Array, np.ndarray]:
         """Return sign, shift, shape (n, 6), and flip, shape (n,), of the images of a family."""

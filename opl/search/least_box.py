@@ -34,6 +34,7 @@ NUMBERS_OF_AN_ENTRY = 2500  # that entering a cell into the table is worth
 MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 TRIMMED = 0.9  # of the cells: more left, and trimming goes on no longer
+FURTHER = 1.5  # times a size: cells are at hand for boxes up to there
 FEWEST_UNSEEN = 8  # subproblems split before a box is shown that is not settled
 FEWEST_BEFORE_ANEW = 256  # subproblems of a tree that is begun anew for walls added since
 CLOSER = 2, 3  # looks at what is forbidden, each closer than the one before
@@ -63,7 +64,7 @@ class BoxProof:
         forbidden: Forbidden | None = None,
         limits: Sequence[JointBox] = UNLIMITED,
     ) -> None:
-        self._cells = Cells(images, cut, forbidden, limits)
+        self._cells = Cells(images, cut, forbidden, limits, FURTHER * threshold)
         self._gap = gap
         self._limits = limits
         self._tells_flips = forbidden is not None and len(limits) > 1
@@ -72,9 +73,8 @@ class BoxProof:
     def _begin(self, threshold: float) -> None:
         self.threshold = threshold
         self.stuck = np.inf  # least bound of what could not be split
-        self.subproblems = 0
+        self.subproblems = self._count = self._unseen = 0
         self.work = 0.0  # how many numbers were worked on, about
-        self._count = self._unseen = 0
         self._show_after = FEWEST_UNSEEN
         self._anew_after = FEWEST_BEFORE_ANEW
         self._plant(0.0)
@@ -89,6 +89,8 @@ class BoxProof:
     def again(self, threshold: float) -> BoxProof:
         """Return the proof begun again for boxes below another size, with the walls of this one."""
         other = copy(self)
+        if threshold > self._cells.reach.size:
+            other._cells = self._cells.reaching(FURTHER * threshold)
         other._begin(threshold)
         return other
 
@@ -161,8 +163,7 @@ class BoxProof:
     @property
     def outdated(self) -> bool:
         """Whether the last candidate may be bounded better now."""
-        found = self._kept.found
-        return found is not None and self._sharper(found)
+        return self._kept.found is not None and self._sharper(self._kept.found)
 
     def pressing(self) -> Array:
         """Return how hard each wall presses on the faces of the last candidate's box.

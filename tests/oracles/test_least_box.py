@@ -102,3 +102,54 @@ def test_walls_added_late_and_trees_begun_anew_lead_to_the_same_bound(seed, in_p
     assert late == pytest.approx(at_once, rel=2.0 * GAP)
     samples = grown(np.stack([curve.at(np.linspace(-1.0, 1.0, SAMPLES)) for curve in curves]))
     assert late <= samples
+
+
+TURNED = tuple(
+    Image(np.ones(6), 2.0 * np.pi * np.array([one, other, 0, 0, 0, 0]), (0, one, other))
+    for one in sorted(range(-2, 3), key=abs)
+    for other in sorted(range(-2, 3), key=abs)
+)
+
+
+def closed_at(proof):
+    """Return the least box of a proof in the images of its walls, nothing added on the way."""
+    while not proof.closed:
+        candidate = proof.take_next()
+        if candidate is None:
+            continue
+        if not candidate.settled:
+            proof.split()
+            continue
+        size = float((candidate.high - candidate.low).sum())
+        if size >= proof.threshold:
+            proof.give_up()
+            continue
+        proof.threshold = size
+        proof.put_back()
+    return proof.lower_bound
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_images_out_of_reach_do_not_matter_and_are_there_where_larger_boxes_are_asked_about(seed):
+    random = np.random.default_rng(seed)
+    curves = [Bent(random) for _ in range(4)]
+    # so far apart that full turns bring some of them nearer
+    for curve in curves:
+        curve._q[0, :2] += 2.0 * np.pi * random.integers(-1, 2, size=2)
+    walls, cut = crossing(curves, False)
+
+    def proof_up_to(threshold):
+        proof = BoxProof(lambda _: TURNED, cut, threshold, GAP)
+        for wall in walls:
+            proof.add(wall)
+        return proof
+
+    every = proof_up_to(100.0)
+    least = closed_at(every)
+    few = proof_up_to(1.01 * least)
+    assert few._cells._n_sources < every._cells._n_sources
+    assert closed_at(few) == pytest.approx(least, rel=2.0 * GAP)
+    # none is so small; begun again for larger ones it has the images that those need
+    small = proof_up_to(0.5 * least)
+    assert closed_at(small) >= 0.5 * least * (1.0 - 2.0 * GAP)
+    assert closed_at(small.again(2.0 * least)) == pytest.approx(least, rel=2.0 * GAP)
