@@ -13,8 +13,10 @@ import numpy as np
 
 from opl.planning.barriers import all_sides
 from opl.planning.box_columns import ColumnSampler
+from opl.planning.box_nodes import TrackSearch
 from opl.planning.box_track import BoxTracks
 from opl.planning.columns import ColumnWalls
+from opl.planning.costs import PushAway
 from opl.planning.cut_cells import whole_cells
 from opl.planning.families import Families, few_columns, grown
 from opl.planning.holders import Holder, holders
@@ -34,9 +36,6 @@ from opl.search.forbidden import Forbidden
 from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
 
-PROOF_SHARE = 0.9  # of the widening: how far the bound may stay below the path
-ROOM_SHARE = 0.4  # of the widening: how much larger than its box the path may be
-MISSED = 0.05  # of the widening: what a box may miss a cutter point by and still hold it
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
 CLEARLY_LESS = 0.005  # of the best: what a motion in a box not settled should be better by
 MOST_IN_VAIN = 2  # such boxes in which no motion is free: what collides is left out from then on
@@ -73,7 +72,9 @@ class OptimalSearch:
         self._families = Families(images, q, problem.cuts, points.pass_index, t, sides)
         self._sampler = ColumnSampler(problem, seams, images.limits)
         costs, most_change = settings.costs, settings.max_contact_change
-        self._tracks = BoxTracks(problem, self._sampler, costs, most_change, most)
+        push_away = PushAway(problem.cell, costs)
+        self._search = TrackSearch(problem, self._sampler, costs, most_change, most, push_away)
+        self._tracks = BoxTracks(self._search)
         self.plan = fallback
         self._largest = largest
         self._proven = 0.0
@@ -83,7 +84,7 @@ class OptimalSearch:
         self._in_vain = 0  # boxes in which none of these was free
         self.proof = self._new_proof(largest)
         self._places: set[float] = set()
-        self._work = Work(problem.scene, self._walls, self._families, self._tracks)
+        self._work = Work(problem.scene, self._walls, self._families, self._search)
         self._rectangles = Rectangles(self._sampler, points, whole_cells(problem.cell.wheel))
         self._hope(self._families.smallest_grown())
         hoped = min(self.proof.threshold, self._hoped.guess(0.0, largest))
@@ -127,15 +128,15 @@ class OptimalSearch:
             return
         box = JointBox(candidate.low, candidate.high)
         self._sampler.mirrored = candidate.mirrored
-        share = MISSED * self._settings.widen if candidate.settled else CLEARLY_MISSED
-        allowed = share * self.proof.threshold
+        most = self.proof.threshold
+        allowed = self._settings.missed(most) if candidate.settled else CLEARLY_MISSED * most
         placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
         if not candidate.settled:
             self._go_into(box, placements, missed[:MOST_ADDED])
             return
-        best, collided = self.plan, self._tracks.collided
+        best, collided = self.plan, self._search.collided
         learnt = self._learn(box, placements, missed[:MOST_ADDED])
-        in_vain = self.plan is best and self._tracks.collided > collided
+        in_vain = self.plan is best and self._search.collided > collided
         if in_vain and not self._sampler.collisions:
             self._mind_collisions()
         elif learnt or self.proof.outdated:
@@ -170,40 +171,42 @@ class OptimalSearch:
 
         Otherwise nothing was learnt of the box: there is a motion, or nothing more to be found.
         """
-        if placements:
-            columns, passages, inner = self._look(box, placements)
-            self._hope(inner)
-            allowed = MISSED * self._settings.widen * self.proof.threshold
-            known, new = columns.missed(box, self._places, allowed)
-            if not missed and (self.proof.clear(known) or self.proof.split_keys(known)):
-                return True
-            missed = missed or new[:MOST_ADDED]
-        if missed:
-            self._add(missed)
-            return True
         if not placements:
-            return False
-        if passages.walls:
+            self._add(missed)
+            return bool(missed)
+        columns, passages, inner = self._look(box, placements)
+        self._hope(inner)
+        allowed = self._settings.missed(self.proof.threshold)
+        known, new = columns.missed(box, self._places, allowed)
+        if not missed and (self.proof.clear(known) or self.proof.split_keys(known)):
+            return True
+        missed = missed or new[:MOST_ADDED]
+        if not missed and not passages.walls:
+            return self._try(columns, passages, inner)
+        # hardly larger it may hold all
+        most = box.size + self._settings.room(box.size)
+        fits = not missed or (inner is not None and inner.size < most)
+        if passages.open and fits and self._work.left_for_early:
             best = self.plan
-            if passages.open and self._work.left_for_early:
-                with self._work.early():
-                    if self._try(columns, passages, inner) or self.plan is not best:
-                        return True
+            with self._work.early():
+                if self._try(columns, passages, inner) or self.plan is not best:
+                    return True
+        if not missed:
             chains = passages.walls[:MOST_ADDED]
             self._rectangles.take_in(chains)
             for wall in self._walls.walls(chains):
                 self.proof.add(wall)
-            return True
-        return self._try(columns, passages, inner)
+        self._add(missed)
+        return True
 
     def _look(
         self, box: JointBox, placements: Sequence[Placement]
     ) -> tuple[Columns, Passages, JointBox | None]:
         """Return places near a box, the ways between them, and the box grown for both."""
-        allowed = MISSED * self._settings.widen * box.size
+        allowed, room = self._settings.missed(box.size), self._settings.room(box.size)
         columns = self._sampler.columns(box, placements, self._rectangles.places)
         inner = grown(columns.q, columns.free, box)
-        passages = self._rectangles.held(inner or box, placements, allowed, self._room(box))
+        passages = self._rectangles.held(inner or box, placements, allowed, room)
         return columns, passages, None if inner is None else passages.grown(inner)
 
     def _shut(self, box: JointBox, placements: Sequence[Placement]) -> bool:
@@ -228,10 +231,10 @@ class OptimalSearch:
                 columns, _, inner = self._look(larger, placements)
                 if inner is not None:
                     self._hope(inner)
-                    room, collided = self._room(inner), self._tracks.collided
+                    room, collided = self._settings.room(inner.size), self._search.collided
                     found = self._tracks.plan(columns, NO_PASSAGES, inner, room, lambda _: False)
                     self.keep(found)
-                    self._in_vain += int(found is None and self._tracks.collided > collided)
+                    self._in_vain += int(found is None and self._search.collided > collided)
         if self.proof.threshold < threshold:
             self.proof.show_soon()
 
@@ -257,9 +260,8 @@ class OptimalSearch:
 
     def _new_proof(self, threshold: float) -> BoxProof:
         """Return a proof without walls, for boxes below a size."""
-        images, gap = self._walls.images, PROOF_SHARE * self._settings.widen
-        kept = self.forbidden, images.limits
-        return BoxProof(images.of, self._walls.finer, threshold, gap, *kept)
+        images, gap = self._walls.images, self._settings.gap
+        return BoxProof(images.of, self._walls.finer, threshold, gap, self.forbidden, images.limits)
 
     def _hope_for_less(self) -> None:
         """Begin the proof again: no motion is as good as was hoped."""
@@ -279,7 +281,7 @@ class OptimalSearch:
 
     def _try(self, columns: Columns, passages: Passages, box: JointBox | None) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
-        if box is None:
+        if box is None or self._tracks.tried(columns, passages, box):
             return False
         learnt = False
 
@@ -288,11 +290,8 @@ class OptimalSearch:
             learnt = self._rectangles.refine(bulges, box)
             return learnt
 
-        self.keep(self._tracks.plan(columns, passages, box, self._room(box), learn))
+        self.keep(self._tracks.plan(columns, passages, box, self._settings.room(box.size), learn))
         return learnt
-
-    def _room(self, box: JointBox) -> float:
-        return ROOM_SHARE * self._settings.widen * box.size
 
     def keep(self, found: Plan | None) -> None:
         """Keep a motion that is better than the best."""

@@ -76,6 +76,10 @@ class ObjectiveWeights:
         )
 
 
+# of the widening
+PROOF_SHARE, ROOM_SHARE, MISSED = 0.9, 0.4, 0.05
+
+
 @dataclass(frozen=True)
 class OptimalSettings:
     """What is wanted of the optimal method.
@@ -92,3 +96,16 @@ class OptimalSettings:
     max_contact_change: float
     costs: CostWeights
     max_subproblems: int
+
+    @property
+    def gap(self) -> float:
+        """Fraction by which the bound may stay below the path."""
+        return PROOF_SHARE * self.widen
+
+    def missed(self, size: float) -> float:
+        """Return what a box of a size in [rad] may miss a cutter point by and still hold it."""
+        return MISSED * self.widen * size
+
+    def room(self, size: float) -> float:
+        """Return how much larger than its box of a size in [rad] a path may be."""
+        return ROOM_SHARE * self.widen * size

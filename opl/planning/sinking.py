@@ -22,13 +22,15 @@ from opl.motion.motion import Phase
 from opl.planning.open_matrix import Track
 from opl.planning.plan import Same
 from opl.planning.problem import GrindingProblem
-from opl.planning.rows import SMALLEST_EDGE, Bulge
+from opl.planning.rows import MOST_PARTS, SMALLEST_EDGE, Bulge
 from opl.planning.track_check import Collides
 
 LOOKS = 8  # along a move that sinks too deep
 ALONG = Phase.APPROACHING, Phase.GRINDING, Phase.RETRACTING
 USELESS = 0.5  # of what was too deep: where so much still is, sparing depth is of no use
 MORE = 1.25  # times what was too deep: what is spared for it
+HARDLY = 1e-6  # [m] too deep: what can be spared nearly anywhere
+DEEP = 2e-5  # [m] too deep: what had better not be spared where places help
 
 
 def sunk_between(problem: GrindingProblem, blocked: Collides) -> Array:
@@ -85,6 +87,19 @@ def struck_between(problem: GrindingProblem, collided: Mapping[Same, Collides]) 
     return struck
 
 
+def passed_where_struck(collided: Mapping[Same, Collides]) -> set[tuple[int, float]]:
+    """Return after which columns, and at which contact positions, configurations collide."""
+    found = set()
+    for blocked in collided.values():
+        motion = blocked.motion
+        for fault in blocked.faults:
+            place = motion.cutter_point[fault.move]
+            grinding = motion.phase[fault.move] is Phase.GRINDING
+            if fault.at_end and grinding and place != np.rint(place):
+                found.add((int(place), float(motion.contact_position[fault.move])))
+    return found
+
+
 def first_sunk(problem: GrindingProblem, collided: Mapping[Same, Collides]) -> Array | None:
     """Return `sunk_between` of the first motion that sinks, None if none does."""
     for blocked in collided.values():
@@ -120,10 +135,20 @@ def spare_for(spare: Array, sunk: Array) -> Array:
         sunk: As of `sunk_between`.
     """
     here = np.maximum(np.append(sunk, 0.0), np.append(0.0, sunk))
-    return np.asarray(spare + MORE * here)
+    return np.asarray(spare + np.where(here > 0.0, np.maximum(MORE * here, HARDLY), 0.0))
 
 
-def places_for(places: Array, wanted: np.ndarray) -> Sequence[Bulge]:
-    """Return where places are wanted: between which a motion sinks too deep, or bodies collide."""
-    edges = np.flatnonzero((wanted > 0.0) & (np.diff(places) > SMALLEST_EDGE)).tolist()
-    return [Bulge(float(places[k]), float(places[k + 1]), 2, False) for k in edges]
+def places_for(places: Array, sunk: Array) -> Sequence[Bulge]:
+    """Return where places are wanted to sink less, as of `sunk_between`."""
+    # it falls with the square
+    parts = np.clip(np.ceil(np.sqrt(sunk / HARDLY)), 2, MOST_PARTS).astype(int)
+    return places_between(places, sunk > 0.0, parts)
+
+
+def places_between(
+    places: Array, wanted: np.ndarray, parts: np.ndarray | int = 2
+) -> Sequence[Bulge]:
+    """Return between which places others are wanted, shape (n - 1,), and into how many parts."""
+    edges = np.flatnonzero(wanted & (np.diff(places) > SMALLEST_EDGE)).tolist()
+    parts = np.broadcast_to(parts, wanted.shape)
+    return [Bulge(float(places[k]), float(places[k + 1]), int(parts[k]), False) for k in edges]

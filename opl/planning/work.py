@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from opl.planning.box_track import BoxTracks
+from opl.planning.box_nodes import TrackSearch
 from opl.planning.columns import ColumnWalls
 from opl.planning.families import Families
 from opl.planning.plan import WORK_OF_A_CHECK
@@ -42,7 +42,7 @@ class Work:
     """
 
     def __init__(
-        self, scene: PlanningScene, walls: ColumnWalls, families: Families, tracks: BoxTracks
+        self, scene: PlanningScene, walls: ColumnWalls, families: Families, tracks: TrackSearch
     ) -> None:
         self._scene, self._walls = scene, walls
         self._families, self._tracks = families, tracks

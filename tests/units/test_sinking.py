@@ -9,13 +9,18 @@ from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import inverse
 from opl.motion.collision_check import CollidingMove
 from opl.motion.motion import Phase
-from opl.planning import box_track
+from opl.planning import box_nodes
+from opl.planning.box_nodes import BoxNodes, TrackSearch
 from opl.planning.box_track import BoxTracks
+from opl.planning.costs import PushAway
 from opl.planning.multi_start import tracks_from_best_start
 from opl.planning.open_matrix import open_matrices
 from opl.planning.passages import NO_PASSAGES
 from opl.planning.sinking import (
+    HARDLY,
     MORE,
+    passed_where_struck,
+    places_between,
     places_for,
     shallower,
     spare_for,
@@ -92,6 +97,49 @@ def test_depth_is_spared_at_both_ends_and_where_it_is_of_no_use_places_are_taken
     assert not places_for(np.array([0.0, 1.0, 1.001, 2.0, 3.0]), sunk)
 
 
+def test_what_sinks_deeper_is_cut_into_more_parts_and_what_hardly_does_is_spared_a_little_more():
+    places = np.arange(5.0)
+    sunk = HARDLY * np.array([0.1, 9.0, 30.0, 1e4])
+    assert [one.parts for one in places_for(places, sunk)] == [2, 3, 6, 8]
+    struck = np.array([False, True, False, True])
+    told = [(one.first, one.last, one.parts) for one in places_between(places, struck)]
+    assert told == [(1.0, 2.0, 2), (3.0, 4.0, 2)]
+    spare = spare_for(np.zeros(5), sunk[:1].repeat(4) * [1, 0, 0, 0])
+    np.testing.assert_allclose(spare, [HARDLY, HARDLY, 0.0, 0.0, 0.0])
+
+
+def test_where_configurations_between_columns_collide_is_told_with_their_contact_positions():
+    _, motion, grinding = motion_of_a_track()
+    place = motion.cutter_point
+    between = [k for k in grinding if place[k] != np.rint(place[k])][:2]
+    at_column = next(k for k in grinding if k not in between and place[k] == np.rint(place[k]))
+    faults = [CollidingMove(k, ("R_link", WHEEL), True) for k in (*between, at_column)]
+    faults.append(CollidingMove(between[0] + 1, ("R_link", WHEEL), False))
+    found = passed_where_struck({(b"", b""): Collides(motion, tuple(faults))})
+    assert found == {(int(place[k]), float(motion.contact_position[k])) for k in between}
+
+
+def test_edges_that_pass_where_a_motion_collided_are_blocked_where_no_place_can_be_taken_in():
+    problem, settings = small_problem(), v_job().search.optimal
+    box, sampler, columns = near_a_box()
+    most, push_away = Travel(np.inf, np.inf), PushAway(problem.cell, settings.costs)
+    search = TrackSearch(problem, sampler, settings.costs, np.inf, most, push_away)
+    spare, spacing = np.zeros(len(columns.places)), np.ones(len(columns.places))
+    edge, t = 3, float(np.median(columns.t[3]))
+    for apart, some in ((1.0, False), (1e-3, True)):
+        places = columns.places.copy()
+        places[: edge + 1] = places[edge + 1] - apart * np.arange(edge + 1, 0, -1)
+        near = BoxNodes(search, replace(columns, places=places), [], box, spare, spacing)
+        near._bar({(edge, t)})
+        for matrix in near.matrices:
+            n = matrix.free.shape[1]
+            first, rest = np.divmod(np.array(sorted(matrix.blocked), dtype=int), n * n)
+            before, after = np.divmod(rest, n)
+            assert (first == edge).all() and (len(first) > 0) == some
+            passes = (columns.t[edge, before] - t) * (columns.t[edge + 1, after] - t)
+            assert (passes < 0.0).all()
+
+
 def distances(columns):
     """Return the distance of the part to the wheel in [m], far away too, shape (n, m)."""
     problem = small_problem()
@@ -128,8 +176,11 @@ def test_where_a_box_leaves_no_depth_to_spare_tracks_are_sought_in_the_next_that
         checked.append((q, distances(at)[edge : edge + 2] + problem.cell.planned_penetration))
         return None, sunk if len(checked) == 1 else None, False
 
-    monkeypatch.setattr(box_track._Sampled, "check", check)
-    tracks = BoxTracks(problem, sampler, settings.costs, np.inf, Travel(np.inf, np.inf))
+    monkeypatch.setattr(box_nodes.BoxNodes, "check", check)
+    push_away = PushAway(problem.cell, settings.costs)
+    most = Travel(np.inf, np.inf)
+    search = TrackSearch(problem, sampler, settings.costs, np.inf, most, push_away)
+    tracks = BoxTracks(search)
     tracks.plan(columns, NO_PASSAGES, box, 1e-3, lambda _: False)
     (_, before), (q, spared), *_ = checked
     assert before.min() < needed

@@ -1,0 +1,243 @@
+"""The nodes of some places in a box, at contact positions of their own, and tracks through them.
+
+What collides between two places rules out more than one edge: all that pass there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from opl.geometry.frames import Array
+from opl.planning.box_columns import ColumnSampler
+from opl.planning.costs import PushAway, track_cost
+from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.nodes import NodeField
+from opl.planning.open_matrix import Track, close_collisions, open_matrices
+from opl.planning.plan import Found, Plan, Same, propose_and_check
+from opl.planning.postures import Columns
+from opl.planning.problem import GrindingProblem
+from opl.planning.rows import SMALLEST_EDGE, Bulge, Row, broken_at, bulging, shut_edges
+from opl.planning.settings import CostWeights
+from opl.planning.sinking import (
+    first_sunk,
+    passed_where_struck,
+    places_between,
+    struck_between,
+    until_sunk,
+)
+from opl.planning.symmetry import everywhere, twins
+from opl.planning.track_check import Collides
+from opl.search import in_box
+from opl.search.box import JointBox
+from opl.search.smooth import Travel, smoothest_within
+
+SAMPLES = 17  # contact positions of a place
+ROUNDS = 3  # of sampling closer around a track
+MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
+MOST_WORK = 5000.0  # units on them, most of them spent on free moves that are not there
+MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
+
+Learn = Callable[[Sequence[Bulge]], bool]  # told where places are wanted; whether that is new
+
+
+@dataclass
+class TrackSearch:
+    """By what tracks are sought, and how many were checked.
+
+    Attributes:
+        problem: What is to be planned.
+        sampler: Samples its places.
+        costs: What a track is charged for.
+        max_contact_change: Largest change of t between neighbouring places in belt units.
+        most: How far joints and contact should move at the most.
+        push_away: What nodes that are near to something are charged.
+        checks: How many motions were checked.
+        places_checked: How many places all of them had.
+        collided: How many collided, those that sink aside.
+    """
+
+    problem: GrindingProblem
+    sampler: ColumnSampler
+    costs: CostWeights
+    max_contact_change: float
+    most: Travel
+    push_away: PushAway
+    checks: int = 0
+    places_checked: int = 0
+    collided: int = 0
+
+
+class BoxNodes:
+    """The nodes of some places at contact positions of their own.
+
+    Args:
+        search: By what tracks are sought.
+        columns: The places and their postures.
+        rows: Contact positions that are passed only where they lie in the box.
+        box: The box.
+        spare: Depth in [m] that nodes leave of what is allowed, by place, shape (n,).
+        spacing: Belt units between contact positions, by place, shape (n,).
+    """
+
+    def __init__(
+        self,
+        search: TrackSearch,
+        columns: Columns,
+        rows: Sequence[Row],
+        box: JointBox,
+        spare: Array,
+        spacing: Array,
+    ) -> None:
+        self._search = search
+        self._columns = columns = search.sampler.spared(columns, spare)
+        self._rows = rows
+        self._box = box
+        self.spare, self._spacing = spare, spacing
+        problem = search.problem
+        near = columns.free & in_box.nearest(columns.q, columns.free, box)
+        q = np.where(near[..., None], columns.q, np.nan)
+        pass_index, sampler = columns.points.pass_index, search.sampler
+        flips = []
+        for flip, move in enumerate(sampler.flips):
+            slots = np.array([placed.slot(flip) for placed in columns.placements])
+            if not sampler.collisions or flip == sampler.mirrored:
+                flips.append((slots[pass_index], *move))
+        matrices = everywhere(problem.cell, columns.t, q, flips)
+        self.problem = replace(
+            problem,
+            points=columns.points,
+            field=NodeField(columns.t[0], problem.field.reached[:0], {}, tuple(matrices)),
+            wheel_distance=np.zeros(columns.t.shape),
+            known_sides=problem.sides_at(columns.places, columns.t),
+        )
+        self.matrices = open_matrices(self.problem)
+        self._swept = False
+        shut = shut_edges(columns.places, columns.t, rows, box)
+        for matrix in self.matrices:
+            matrix.shut = shut
+
+    def sweep(self) -> None:
+        """Close every node that collides."""
+        self._swept = True
+        close_collisions(self.matrices, self.problem.scene.collision)
+
+    def smoothest(self) -> Track | None:
+        """Return the smoothest track in the matrix that is farthest from the limits."""
+        search, without = self._search, set()
+        for index, matrix in enumerate(self.matrices):
+            # images differ in their limits only: one with the same nodes has no track either
+            left = matrix.free.tobytes(), matrix.blocked_edges.tobytes()
+            if left in without:
+                continue
+            without.add(left)
+            cost = track_cost(
+                self.problem, matrix.nodes, replace(search.costs, push_weight=0.0), matrix.free
+            )
+            ladder = matrix.ladder_within(search.max_contact_change)
+            asked = np.zeros_like(matrix.free)
+            columns = np.arange(len(matrix.free))
+            for asking in range(MOST_ROUNDS + 1):
+                edges = matrix.blocked_edges
+                found = smoothest_within(ladder, edges, matrix.free, cost, search.most)
+                if found is None:
+                    break
+                # only along the track, and all over columns where something is nearer than wanted
+                new = ~asked[columns, found.rows]
+                charge = search.push_away.charge(matrix.nodes.q[columns[new], found.rows[new]])
+                now = np.zeros_like(asked)
+                now[columns[new][charge > 0.0]] = True
+                now &= matrix.free & ~asked
+                if asking == MOST_ROUNDS or not now.any():
+                    return Track(index, found.rows)
+                cost.node_cost[now] += search.push_away.charge(matrix.nodes.q[now])
+                asked |= now
+        return None
+
+    def _closer(self, track: Track) -> BoxNodes:
+        """Return closer samples around a track, whose own nodes are among them."""
+        search, columns = self._search, self._columns
+        own = self.matrices[track.matrix].nodes.t_along(track.rows)
+        about = np.linspace(-1.0, 1.0, SAMPLES)
+        last = search.problem.cell.wheel.last_position
+        t = np.clip(own[:, None] + about * self._spacing[:, None], -last, last)
+        around = search.sampler.at(columns.places, columns.points, columns.placements, t)
+        spacing = self._spacing * 2.0 / (SAMPLES - 1)
+        return BoxNodes(search, around, self._rows, self._box, self.spare, spacing)
+
+    def closest(self, track: Track) -> tuple[BoxNodes, Track]:
+        """Return samples closer and closer around a track, and the smoothest track in them."""
+        sampled: BoxNodes = self
+        for _ in range(ROUNDS):
+            closer = sampled._closer(track)
+            if (finer := closer.smoothest()) is None:
+                break
+            sampled, track = closer, finer
+        return sampled, track
+
+    def bulges(self, track: Track, box: JointBox) -> list[Bulge]:
+        """Return where a track leaves the box on its way from place to place, or cannot be made."""
+        problem, nodes = self.problem, self.matrices[track.matrix].nodes
+        try:
+            path = fill_in(problem.cell, problem.points, nodes, track.rows, problem.interpolation)
+        except BrokenEdgeError as broken:
+            return broken_at(self._columns.places, broken.column)
+        if path.joint_range_sum <= box.size:
+            return []
+        spanned = nodes.along(track.rows)
+        outer = JointBox(spanned.min(axis=0), spanned.max(axis=0))
+        excess = in_box.missing(path.q, outer.widened(max(box.size - outer.size, 0.0)))
+        where = path.cutter_point.astype(int), excess / box.size
+        return bulging(self._columns.places, nodes.t_along(track.rows), *where)
+
+    def check(self, track: Track, learn: Learn) -> tuple[Plan | None, Array | None, bool]:
+        """Return the plan of a track, or of the next smoothest, if its whole motion is free.
+
+        One that sinks is the last: others do so as well. `sunk_between` of it, if it does; and
+        whether something was learnt of where motions collide instead.
+        """
+        search, places, problem = self._search, self._columns.places, self.problem
+        scene, robot = problem.scene, problem.cell.robot
+        most, end = search.checks + MOST_CHECKS, scene.work + MOST_WORK
+        while search.checks < most and scene.work < end:
+            before, hits = search.checks, dict[Same, Collides]()
+            tries = until_sunk(problem, twins(self.matrices, track, robot), hits)
+            left = end - scene.work
+            outcome = propose_and_check(problem, self.matrices, tries, before, None, left, hits)
+            now = outcome.plan if isinstance(outcome, Found) else outcome
+            search.checks = now.checks
+            search.places_checked += (search.checks - before) * len(places)
+            if isinstance(outcome, Found):
+                return outcome.plan.at_places(places), None, False
+            if (sunk := first_sunk(problem, hits)) is not None:
+                return None, sunk, False
+            search.collided += 1
+            if not self._swept:
+                self.sweep()
+            nodes_are_free = self.matrices[track.matrix].free[np.arange(len(places)), track.rows]
+            if nodes_are_free.all():  # it collides between them alone
+                struck = places_between(places, struck_between(problem, hits))
+                if struck and learn(struck):
+                    return None, None, True
+                self._bar(passed_where_struck(hits))
+            if (following := self.smoothest()) is None:
+                break
+            track = following
+        return None, None, False
+
+    def _bar(self, struck: Iterable[tuple[int, float]]) -> None:
+        """Block all edges that pass where motions collided, as of `passed_where_struck`.
+
+        Where no more places can be taken in between: there it matters little which edge it is.
+        """
+        places, t_of_columns = self._columns.places, self._columns.t
+        for first, t in struck:
+            if places[first + 1] - places[first] > SMALLEST_EDGE:
+                continue
+            ends = t_of_columns[first : first + 2]
+            for before, after in ((ends[0] < t, ends[1] > t), (ends[0] > t, ends[1] < t)):
+                rows = np.flatnonzero(before).tolist(), np.flatnonzero(after).tolist()
+                for matrix in self.matrices:
+                    matrix.block_edges(first, *rows, "passed where another collided")
