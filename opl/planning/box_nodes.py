@@ -24,8 +24,10 @@ from opl.planning.settings import CostWeights
 from opl.planning.sinking import (
     first_sunk,
     passed_where_struck,
+    past_help,
     places_between,
     struck_between,
+    sunk_at_ends,
     until_sunk,
 )
 from opl.planning.symmetry import everywhere, twins
@@ -201,6 +203,7 @@ class BoxNodes:
         search, places, problem = self._search, self._columns.places, self.problem
         scene, robot = problem.scene, problem.cell.robot
         most, end = search.checks + MOST_CHECKS, scene.work + MOST_WORK
+        too_near = np.diff(places) <= SMALLEST_EDGE
         while search.checks < most and scene.work < end:
             before, hits = search.checks, dict[Same, Collides]()
             tries = until_sunk(problem, twins(self.matrices, track, robot), hits)
@@ -211,9 +214,13 @@ class BoxNodes:
             search.places_checked += (search.checks - before) * len(places)
             if isinstance(outcome, Found):
                 return outcome.plan.at_places(places), None, False
-            if (sunk := first_sunk(problem, hits)) is not None:
+            sunk = first_sunk(problem, hits)
+            shut = too_near
+            if sunk is not None:
+                shut = past_help(places, sunk) & ~sunk_at_ends(problem, hits)
+            if sunk is not None and not shut.any():
                 return None, sunk, False
-            search.collided += 1
+            search.collided += int(sunk is None)
             if not self._swept:
                 self.sweep()
             nodes_are_free = self.matrices[track.matrix].free[np.arange(len(places)), track.rows]
@@ -221,22 +228,22 @@ class BoxNodes:
                 struck = places_between(places, struck_between(problem, hits))
                 if struck and learn(struck):
                     return None, None, True
-                self._bar(passed_where_struck(hits))
+                self._bar(passed_where_struck(hits), shut)
             if (following := self.smoothest()) is None:
-                break
+                return None, sunk, False
             track = following
         return None, None, False
 
-    def _bar(self, struck: Iterable[tuple[int, float]]) -> None:
+    def _bar(self, struck: Iterable[tuple[int, float]], shut: np.ndarray) -> None:
         """Block all edges that pass where motions collided, as of `passed_where_struck`.
 
-        Where no more places can be taken in between: there it matters little which edge it is.
+        Between the columns that are shut there, shape (n - 1,): places that are so near that it
+        matters little which edge it is.
         """
-        places, t_of_columns = self._columns.places, self._columns.t
         for first, t in struck:
-            if places[first + 1] - places[first] > SMALLEST_EDGE:
+            if not shut[first]:
                 continue
-            ends = t_of_columns[first : first + 2]
+            ends = self._columns.t[first : first + 2]
             for before, after in ((ends[0] < t, ends[1] > t), (ends[0] > t, ends[1] < t)):
                 rows = np.flatnonzero(before).tolist(), np.flatnonzero(after).tolist()
                 for matrix in self.matrices:

@@ -30,6 +30,7 @@ ALONG = Phase.APPROACHING, Phase.GRINDING, Phase.RETRACTING
 USELESS = 0.5  # of what was too deep: where so much still is, sparing depth is of no use
 MORE = 1.25  # times what was too deep: what is spared for it
 HARDLY = 1e-6  # [m] too deep: what can be spared nearly anywhere
+NEAR, SHUT = 0.25, 1e-4  # cutter points, and [m] too deep: what so near places is shut
 DEEP = 2e-5  # [m] too deep: what had better not be spared where places help
 
 
@@ -85,6 +86,29 @@ def struck_between(problem: GrindingProblem, collided: Mapping[Same, Collides]) 
             if grinding and not at_column and fault.pair != (PART, WHEEL):
                 struck[int(np.ceil(place)) - 1] = True
     return struck
+
+
+def past_help(places: Array, sunk: Array) -> np.ndarray:
+    """Return between which places a motion is so deep that neither places nor depth help, (n - 1,).
+
+    It slides over contact positions at which the part cuts into the wheel.
+    """
+    apart = np.diff(places)
+    return np.asarray(
+        ((apart <= SMALLEST_EDGE) & (sunk > DEEP)) | ((apart <= NEAR) & (sunk > SHUT))
+    )
+
+
+def sunk_at_ends(problem: GrindingProblem, collided: Mapping[Same, Collides]) -> np.ndarray:
+    """Return between which columns a motion sinks too deep at one of both, shape (n - 1,)."""
+    deep = np.zeros(len(problem.points), dtype=bool)
+    for blocked in collided.values():
+        motion = blocked.motion
+        for fault in blocked.faults:
+            place = motion.cutter_point[fault.move]
+            if fault.at_end and fault.pair == (PART, WHEEL) and place == np.rint(place):
+                deep[int(place)] = True
+    return np.asarray(deep[:-1] | deep[1:])
 
 
 def passed_where_struck(collided: Mapping[Same, Collides]) -> set[tuple[int, float]]:

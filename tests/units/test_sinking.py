@@ -20,6 +20,7 @@ from opl.planning.sinking import (
     HARDLY,
     MORE,
     passed_where_struck,
+    past_help,
     places_between,
     places_for,
     shallower,
@@ -108,6 +109,12 @@ def test_what_sinks_deeper_is_cut_into_more_parts_and_what_hardly_does_is_spared
     np.testing.assert_allclose(spare, [HARDLY, HARDLY, 0.0, 0.0, 0.0])
 
 
+def test_deep_between_places_that_are_near_nothing_helps():
+    places, deep = np.array([0.0, 1.0, 1.2, 1.201, 3.0]), np.array([1e-3, 1e-3, 3e-5, 1e-3])
+    assert past_help(places, deep).tolist() == [False, True, True, False]
+    assert not past_help(places, np.array([1e-3, 3e-5, 1e-5, 1e-3])).any()
+
+
 def test_where_configurations_between_columns_collide_is_told_with_their_contact_positions():
     _, motion, grinding = motion_of_a_track()
     place = motion.cutter_point
@@ -119,23 +126,22 @@ def test_where_configurations_between_columns_collide_is_told_with_their_contact
     assert found == {(int(place[k]), float(motion.contact_position[k])) for k in between}
 
 
-def test_edges_that_pass_where_a_motion_collided_are_blocked_where_no_place_can_be_taken_in():
+def test_edges_that_pass_where_a_motion_collided_are_blocked_where_that_is_shut():
     problem, settings = small_problem(), v_job().search.optimal
     box, sampler, columns = near_a_box()
     most, push_away = Travel(np.inf, np.inf), PushAway(problem.cell, settings.costs)
     search = TrackSearch(problem, sampler, settings.costs, np.inf, most, push_away)
     spare, spacing = np.zeros(len(columns.places)), np.ones(len(columns.places))
     edge, t = 3, float(np.median(columns.t[3]))
-    for apart, some in ((1.0, False), (1e-3, True)):
-        places = columns.places.copy()
-        places[: edge + 1] = places[edge + 1] - apart * np.arange(edge + 1, 0, -1)
-        near = BoxNodes(search, replace(columns, places=places), [], box, spare, spacing)
-        near._bar({(edge, t)})
+    for shut in (False, True):
+        near = BoxNodes(search, columns, [], box, spare, spacing)
+        edges = np.arange(len(spare) - 1) == edge
+        near._bar({(edge, t), (edge + 1, t)}, edges if shut else ~edges & False)
         for matrix in near.matrices:
             n = matrix.free.shape[1]
             first, rest = np.divmod(np.array(sorted(matrix.blocked), dtype=int), n * n)
             before, after = np.divmod(rest, n)
-            assert (first == edge).all() and (len(first) > 0) == some
+            assert (first == edge).all() and (len(first) > 0) == shut
             passes = (columns.t[edge, before] - t) * (columns.t[edge + 1, after] - t)
             assert (passes < 0.0).all()
 
