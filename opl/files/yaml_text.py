@@ -16,6 +16,7 @@ import yaml
 MOST_DEPTH = 60
 MOST_VALUES = 600_000  # with each alias counted as what it stands for
 MOST_DIGITS = 64  # of a number
+_TOO_DEEP = f"is nested more than {MOST_DEPTH} deep"
 
 _BOOL = re.compile(r"true|True|TRUE|false|False|FALSE")
 _NULL = re.compile(r"~|null|Null|NULL|")
@@ -45,6 +46,8 @@ def load(text: str) -> Any:
         mark = getattr(error, "problem_mark", None)
         found = [getattr(error, name, None) for name in ("context", "problem")]
         problem = ", ".join(text for text in found if text) or "is not YAML"
+        if "nesting depth" in problem:  # a limit of the parser, which reads ahead
+            problem = _TOO_DEEP
         raise YamlError(_at(mark, problem)) from error
     return builder.value
 
@@ -163,7 +166,7 @@ class _Builder:
 
     def _limit(self, size: int, height: int, event: yaml.Event) -> None:
         if len(self._open) + height > MOST_DEPTH:
-            raise YamlError(_at(event.start_mark, f"is nested more than {MOST_DEPTH} deep"))
+            raise YamlError(_at(event.start_mark, _TOO_DEEP))
         self._total += size
         if self._total > MOST_VALUES:
             raise YamlError(_at(event.start_mark, f"holds more than {MOST_VALUES} values"))
