@@ -1,0 +1,193 @@
+"""A lead over cells of contact positions, in one posture: in which of them it fails.
+
+Before a free move may begin it is out of reach, beyond the limits, in collision or too deep in the
+wheel, all over the cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from opl.cell.collision import CollisionScene
+from opl.cell.flange_jets import contact_jets
+from opl.cell.full_turns import FULL_TURN, principal
+from opl.cell.inverse_jets import joint_derivatives
+from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.geometry import frames
+from opl.geometry.frames import Array
+from opl.motion.straight_moves import WHERE_BEGUN
+from opl.planning.cut_cells import surely_nearer
+from opl.planning.enclosed import ROUND_OFF
+from opl.planning.images import TOUCHING
+from opl.planning.problem import GrindingProblem
+
+AT_ONCE = 4  # configurations of a lead that are looked at together
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Places of a lead at contact positions, whatever the posture.
+
+    Attributes:
+        q: Every inverse solution in [rad], shape (k, n, 8, 6).
+        deep: Where the part is too deep in the wheel, shape (k, n).
+        near: Where it is so near to the wheel that no free move may begin, shape (k, n).
+    """
+
+    q: Array
+    deep: np.ndarray
+    near: np.ndarray
+
+
+class LeadCells:
+    """Cells of contact positions, in one posture.
+
+    Args:
+        problem: What is planned.
+        family: The posture.
+        flip: Sign and shift of its flip.
+        low: Least contact position of each, shape (n,).
+        high: Greatest; those of no width are looked at where they are.
+        collision: In which a lead collides.
+        begun: In which it does not, links and all that stands still, where a free move may begin.
+        seen: What was seen of these contact positions before, whatever the posture; grows.
+    """
+
+    def __init__(
+        self,
+        problem: GrindingProblem,
+        family: int,
+        flip: tuple[Array, Array],
+        low: Array,
+        high: Array,
+        collision: CollisionScene,
+        begun: CollisionScene,
+        seen: dict[bytes, Seen] | None = None,
+    ) -> None:
+        self._collision, self._begun = collision, begun
+        self._cell, self._scene = problem.cell, problem.scene
+        self._family, self._flip = family, flip
+        self._low, self._high = low, high
+        self._middle, self._radius = (low + high) / 2.0, (high - low) / 2.0
+        self._seen = seen
+
+    def shut(self, T_workpiece_cutter: Array, lead: Array, cells: np.ndarray) -> np.ndarray:
+        """Return in which of some cells a lead fails before a free move may begin, (n,)."""
+        contact, turned, none = (of[0] for of in self._postures(T_workpiece_cutter[None], cells))
+        before, turned_before = contact.copy(), turned.copy()
+        # over all of a cell the joints make as many full turns on their way as at its middle
+        alike = np.ones(contact.shape, dtype=bool)
+        shut, begun = np.zeros(len(contact), dtype=bool), none | np.isnan(contact[:, 0])
+        for first in range(0, len(lead), AT_ONCE):
+            left = np.flatnonzero(~shut & ~begun)
+            if not len(left):
+                break
+            Ts = lead[first : first + AT_ONCE]
+            q, now, none = self._postures(Ts, cells[left])
+            steps = principal(np.diff(q, axis=0, prepend=before[None, left]))
+            q = before[left] + np.cumsum(steps, axis=0)
+            way = np.abs(steps) + now + np.concatenate([turned_before[None, left], now[:-1]])
+            same = alike[left] & np.logical_and.accumulate(way < np.pi, axis=0)
+            before[left], turned_before[left], alike[left] = q[-1], now[-1], same[-1]
+            there = q, np.where(same, now, np.inf)
+            out = none | self._out_of_limits((contact[left], turned[left]), there)
+            too_deep, near = self._beside_wheel(Ts, cells[left])
+            out, away = out | too_deep, ~near
+            known = ~out & ~np.isnan(q[..., 0]) & np.isfinite(now).all(axis=-1)
+            on = np.ones(len(left), dtype=bool)  # neither shut nor begun so far
+            for k in range(len(Ts)):
+                asked = np.flatnonzero(on & known[k])
+                out[k, asked] = self._collides(self._collision, q[k, asked], now[k, asked])
+                shut[left[on & out[k]]] = True
+                asked = np.flatnonzero(on & known[k] & ~out[k] & away[k])
+                away[k, asked] = ~self._collides(self._begun, q[k, asked], now[k, asked])
+                begun[left[on & ~out[k] & away[k]]] = True
+                on &= ~out[k] & ~away[k]
+        return np.asarray(~begun)
+
+    def _postures(
+        self, Ts_workpiece_cutter: Array, asked: np.ndarray
+    ) -> tuple[Array, Array, np.ndarray]:
+        """Return postures at the middle, how far joints turn in the cell, and where none is.
+
+        Of places of shape (k, 4, 4) and n cells asked about: principal angles in [rad], NaN where
+        there is none, shape (k, n, 6); not finite where it is not known, shape (k, n, 6); shape
+        (k, n).
+        """
+        cell, arm, k, n = self._cell, self._cell.robot.arm, len(Ts_workpiece_cutter), len(asked)
+        if self._seen is not None:
+            q = np.ascontiguousarray(self._of(Ts_workpiece_cutter).q[:, asked, self._family])
+            return q, np.zeros_like(q), np.isnan(q[..., 0])
+        Ts = cell.Ts_base_flange(self._middle[asked], Ts_workpiece_cutter[:, None])
+        q = np.ascontiguousarray(inverse_kinematics(arm, Ts)[:, :, self._family])
+        if not self._radius.any():
+            return q, np.zeros_like(q), np.isnan(q[..., 0])
+        Ts_cutter_flange = frames.inverse(cell.T_flange_workpiece @ Ts_workpiece_cutter)
+        middle, radius = np.tile(self._middle[asked], k), np.tile(self._radius[asked], k)
+        flange = contact_jets(cell.wheel, np.repeat(Ts_cutter_flange, n, axis=0), middle, radius)
+        found = joint_derivatives(arm, flange, [self._family])
+        turned = found.first[0].T * radius[:, None] + ROUND_OFF
+        return q, turned.reshape(k, n, 6), found.none[0].reshape(k, n)
+
+    def _out_of_limits(self, contact: tuple[Array, Array], lead: tuple[Array, Array]) -> np.ndarray:
+        """Return which postures no full turns bring within the limits, those of contact and lead.
+
+        The same full turns both, each given by its middle and how far joints turn, shape (n, 6) of
+        contact, (k, n, 6) of a lead. Shape (k, n).
+        """
+        robot, (sign, shift) = self._cell.robot, self._flip
+        fewest, most = np.full(6, -np.inf), np.full(6, np.inf)
+        for middle, turned in (contact, lead):
+            q = middle * sign + shift
+            low, high = (
+                (robot.lower - q - turned) / FULL_TURN,
+                (robot.upper - q + turned) / FULL_TURN,
+            )
+            fewest = np.maximum(fewest, np.ceil(low - TOUCHING))
+            most = np.minimum(most, np.floor(high + TOUCHING))
+        return np.asarray((fewest > most).any(axis=-1))
+
+    def _of(self, Ts_workpiece_cutter: Array) -> Seen:
+        """Return what is seen of some places at all contact positions."""
+        assert self._seen is not None
+        key = Ts_workpiece_cutter.tobytes()
+        if key not in self._seen:
+            Ts = self._cell.Ts_base_flange(self._middle, Ts_workpiece_cutter[:, None])
+            q, every = inverse_kinematics(self._cell.robot.arm, Ts), np.arange(len(self._middle))
+            deep, near = (self._nearer(Ts_workpiece_cutter, every, one) for one in self._distances)
+            self._seen[key] = Seen(q, deep, near)
+        return self._seen[key]
+
+    @property
+    def _distances(self) -> tuple[float, float]:
+        """Nearer to the wheel than these in [m] the part is too deep, or no free move may begin."""
+        return -self._cell.planned_penetration, self._cell.part_from_wheel + WHERE_BEGUN
+
+    def _beside_wheel(
+        self, Ts_workpiece_cutter: Array, asked: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return in which cells the part is nearer than either distance all over, (k, n) each."""
+        if self._seen is not None:
+            seen = self._of(Ts_workpiece_cutter)
+            return seen.deep[:, asked], seen.near[:, asked]
+        deep, near = (self._nearer(Ts_workpiece_cutter, asked, one) for one in self._distances)
+        return deep, near
+
+    def _nearer(self, Ts_workpiece_cutter: Array, asked: np.ndarray, distance: float) -> np.ndarray:
+        """Return in which cells asked about the part is nearer to the wheel all over, (k, n)."""
+        k, n = len(Ts_workpiece_cutter), len(asked)
+        at = np.tile(self._low[asked], k), np.tile(self._high[asked], k)
+        Ts = np.repeat(Ts_workpiece_cutter, n, axis=0)
+        nearer, _ = surely_nearer(self._cell, self._scene.part, Ts, *at, distance)
+        return nearer.reshape(k, n)
+
+    def _collides(self, scene: CollisionScene, q: Array, turned: Array) -> np.ndarray:
+        """Return which postures collide in a scene, however far joints turn, shape (n,)."""
+        sign, shift = self._flip
+        placed = q * sign + shift
+        hits = scene.collides(placed)
+        if turned.any():
+            hits[hits] = scene.collides_throughout(placed[hits], turned[hits])
+        return np.asarray(hits)
