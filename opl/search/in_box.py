@@ -74,7 +74,8 @@ def hidden(q: Array, row: Array) -> Array:
     """
     bend = np.abs(np.diff(q, n=2, axis=1))
     bend = np.pad(np.where(bend < JUMP, bend, 0.0), ((0, 0), (1, 1), (0, 0)))
-    every, before = np.arange(len(q)), np.floor(row).astype(int)
+    # the last row ends the last chord
+    every, before = np.arange(len(q)), np.minimum(row.astype(int), q.shape[1] - 2)
     most = np.maximum(bend[every, before], bend[every, before + 1])
     return np.asarray(BEND * most.sum(axis=-1) / 8.0)
 

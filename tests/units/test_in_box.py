@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opl.search.box import JointBox
-from opl.search.in_box import clipped, nearest_points, sampled
+from opl.search.in_box import clipped, hidden, nearest_points, sampled
 
 ROWS = np.linspace(-1.0, 1.0, 9)
 some = st.lists(st.integers(-200, 200).map(lambda k: k / 1000.0), min_size=6, max_size=6)
@@ -64,3 +64,10 @@ def test_the_nearest_chord_is_sampled_where_another_is_met_for_its_bend_alone():
     t, _ = sampled(ROWS[None], q, free, box, 9)
     assert (t[0] <= ROWS[3]).any()
     assert ((t[0] >= ROWS[5]) & (t[0] <= ROWS[8])).any()
+
+
+def test_what_hides_beside_the_last_row_is_that_of_the_last_chord():
+    q = np.zeros((3, 5, 6))
+    q[:, :, 0] = 0.01 * np.arange(5) ** 2
+    at = hidden(q, np.array([0.0, 3.5, 4.0]))
+    assert at[1] == at[2] > 0.0
