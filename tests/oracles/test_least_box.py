@@ -62,6 +62,18 @@ def least_of_all(low, high):
     return low[order], high[order]
 
 
+def take(proof, candidate):
+    """Split a candidate; look for less than its box where nothing is gained by that."""
+    size = float((candidate.high - candidate.low).sum())
+    if not candidate.settled:
+        proof.split()
+    elif size >= proof.threshold:
+        proof.give_up()
+    else:
+        proof.threshold = size
+        proof.put_back()
+
+
 def proven(curves, late, in_pieces=False):
     """Return the bound, with walls added when a box misses them, and the bounds on the way."""
     walls, cut = crossing(curves, in_pieces)
@@ -78,15 +90,8 @@ def proven(curves, late, in_pieces=False):
         if left and candidate.settled:
             proof.add(left.pop(0))
             proof.put_back()
-        elif not candidate.settled:
-            proof.split()
         else:
-            size = float((candidate.high - candidate.low).sum())
-            if size >= proof.threshold:
-                proof.give_up()
-                continue
-            proof.threshold = size
-            proof.put_back()
+            take(proof, candidate)
     return proof.lower_bound, bounds
 
 
@@ -115,17 +120,8 @@ def closed_at(proof):
     """Return the least box of a proof in the images of its walls, nothing added on the way."""
     while not proof.closed:
         candidate = proof.take_next()
-        if candidate is None:
-            continue
-        if not candidate.settled:
-            proof.split()
-            continue
-        size = float((candidate.high - candidate.low).sum())
-        if size >= proof.threshold:
-            proof.give_up()
-            continue
-        proof.threshold = size
-        proof.put_back()
+        if candidate is not None:
+            take(proof, candidate)
     return proof.lower_bound
 
 
