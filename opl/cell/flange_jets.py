@@ -7,7 +7,7 @@ import numpy as np
 from opl.cell.inverse_jets import Axes, FlangeJets
 from opl.geometry import frames
 from opl.geometry.frames import Array
-from opl.geometry.jets import Interval, Jet, constant, variable, wave
+from opl.geometry.jets import Jet, constant, variable, wave
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import MM_PER_M, ContactWheel
 
@@ -26,26 +26,19 @@ def contact_jets(
     T0 = wheel.T_base_contact0
     slide = np.clip(t, -wheel.flat_end, wheel.flat_end)
     rolled = np.abs(t) > wheel.flat_end
-    roll, rolling = t - slide, rolled.astype(float)
-    zero = np.zeros_like(t)
-    value = Interval(slide, np.where(rolled, 0.0, radius))
-    sliding = Jet(value, Interval(1.0 - rolling, zero), Interval(zero, zero))
-
-    def vector(v: Array, origin: bool) -> Axes:
-        jets = []
-        for axis in range(3):
-            x0, y0, z0, p0 = T0[axis]
-            cosine, sine = x0 * v[:, 0] + z0 * v[:, 2], x0 * v[:, 2] - z0 * v[:, 0]
-            jet = wave(cosine, sine, roll, rolling * radius, np.deg2rad(1.0))
-            jet = Jet(jet.value, _shared(rolling, jet.first), _shared(rolling, jet.second))
-            jet = jet.plus(y0 * v[:, 1])
-            if origin:
-                jet = jet.plus(p0) + sliding.times(-x0 / MM_PER_M)
-            jets.append(jet)
-        return jets[0], jets[1], jets[2]
-
-    x, y, z = (vector(Ts_cutter_flange[:, :3, k], False) for k in range(3))
-    return FlangeJets(x, y, z, vector(Ts_cutter_flange[:, :3, 3], True))
+    # axes and origin of the flange in the frame of the cutter, each along each axis of the base
+    x, y, z = np.moveaxis(Ts_cutter_flange[:, :3], 0, -1)
+    x0, y0, z0, p0 = (T0[:3, k, None, None] for k in range(4))
+    cosine, sine = x0 * x + z0 * z, x0 * z - z0 * x
+    jets = wave(cosine, sine, t - slide, np.where(rolled, radius, 0.0), np.deg2rad(1.0))
+    jets.data[2:] *= rolled
+    jets.data[0] += y0 * y
+    jets.data[0, :, 3] += p0[..., 0]
+    sliding = variable(slide, np.where(rolled, 0.0, radius))
+    sliding.data[2, rolled] = 0.0
+    origin = Jet(jets.data[:, :, 3]) + sliding.scaled(-x0[..., 0] / MM_PER_M)
+    x_axis, y_axis, z_axis = (_axes(jets.data[:, :, k]) for k in range(3))
+    return FlangeJets(x_axis, y_axis, z_axis, _axes(origin.data))
 
 
 def path_jets(
@@ -92,13 +85,19 @@ def path_jets(
         return a, b, c
 
     def fixed(v: Array) -> Axes:
-        a, b, c = (constant(v[k], at) for k in range(3))
+        a, b, c = (constant(float(v[k]), at) for k in range(3))
         return a, b, c
 
     axes = [in_base(fixed(T_workpiece_flange[:3, k])) for k in range(3)]
     origin = in_base(_minus(fixed(T_workpiece_flange[:3, 3]), p))
     a, b, c = (origin[k].plus(Ts_base_contact[:, k, 3]) for k in range(3))
     return FlangeJets(axes[0], axes[1], axes[2], (a, b, c))
+
+
+def _axes(data: Array) -> Axes:
+    """Return the coordinates of a vector by axis, of data of shape (6, 3, n)."""
+    a, b, c = (Jet(np.ascontiguousarray(data[:, k])) for k in range(3))
+    return a, b, c
 
 
 def _dot(a: Axes, b: Axes) -> Jet:
@@ -112,7 +111,3 @@ def _minus(a: Axes, b: Axes) -> Axes:
 def _unit(v: Axes) -> Axes:
     length = _dot(v, v).root()
     return v[0] / length, v[1] / length, v[2] / length
-
-
-def _shared(share: Array, interval: Interval) -> Interval:
-    return Interval(share * interval.middle, share * interval.radius)

@@ -73,11 +73,10 @@ def joint_derivatives(arm: Arm, flange: FlangeJets, slots: Sequence[int]) -> Joi
     shape = len(slots), 6, *np.shape(flange.p[0].value.middle)
     middle, radius, first, low, high = (np.empty(shape) for _ in range(5))
     for joint, (theta, offset, sign) in enumerate(zip(joints, arm.offsets, arm.signs, strict=True)):
-        second = theta.second.times(float(sign))
-        middle[:, joint] = sign * (theta.angle.middle + offset)
-        radius[:, joint] = theta.angle.radius
-        first[:, joint] = np.abs(theta.first.middle) + theta.first.radius
-        low[:, joint], high[:, joint] = second.low, second.high
+        turned = theta.plus(offset).scaled(sign)
+        middle[:, joint], radius[:, joint] = turned.value.middle, turned.value.radius
+        first[:, joint] = np.abs(turned.first.middle) + turned.first.radius
+        low[:, joint], high[:, joint] = turned.second.low, turned.second.high
     return JointDerivatives(middle, radius, first, low, high, none)
 
 
@@ -99,8 +98,8 @@ def _spherical_wrist(
     theta3 = bend.plus(-tilt_zero)
     # the forearm axis stands off the line to the wrist by the angle of its offset
     c, s = float(np.cos(tilt_zero)), float(np.sin(tilt_zero))
-    cos_tilt = cos_link.times(c) + sin_link.times(s)
-    sin_tilt = sin_link.times(c) - cos_link.times(s)
+    cos_tilt = cos_link.scaled(c) + sin_link.scaled(s)
+    sin_tilt = sin_link.scaled(c) - cos_link.scaled(s)
     z1 = cos_tilt * z_ahead - sin_tilt * flange.z[2]
     z3 = sin_tilt * z_ahead + cos_tilt * flange.z[2]
     x3 = sin_tilt * x_ahead + cos_tilt * flange.x[2]
@@ -128,15 +127,15 @@ def _parallel_axes(
         -(sin_tilt * x_ahead + cos_tilt * flange.x[2]),
         -(sin_tilt * y_ahead + cos_tilt * flange.y[2]),
     )
-    forward = ahead.plus(-arm.a1) - sin_tilt.times(arm.c4)
-    up = w[2].plus(-arm.c1) - cos_tilt.times(arm.c4)
+    forward = ahead.plus(-arm.a1) - sin_tilt.scaled(arm.c4)
+    up = w[2].plus(-arm.c1) - cos_tilt.scaled(arm.c4)
     theta2, theta3, _, beyond = _triangle(forward, up, arm.c2, arm.c3, elbow)
     theta4 = turning(sin_tilt, cos_tilt) - theta2 - theta3
     return (theta1, theta2, theta3, theta4, theta5, theta6), beside | beyond
 
 
 def _moved(p: Axes, along: Axes, length: float) -> Axes:
-    a, b, c = (origin + axis.times(length) for origin, axis in zip(p, along, strict=True))
+    a, b, c = (origin + axis.scaled(length) for origin, axis in zip(p, along, strict=True))
     return a, b, c
 
 
@@ -152,8 +151,8 @@ def _heading(p: Axes, lateral: float, back: Array) -> tuple[Jet, Jet, Jet, Turni
     """
     away = p[0] * p[0] + p[1] * p[1]
     ahead = away.plus(-lateral * lateral).root().scaled(back)
-    cos1 = (p[0] * ahead + p[1].times(lateral)) / away
-    sin1 = (p[1] * ahead - p[0].times(lateral)) / away
+    cos1 = (p[0] * ahead + p[1].scaled(lateral)) / away
+    sin1 = (p[1] * ahead - p[0].scaled(lateral)) / away
     beside = away.value.high < lateral * lateral - SURELY
     return cos1, sin1, ahead, turning(sin1, cos1), np.asarray(beside)
 
@@ -167,12 +166,12 @@ def _triangle(
     """
     away = forward * forward + up * up
     double = 2.0 * upper_arm * forearm
-    cos_bend = away.plus(-(upper_arm**2) - forearm**2).times(1.0 / double)
+    cos_bend = away.plus(-(upper_arm**2) - forearm**2).scaled(1.0 / double)
     beyond = (cos_bend.value.low > 1.0 + SURELY) | (cos_bend.value.high < -1.0 - SURELY)
     sin_bend = (-(cos_bend * cos_bend)).plus(1.0).root().scaled(elbow)
     bend = turning(sin_bend, cos_bend)
     # seen from axis 2: along the upper arm, and across it
-    along, across = cos_bend.times(forearm).plus(upper_arm), sin_bend.times(forearm)
+    along, across = cos_bend.scaled(forearm).plus(upper_arm), sin_bend.scaled(forearm)
     cos2 = (up * along + forward * across) / away
     sin2 = (forward * along - up * across) / away
     cos_link, sin_link = cos2 * cos_bend - sin2 * sin_bend, sin2 * cos_bend + cos2 * sin_bend
