@@ -25,7 +25,7 @@ from opl.search.joint_limits import about
 
 FINE = 33  # contact positions of a place at which a box is held against it
 POSTURES_OF_WORK = 400  # that cost a unit of work
-WITHIN = 6  # halvings of the way between places that is too deep in the wheel, but hardly
+WITHIN = 9  # halvings of the way between places that is too deep in the wheel, but hardly
 CLOSER = 2  # times that places are sampled closer where collisions begin
 HIDDEN = 5e-5  # of the box: what a chord that meets it may stand off the postures
 LESS = 1e-4, 3e-5  # [m] beyond the clearance needed, where all of the reserve costs too much

@@ -90,7 +90,7 @@ def rows_of(
     def surely(run: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
         return surely_cuts_along(cell, part, points, t[run], low, high)
 
-    run, low, high, cuts = halved(run, low, high, surely, MOST_WITHIN)
+    run, low, high, cuts = halved(run, low, high, surely)
     own = [np.flatnonzero(run == k) for k in range(len(grids))]
     return [np.append(low[k], high[k[-1]]) for k in own], [cuts[k] for k in own]
 

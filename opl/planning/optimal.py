@@ -11,28 +11,24 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from opl.planning.barriers import all_sides
-from opl.planning.box_columns import ColumnSampler
 from opl.planning.box_nodes import TrackSearch
 from opl.planning.box_track import BoxTracks
-from opl.planning.columns import ColumnWalls
 from opl.planning.costs import PushAway
-from opl.planning.cut_cells import whole_cells
-from opl.planning.families import Families, few_columns, grown
+from opl.planning.families import few_columns, grown
 from opl.planning.holders import Holder, holders
 from opl.planning.hope import Hope
-from opl.planning.images import Images, seams_of
 from opl.planning.obstructed import Obstructions
-from opl.planning.passages import NO_PASSAGES, Passages, Rectangles
+from opl.planning.passages import NO_PASSAGES, Passages
 from opl.planning.placement import Placement
 from opl.planning.plan import AT_REST, Plan
 from opl.planning.postures import Columns
 from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulge
+from opl.planning.search_space import SearchSpace
 from opl.planning.settings import OptimalSettings
 from opl.planning.work import Work
 from opl.search.box import JointBox
-from opl.search.forbidden import Forbidden
+from opl.search.forbidden import Forbidden, crossed_by_any
 from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
 
@@ -57,20 +53,15 @@ class OptimalSearch:
     ) -> None:
         self._problem = problem
         self._settings = settings
-        q = problem.solutions(few_columns(problem.points.pass_index))
-        seams = seams_of(q)
-        robot, most = problem.cell.robot, Travel(np.inf, np.inf)
+        robot, points, most = problem.cell.robot, problem.points, Travel(np.inf, np.inf)
         # the proof, closed below that, leaves no motion
         largest = float((robot.upper - robot.lower).sum()) / (1.0 - settings.widen)
         if fallback is not None:
             largest = fallback.path.joint_range_sum
             most = Travel(fallback.path.joint_travel, fallback.path.contact_travel)
-        images = Images(robot, seams, largest)
-        part, points = problem.scene.part, problem.points
-        sides, t = all_sides(problem), problem.field.contact_positions
-        self._walls = ColumnWalls(problem.cell, part, points, images, sides)
-        self._families = Families(images, q, problem.cuts, points.pass_index, t, sides)
-        self._sampler = ColumnSampler(problem, seams, images.limits)
+        space = SearchSpace.of(problem, largest)
+        self._walls, self._families = space.walls, space.families
+        self._sampler, self._rectangles = space.sampler, space.rectangles
         costs, most_change = settings.costs, settings.max_contact_change
         push_away = PushAway(problem.cell, costs)
         self._search = TrackSearch(problem, self._sampler, costs, most_change, most, push_away)
@@ -85,7 +76,6 @@ class OptimalSearch:
         self.proof = self._new_proof(largest)
         self._places: set[float] = set()
         self._work = Work(problem.scene, self._walls, self._families, self._search)
-        self._rectangles = Rectangles(self._sampler, points, whole_cells(problem.cell.wheel))
         self._hope(self._families.smallest_grown())
         hoped = min(self.proof.threshold, self._hoped.guess(0.0, largest))
         self._begin_again(self._new_proof(hoped), hoped)
@@ -95,7 +85,8 @@ class OptimalSearch:
     @property
     def finished(self) -> bool:
         """Whether there is nothing left to do."""
-        done = self.proof.closed and self.proof.threshold >= self._value
+        closed = self.proof.closed and self.proof.threshold >= self._value
+        done = closed or self._proven >= self._value
         ended = self._given_up >= MOST_GIVEN_UP or self.work_share >= 1.0
         return done or ended or self._value <= AT_REST
 
@@ -176,13 +167,14 @@ class OptimalSearch:
             return bool(missed)
         columns, passages, inner = self._look(box, placements)
         self._hope(inner)
-        allowed = self._settings.missed(self.proof.threshold)
-        known, new = columns.missed(box, self._places, allowed)
+        known, new = columns.missed(box, self._places, self._settings.missed(self.proof.threshold))
         if not missed and (self.proof.clear(known) or self.proof.split_keys(known)):
             return True
         missed = missed or new[:MOST_ADDED]
         if not missed and not passages.walls:
-            return self._try(columns, passages, inner)
+            # the box meets the walls that it cannot pass, but perhaps not with these images
+            split = not passages.open and self.proof.split_keys()
+            return split or self._try(columns, passages, inner)
         # hardly larger it may hold all
         most = box.size + self._settings.room(box.size)
         fits = not missed or (inner is not None and inner.size < most)
@@ -192,9 +184,7 @@ class OptimalSearch:
                 if self._try(columns, passages, inner) or self.plan is not best:
                     return True
         if not missed:
-            chains = passages.walls[:MOST_ADDED]
-            self._rectangles.take_in(chains)
-            for wall in self._walls.walls(chains):
+            for wall in self._walls.walls(self._rectangles.take_in(passages.walls[:MOST_ADDED])):
                 self.proof.add(wall)
         self._add(missed)
         return True
@@ -264,7 +254,10 @@ class OptimalSearch:
         return BoxProof(images.of, self._walls.finer, threshold, gap, self.forbidden, images.limits)
 
     def _hope_for_less(self) -> None:
-        """Begin the proof again: no motion is as good as was hoped."""
+        """Begin the proof again: no motion is as good as was hoped; or end it if there is none."""
+        if self.plan is None and not crossed_by_any(self.proof.walls, self.forbidden):
+            self._proven = self._largest
+            return
         more = self._hoped.more(self.proof.threshold, self._value, self.plan is not None)
         self._begin_again(self.proof, more)
 
@@ -290,8 +283,9 @@ class OptimalSearch:
             learnt = self._rectangles.refine(bulges, box)
             return learnt
 
-        self.keep(self._tracks.plan(columns, passages, box, self._settings.room(box.size), learn))
-        return learnt
+        found = self._tracks.plan(columns, passages, box, self._settings.room(box.size), learn)
+        self.keep(found)
+        return learnt or (found is None and learn(passages.narrow))
 
     def keep(self, found: Plan | None) -> None:
         """Keep a motion that is better than the best."""

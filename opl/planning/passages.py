@@ -39,6 +39,7 @@ class Passages:
         rows: Contact positions that it passes only where they lie in the box.
         edges: Ends of the edges that its way crosses in [rad], both free, shape (n, 2, 6).
         crossings: Places, and the contact positions at which its way crosses them, shape (k, 2).
+        narrow: Where its way slides past what may be shut, as of `Rectangle.narrow`.
         open: Whether it may be passed by what leaves the box by the room of a motion.
     """
 
@@ -46,6 +47,7 @@ class Passages:
     rows: list[Row]
     edges: Array
     crossings: Array
+    narrow: list[Bulge]
     open: bool
 
     def grown(self, box: JointBox) -> JointBox:
@@ -55,7 +57,7 @@ class Passages:
         return grown(self.edges, np.ones(self.edges.shape[:2], dtype=bool), box) or box
 
 
-NO_PASSAGES = Passages([], [], np.empty((0, 2, 6)), np.empty((0, 2)), True)
+NO_PASSAGES = Passages([], [], np.empty((0, 2, 6)), np.empty((0, 2)), [], True)
 
 
 class Rectangles:
@@ -133,6 +135,7 @@ class Rectangles:
         """
         walls: list[tuple[float, Chain]] = []
         rows: list[Row] = []
+        narrow: list[Bulge] = []
         edges, crossings = [np.empty((0, 2, 6))], [np.empty((0, 2))]
         passed = True
         for places in self._windows():
@@ -162,14 +165,17 @@ class Rectangles:
             ends = np.array(passage(up, along, max(most, allowed)))
             edges.append(rectangle.ends_of(ends))
             crossings.append(rectangle.crossings(ends, box))
-            rows += rectangle.rows(box, room)
+            rows += rectangle.rows(up, room)
+            narrow += rectangle.narrow(ends)
         walls.sort(key=lambda one: -one[0])
         hardest = [wall for _, wall in walls]
-        return Passages(hardest, rows, np.concatenate(edges), np.concatenate(crossings), passed)
+        of_ways = np.concatenate(edges), np.concatenate(crossings), narrow
+        return Passages(hardest, rows, *of_ways, passed)
 
-    def take_in(self, walls: Sequence[Chain]) -> None:
-        """Note chains that are walls of the proof now."""
+    def take_in(self, walls: Sequence[Chain]) -> Sequence[Chain]:
+        """Note chains that are walls of the proof from now on, and return them."""
         self._walls.update(walls)
+        return walls
 
     def _chain(self, places: Array, corners: Sequence[Corner]) -> Chain:
         return tuple((float(places[k]), float(self._t[j])) for k, j in corners)

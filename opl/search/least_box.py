@@ -204,15 +204,15 @@ class BoxProof:
             for spans in parts(node, self._cells, self._branch):
                 self._push(node.bound, spans, node.n_walls, node.low, node.high)
 
-    def split_keys(self, places: Sequence[float]) -> bool:
-        """Split the subproblem of the last candidate between keys at one of some walls, if any can.
+    def split_keys(self, places: Sequence[float] | None = None) -> bool:
+        """Split the last subproblem between keys at a wall, if it can: of some places, or of all.
 
         The box meets the walls of its pass, but perhaps not with one key. One part is put back.
         """
         node = self._kept
         for number, wall in enumerate(self.walls):
             own = node.spans[node.spans[:, WALL] == number, KEY]
-            if wall.place in places and len(own) and (own != own[0]).any():
+            if (places is None or wall.place in places) and len(own) and (own != own[0]).any():
                 one, other = parts(node, self._cells, number)
                 self._push(node.bound, other, node.n_walls, node.low, node.high)
                 low, high = node.low, node.high

@@ -1,11 +1,15 @@
 """Postures of places between cutter points, and what they tell of a box."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from opl.cell.robot import forward_kinematics
+from opl.planning.box_track import nearest_about
 from opl.planning.field_at_places import FieldAtPlaces
 from opl.planning.postures import BESIDE
 from opl.planning.rectangle import Rectangle
+from opl.planning.sides import Barrier, Side
 from opl.search.box import JointBox
 from tests.support.boxes import near_a_box
 from tests.support.planned import small_problem
@@ -48,3 +52,48 @@ def test_a_chain_is_cut_finer_where_the_postures_between_its_places_are_nearer_t
     corners = [(0, 1), (3, 1)]  # from place to place, all along one contact position
     assert rectangle.nearer_between(corners, box, 1e-6) == [(21.0, 22.0)]
     assert rectangle.nearer_between([(0, 0), (0, 1)], box, 1e-6) == []
+
+
+def test_lines_on_both_sides_of_what_lies_in_a_box_between_them_are_rows():
+    _, sampler, columns = near_a_box()
+    image, t = columns.placements[0], np.linspace(-6.0, 6.0, 7)
+    places = np.array([20.0, 20.5, 21.0, 22.0])
+    rectangle = Rectangle(sampler, places, t, image)
+    at = np.array([20.5]), np.array([[1.3]])  # between the lines at 0 and 2
+    q = sampler.at(at[0], sampler.there(at[0]), [image], at[1]).q[0, 0]
+    box = JointBox(q - 1e-3, q + 1e-3)
+    up, _ = rectangle.missed(box)
+    rows = rectangle.rows(up, 1e-6)
+    assert [row.contact_position for row in rows] == [0.0, 2.0]
+    assert all((row.places == places[:3]).all() for row in rows)
+
+
+def test_a_way_is_narrow_where_it_slides_past_what_is_shut_at_a_place():
+    _, sampler, columns = near_a_box()
+    side = Side(1, above=(Barrier(20.5, 22.0, 1.0),))
+    image, t = replace(columns.placements[0], side=side), np.linspace(-6.0, 6.0, 7)
+    places = np.array([20.0, 20.5, 21.0])
+    where = np.broadcast_to(t, (3, len(t)))
+    free = sampler.at(places, sampler.there(places), [image], where).free
+    rectangle = Rectangle(sampler, places, t, image)
+    every = [(k, j) for k in range(2) for j in range(len(t))]
+    for k, j in every:
+        way = np.array([[[k, j], [k, j + 1]], [[k, j], [k + 1, j]]])
+        found = [(bulge.first, bulge.last) for bulge in rectangle.narrow(way)]
+        shut = not (free[k, j] and free[k + 1, j])
+        assert found == ([(places[k], places[k + 1])] if shut else [])
+    told = [free[k, j] and free[k + 1, j] for k, j in every]
+    assert any(told) and not all(told)
+
+
+def test_a_crossing_is_moved_to_where_the_place_is_nearest_to_a_box():
+    _, sampler, columns = near_a_box()
+    last, rows = 8.0, np.arange(0, len(columns.places), 3)
+    few = columns.places[rows]
+    t = np.linspace(-5.0, 5.0, len(few))[:, None]
+    there = sampler.at(few, sampler.there(few), columns.placements, t)
+    box = JointBox(there.q[4, 0], there.q[4, 0])
+    found = nearest_about(sampler, there, t + 0.07, box, last)
+    assert there.free[4, 0]
+    assert abs(found[4, 0] - t[4, 0]) < 1e-4
+    assert (np.abs(found - t) <= 0.17 + 1e-12).all()

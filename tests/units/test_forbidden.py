@@ -1,8 +1,13 @@
 """What is forbidden of walls, each flip of the wrist for itself."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from opl.search.forbidden import crossed_by_any
 from opl.search.least_box import BoxProof
 from opl.search.walls import Image, Line, Piece, Wall
 
@@ -70,3 +75,61 @@ def test_cells_are_cut_where_the_forbidden_part_ends():
 
 def test_nothing_is_left_where_all_flips_of_a_wall_are_forbidden():
     assert least([(1.0, 1.0), (0.0, 0.0)])[0] == np.inf
+
+
+KINDS = [(family, side) for family in (0, 1) for side in (0, 1)]
+# of each kind of posture whether it has a piece, and whether either flip of it is forbidden
+SHUT = st.tuples(*[st.tuples(st.booleans(), st.booleans(), st.booleans()) for _ in KINDS])
+
+
+@given(st.lists(st.tuples(st.integers(0, 1), SHUT), min_size=1, max_size=5))
+def test_a_pass_needs_one_posture_in_which_all_its_walls_can_be_crossed(drawn):
+    template = ramp(0.0, 0).pieces[0]
+    pieces = [
+        [
+            replace(template, family=f, side=s) if of[0] else None
+            for (f, s), of in zip(KINDS, shut, strict=True)
+        ]
+        for _, shut in drawn
+    ]
+    walls = [
+        Wall(index, float(k), tuple(piece for piece in pieces[k] if piece is not None))
+        for k, (index, _) in enumerate(drawn)
+    ]
+    forbidden = LowCells([], [])
+    for own, (_, shut) in zip(pieces, drawn, strict=True):
+        for piece, (_, one, other) in zip(own, shut, strict=True):
+            forbidden._shares[id(piece)] = float(one), float(other)
+
+    def open_to(index, kind, flip):
+        return all(of[kind][0] and not of[kind][1 + flip] for own, of in drawn if own == index)
+
+    wanted = all(
+        any(open_to(index, kind, flip) for kind in range(len(KINDS)) for flip in (0, 1))
+        for index in {index for index, _ in drawn}
+    )
+    assert crossed_by_any(walls, forbidden) == wanted
+    with_pieces = all(
+        any(all(of[k][0] for own, of in drawn if own == index) for k in range(len(KINDS)))
+        for index in {index for index, _ in drawn}
+    )
+    assert crossed_by_any(walls, None) == with_pieces
+
+
+def test_a_box_is_split_between_postures_at_any_wall_where_no_place_is_given():
+    # two walls of a pass, each crossed by two postures at the same point
+    crossed = ramp(0.0, 0).pieces[0]
+    walls = [ramp(0.0, 0)]
+    walls += [Wall(1, at, (crossed, replace(crossed, family=1))) for at in (1.0, 2.0)]
+    proof = BoxProof(lambda _: IMAGES[:1], lambda *_: (), 3.0, 1e-4)
+    for wall in walls:
+        proof.add(wall)
+    while (candidate := proof.take_next()) is None or not candidate.settled:
+        if candidate is not None:
+            proof.split()
+    assert len(candidate.keys[1]) == 2
+    assert not proof.split_keys([0.5])
+    assert proof.split_keys()
+    proof.put_back()
+    candidate = proof.take_next()
+    assert len(candidate.keys[1]) == 1

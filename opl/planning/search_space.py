@@ -1,0 +1,44 @@
+"""What the search for the least looks at: walls, postures at cutter points, and places between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from opl.planning.barriers import all_sides
+from opl.planning.box_columns import ColumnSampler
+from opl.planning.columns import ColumnWalls
+from opl.planning.cut_cells import whole_cells
+from opl.planning.families import Families, few_columns
+from opl.planning.images import Images, seams_of
+from opl.planning.passages import Rectangles
+from opl.planning.problem import GrindingProblem
+
+
+@dataclass(frozen=True, eq=False)
+class SearchSpace:
+    """The same problem in the forms that a proof and a motion need.
+
+    Attributes:
+        walls: Makes the walls of the proof.
+        families: The postures at cutter points spread over the passes.
+        sampler: Samples the postures of places.
+        rectangles: Between which places motions are held against boxes.
+    """
+
+    walls: ColumnWalls
+    families: Families
+    sampler: ColumnSampler
+    rectangles: Rectangles
+
+    @classmethod
+    def of(cls, problem: GrindingProblem, largest: float) -> SearchSpace:
+        """Return that of a problem, for boxes up to a size in [rad]."""
+        cell, points = problem.cell, problem.points
+        q = problem.solutions(few_columns(points.pass_index))
+        seams = seams_of(q)
+        images = Images(cell.robot, seams, largest)
+        sides, t = all_sides(problem), problem.field.contact_positions
+        walls = ColumnWalls(cell, problem.scene.part, points, images, sides)
+        families = Families(images, q, problem.cuts, points.pass_index, t, sides)
+        sampler = ColumnSampler(problem, seams, images.limits)
+        return cls(walls, families, sampler, Rectangles(sampler, points, whole_cells(cell.wheel)))
