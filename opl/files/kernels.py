@@ -135,13 +135,21 @@ def use_threads(count: int) -> None:
 def _numba() -> Any:
     """Return numba, to which a kernel is the compiled function."""
     settle_kernel_cache(Path(__file__).parents[1])  # before numba looks for it
-    import numba
-    from numba.core.registry import cpu_target
+    with _without(_LINEAR_ALGEBRA):
+        import numba
+        import numba.np.arraymath
+    from numba.core.caching import FunctionCache
+    from numba.core.runtime.nrt import rtsys
     from numba.extending import typeof_impl
 
-    with _without(_LINEAR_ALGEBRA):
-        cpu_target.typing_context.refresh()
-        cpu_target.target_context.refresh()
+    def load(kept: Any, signature: Any, context: Any) -> Any:
+        rtsys.initialize(context)
+        with kept._guard_against_spurious_io_errors():
+            return kept._load_overload(signature, context)
+
+    # numba's own first loads all that it compiles with, which takes half as long as numba itself:
+    # what is compiled needs none of it, and whatever compiles loads it then
+    FunctionCache.load_overload = load  # type: ignore[method-assign]
 
     @typeof_impl.register(Kernel)
     def type_of(made: Kernel, _context: Any) -> Any:
