@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from opl.cli.programs import show, templates, verify
 from opl.cli.progress import progress_bar
 from opl.cli.robots import robots
 from opl.cli.services import plugin, serve, watch
-from opl.cli.stopping import stopped_at_once
+from opl.cli.stopping import left_at_once, stopped_at_once
 
 METHODS = ("recursive", "optimal")
 # objects made by a run before Python looks for garbage in cycles, of which there is next to none:
@@ -29,6 +30,12 @@ BETWEEN_COLLECTIONS = 20_000
 
 class _Group(click.Group):
     """Shows opl's own errors as one message and ends with their exit status."""
+
+    def main(self, args: Sequence[str] | None = None, *others: Any, **settings: Any) -> Any:
+        if args is not None:  # of a program, which goes on
+            return super().main(args, *others, **settings)
+        with left_at_once():
+            return super().main(None, *others, **settings)
 
     def invoke(self, ctx: click.Context) -> Any:
         try:

@@ -40,6 +40,28 @@ def opl_process(*arguments):
     )
 
 
+LEFT = """
+import atexit
+from opl.cli.commands import main
+
+class Loaded:
+    def __del__(self):
+        print("taken apart")
+
+kept = Loaded()
+atexit.register(print, "done at the end")
+main()
+"""
+
+
+@pytest.mark.parametrize(("argument", "status"), [("robots", 0), ("no-such-command", 2)])
+def test_what_is_to_be_done_at_the_end_is_done_and_nothing_taken_apart(argument, status):
+    command = [sys.executable, "-c", LEFT, argument]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert ended.returncode == status
+    assert ended.stdout.endswith("done at the end\n")
+
+
 @pytest.fixture(scope="session")
 def v_run(tmp_path_factory):
     """Run the V job once; return the folder and the ended process."""
