@@ -136,7 +136,11 @@ def chain_of(
     return kept[chain] if len(chain) else None
 
 
-@kernel()
+@kernel(
+    "Tuple((int64[::1],int64[::1],float64[::1]))(float64[:,::1],float64[:,::1],float64[:,::1],"
+    "float64[:,:,::1],float64[:,:,::1],int64[::1],float64[:,::1],float64[::1],float64[:,::1])",
+    early=True,
+)
 def _lines(axes, T0, q, places, targets, freedom, room, allowed, pace):  # type: ignore[no-untyped-def]
     """Return the lines that keep their contact by where they end: starts, first ones, errors."""
     n = len(q)
@@ -187,7 +191,12 @@ def _even(pace, i, j, k, ratio):  # type: ignore[no-untyped-def]
     return max(one / other, other / one) <= ratio * (1.0 + 1e-9)
 
 
-@kernel()
+@kernel(
+    "int64[::1](float64[:,::1],float64[:,::1],float64[:,::1],float64[:,:,::1],float64[:,:,::1],"
+    "int64[::1],float64[:,::1],float64[::1],float64[:,::1],float64[:,::1],"
+    "float64,float64,float64,float64,int64[::1],int64[::1],float64[::1],int64[:,::1],int64[::1])",
+    early=True,
+)
 def _chain(  # type: ignore[no-untyped-def]
     axes, T0, q, places, targets, freedom, room, allowed, pace, tool,
     shortest, ratio, zone, most, starts, first, errors, wide, at,

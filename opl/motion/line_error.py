@@ -189,7 +189,11 @@ def _pass_by(axes, T0, q, places, targets, freedom, room, pace, i, j, k, least, 
     return s, _left(off, freedom[k], room[k])
 
 
-@kernel()
+@kernel(
+    "void(float64[:,::1],float64[:,::1],float64[:,::1],float64[:,:,::1],float64[:,:,::1],"
+    "int64[::1],float64[:,::1],float64[::1],float64[:,::1],int64,int64,float64[::1],float64[::1])",
+    early=True,
+)
 def _along(axes, T0, q, places, targets, freedom, room, allowed, pace, i, j, shares, errors):  # type: ignore[no-untyped-def]
     """Fill in where the line from i to j passes the places between, none before the one ahead."""
     T, work, last = np.empty((3, 4)), np.empty((3, 6)), 0.0

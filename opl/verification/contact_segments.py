@@ -219,7 +219,8 @@ def _in_order(
 
 @kernel(
     "void(float64[:,:,::1],float64[:,:,::1],float64[:,:,::1],float64[:,::1],float64[::1],"
-    "float64[::1],int64[:,::1])"
+    "float64[::1],int64[:,::1])",
+    early=True,
 )
 def _choose(tried, apart, t, even, t_before, t_after, chosen):  # type: ignore[no-untyped-def]
     """Do `_in_order` by dynamic programming over the configurations."""

@@ -41,7 +41,9 @@ def out_of_drum(x, y, z, T, radius, width):  # type: ignore[no-untyped-def]
     )
 
 
-@kernel("void(float64[:,::1],float64[:,::1],float64,float64,float64[::1],float64[:,::1])")
+@kernel(
+    "void(float64[:,::1],float64[:,::1],float64,float64,float64[::1],float64[:,::1])", early=True
+)
 def _from_drum(points, T, radius, width, distance, direction):  # type: ignore[no-untyped-def]
     """Do `Drum.distances` for points in the base frame, shape (n, 3)."""
     for k in range(len(points)):
@@ -113,7 +115,7 @@ def _is_beyond(corners, radius, width, within):  # type: ignore[no-untyped-def]
     return False
 
 
-@kernel("boolean(float64[:,:,::1],float64[:,::1],float64,float64,float64)")
+@kernel("boolean(float64[:,:,::1],float64[:,::1],float64,float64,float64)", early=True)
 def _are_beyond(triangles, T, radius, width, within):  # type: ignore[no-untyped-def]
     """Do `Drum.is_beyond` for a part at T in the frame of the drum."""
     corners = np.empty((3, 3))

@@ -16,7 +16,8 @@ MOST = 50  # triangles in a patch
 
 @kernel(
     "void(float64[:,::1],float64[:,::1],float64[:,:,::1],float64[:,::1],float64[:,::1],float64,"
-    "float64,float64[::1],float64[:,::1],float64[::1])"
+    "float64,float64[::1],float64[:,::1],float64[::1])",
+    early=True,
 )
 def _beside_drum(  # type: ignore[no-untyped-def]
     T, middle, axes, half, T_base_drum, radius, width, distance, outward, boxes
