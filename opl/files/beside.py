@@ -109,18 +109,24 @@ class Beside:
         given: Sequence[Any],
         items: Sequence[Item],
         report: Callable[[float], None] = lambda fraction: None,
+        length: Callable[[Item], float] = lambda item: 0.0,
     ) -> list[Result]:
         """Work on items here and in the copy: whoever is free takes the next one.
+
+        The longest are taken first, so that nobody waits for long at the end.
 
         Args:
             opened: Opens what the work needs and gives what works on an item; it lies in a module.
             given: What it is called with, once in each process that takes an item.
             items: What is worked on.
             report: Called with the part of the items that is taken, 0 to 1.
+            length: Tells how long the work on an item takes, in any unit.
 
         Returns:
             What was made of each item.
         """
+        order = sorted(range(len(items)), key=lambda k: -length(items[k]))
+        items = [items[k] for k in order]
         number, turns = None, iter(range(len(items)))
         if self._process is not None and self._lists < self._turns.most_lists:
             of, self._lists = self._lists, self._lists + 1
@@ -132,7 +138,8 @@ class Beside:
             made |= {} if answer is None else answer[0]
         left = [k for k in range(len(items)) if k not in made]  # by a copy that is gone
         made |= dict(_made(opened, given, items, iter(left)))
-        return [made[k] for k in range(len(items))]
+        found = {k: made[place] for place, k in enumerate(order)}
+        return [found[k] for k in range(len(items))]
 
     def answer(self, number: int) -> list[Any] | None:
         """Wait for the answer to a question; None if there will be none."""

@@ -111,7 +111,9 @@ def with_fewest_positions(
         UnsafeError: If there are none on some pass: only where the motion itself breaks the rule.
     """
     runs = list(on_wheel_runs(scene.cell, points, motion, process, rule))
-    chosen = (beside or Beside()).share(_choosing, (scene, motion, rule), runs)
+    chosen = (beside or Beside()).share(
+        _choosing, (scene, motion, rule), runs, length=lambda of_pass: len(of_pass[1].q)
+    )
     thinned, screws = motion, screws_of(scene.cell.robot)
     for (first, run), (kept, _) in zip(runs, chosen, strict=True):
         thinned = _thinned(screws, thinned, first, run, kept)

@@ -82,7 +82,10 @@ def replay(
     stretches = [
         range(first, min(first + AT_ONCE, len(motion))) for first in range(0, len(motion), AT_ONCE)
     ]
-    run, *others = (beside or Beside()).share(_replaying, given, stretches, progress)
+    turned = np.abs(np.diff(motion.q, axis=0, prepend=motion.q[:1])).max(axis=1)
+    run, *others = (beside or Beside()).share(
+        _replaying, given, stretches, progress, lambda moves: turned[moves.start : moves.stop].sum()
+    )
     for other in others:
         run.add(other)
     limits = limit_findings(cell, timed)

@@ -55,6 +55,18 @@ def test_a_value_is_worked_out_in_another_process_once_and_the_process_is_gone()
     np.testing.assert_array_equal(array, np.arange(3.0))
 
 
+def test_the_longest_items_are_taken_first_and_given_back_in_their_order():
+    taken = []
+
+    @contextmanager
+    def working():
+        yield lambda item: taken.append(item) or -item
+
+    items = [3, 1, 4, 1, 5]
+    assert Beside().share(working, (), items, length=float) == [-3, -1, -4, -1, -5]
+    assert taken == [5, 4, 3, 1, 1]
+
+
 def test_values_come_in_any_order_from_one_process():
     laters = [Later(where, k) for k in range(3)]
     with Beside(True) as beside:
