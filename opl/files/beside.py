@@ -74,6 +74,7 @@ class Beside:
         self._questions = 0
         self._answers: list[bytes] = []
         self._lists = 0
+        self._behind: list[Later[Any]] = []
 
     def __enter__(self) -> Beside:
         return self
@@ -102,6 +103,10 @@ class Beside:
         if number is not None:
             self._known.add(later)
             later.asked_of(self, number)
+
+    def begin_behind(self, later: Later[Any]) -> None:
+        """Let the copy work out a value as soon as all of the next list that is shared is taken."""
+        self._behind.append(later)
 
     def share(
         self,
@@ -132,6 +137,8 @@ class Beside:
             of, self._lists = self._lists, self._lists + 1
             number = self._ask(Beside._some, opened, given, items, of)
             turns = self._turns.taken(of, len(items))
+        while self._behind:
+            self.begin(self._behind.pop(0))
         made = dict(_made(opened, given, items, turns, report))
         if len(made) < len(items) and number is not None:
             answer = self.answer(number)

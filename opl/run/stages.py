@@ -121,14 +121,13 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
         return _without_path(prepared, error, watch)
     charted = Later(_charted, prepared, found.plan)
     compared = Later(compare, prepared, found)
-    one_pass = points.n_passes == 1
-    if one_pass:  # its positions are chosen here, those of several passes in turns with the copy
+    if points.n_passes > 1 and job.program.motion is MotionForm.JOINT:
+        beside.begin_behind(charted)  # positions of several passes are chosen in turns
+    else:
         beside.begin(charted)
     with watch.stage(Stage.MOTION):
         exact = with_speed_steps(found.plan.motion, points, job.process, job.cell.robot)
         exact, motion = _positions(prepared, exact, beside)
-        if not one_pass:
-            beside.begin(charted)
         timing, seen = recognised_times(job, points, motion)
         slow = slow_stretches(timing, job.process)
     timed = TimedMotion.passing(motion, timing.timed.duration)
@@ -211,6 +210,8 @@ def verify_motion(
     watch, beside = watch or Watch(), beside or Beside()
     surfaced = planned.surfaced
     job = surfaced.job
+    beside.begin_behind(planned.comparison)
+    beside.begin_behind(planned.drawn)
     with watch.stage(Stage.VERIFICATION) as progress:
         verification = replay(
             job.cell,
@@ -220,9 +221,6 @@ def verify_motion(
             progress,
             beside,
         )
-    # not before: while the program is written there is nothing to take turns with
-    beside.begin(planned.comparison)
-    beside.begin(planned.drawn)
     if verification.verified is None:
         return Refused(planned, verification, (), watch.seconds)
     return Proven(planned, verification, verification.verified)

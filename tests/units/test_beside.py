@@ -55,6 +55,17 @@ def test_a_value_is_worked_out_in_another_process_once_and_the_process_is_gone()
     np.testing.assert_array_equal(array, np.arange(3.0))
 
 
+def test_a_value_is_begun_behind_the_next_list_that_is_shared():
+    before, later = Later(where), Later(where)
+    with Beside(True) as beside:
+        beside.begin_behind(before)
+        assert beside.share(squaring, (0,), [1, 2]) and before.value() == (HERE,)
+        beside.start()
+        beside.begin_behind(later)
+        beside.share(squaring, (1,), list(range(4)))
+        assert later.value() != (HERE,)
+
+
 def test_the_longest_items_are_taken_first_and_given_back_in_their_order():
     taken = []
 
