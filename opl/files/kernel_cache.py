@@ -15,6 +15,7 @@ import logging
 import os
 import shutil
 import tempfile
+from functools import cache
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
@@ -54,6 +55,7 @@ def settle_kernel_cache(package: Path) -> None:
     )
 
 
+@cache
 def _mark(package: Path) -> str:
     """Return the digest of all modules of a package that compile, and of how they do, short."""
     digest, how = hashlib.sha256(), package / "files" / "kernels.py"

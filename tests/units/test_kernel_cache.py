@@ -47,6 +47,7 @@ def test_kernels_of_other_code_are_not_taken(tmp_path, monkeypatch):
         (package / "kernel.py").write_text(f"from opl.files.kernels import kernel\n{kernel}")
         (package / "other.py").write_text(other)
         monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "given"))
+        kernel_cache._mark.cache_clear()  # as in another process
         settle_kernel_cache(package)
         settle_kernel_cache(package)  # as the next room does
         return Path(os.environ["NUMBA_CACHE_DIR"])
