@@ -78,6 +78,8 @@ class CollisionScene:
         self._enough = np.array(margins) + ROUND_OFF
         self._enough[list(unchecked)] = -np.inf
         self._separation = self.separation(np.arange(len(margins)))
+        # and need not look where a pair of plain solids is certainly nearer than that
+        self._surely = np.where(self._separation.plain, self._enough - 2.0 * ROUND_OFF, -np.inf)
 
     def for_second_opinion(self) -> CollisionScene:
         """Return the scene with as much more clearance as the replay may find less.
@@ -150,8 +152,9 @@ class CollisionScene:
         found: np.ndarray = np.zeros(len(q), dtype=bool)
         for first in range(0, len(q), BLOCK):
             block = q[first : first + BLOCK]
-            near = self._separation.near(block, self._enough)
-            for k in near.any(axis=1).nonzero()[0].tolist() if near.any() else ():
+            near, met = self._separation.near_or_met(block, self._enough, self._surely)
+            found[first : first + BLOCK] = met
+            for k in (near.any(axis=1) & ~met).nonzero()[0].tolist():
                 found[first + k] = next(self._hits(block[k], near[k]), None) is not None
         return found
 

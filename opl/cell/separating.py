@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from opl.cell.touching import beyond, surely_within
 from opl.files.kernels import kernel, prange
 
 DIRECTIONS = 18  # that are tried for a pair
@@ -20,7 +21,7 @@ _GIVEN = (
     "Tuple((float64[:,:,::1],float64[:,::1],int64[::1],float64[:,:,::1],float64[:,::1],"
     "float64[:,::1])),"
     "Tuple((int64[:,::1],int64[::1],int64[:,::1],float64[:,::1])),"
-    "float64[::1],float64,"
+    "float64[::1],float64[::1],float64,"
 )
 
 
@@ -54,26 +55,7 @@ def _between(bodies, sizes, a, b, way):  # type: ignore[no-untyped-def]
 @kernel()
 def _towards(bodies, sizes, a, b):  # type: ignore[no-untyped-def]
     """Return the vector from the nearest point of a body to the middle of another one."""
-    dx = bodies[b, 0, 3] - bodies[a, 0, 3]
-    dy = bodies[b, 1, 3] - bodies[a, 1, 3]
-    dz = bodies[b, 2, 3] - bodies[a, 2, 3]
-    x = dx * bodies[a, 0, 0] + dy * bodies[a, 1, 0] + dz * bodies[a, 2, 0]
-    y = dx * bodies[a, 0, 1] + dy * bodies[a, 1, 1] + dz * bodies[a, 2, 1]
-    z = dx * bodies[a, 0, 2] + dy * bodies[a, 1, 2] + dz * bodies[a, 2, 2]
-    if sizes[a, 2] < 0.0:
-        away = np.sqrt(x * x + y * y)
-        part = max(0.0, away - sizes[a, 0]) / away if away > 0.0 else 0.0
-        x, y = part * x, part * y
-        z -= min(max(z, -sizes[a, 1]), sizes[a, 1])
-    else:
-        x -= min(max(x, -sizes[a, 0]), sizes[a, 0])
-        y -= min(max(y, -sizes[a, 1]), sizes[a, 1])
-        z -= min(max(z, -sizes[a, 2]), sizes[a, 2])
-    return (
-        x * bodies[a, 0, 0] + y * bodies[a, 0, 1] + z * bodies[a, 0, 2],
-        x * bodies[a, 1, 0] + y * bodies[a, 1, 1] + z * bodies[a, 1, 2],
-        x * bodies[a, 2, 0] + y * bodies[a, 2, 1] + z * bodies[a, 2, 2],
-    )
+    return beyond(bodies, sizes, a, 0.0, bodies[b, 0, 3], bodies[b, 1, 3], bodies[b, 2, 3])
 
 
 @kernel()
@@ -130,12 +112,38 @@ def _turn_about(axis, angle, T):  # type: ignore[no-untyped-def]
     T[2, 0], T[2, 1], T[2, 2] = d * z * x - s * y, d * z * y + s * x, c + d * z * z
 
 
-@kernel("void(" + _GIVEN + "float64[::1],float64[::1],int64[::1],boolean[:,::1])", early=True)
-def separate(q, solids, paired, enough, more, last, apart, best, near):  # type: ignore[no-untyped-def]
-    """Go through configurations one after the other; see `Separation.near`.
+@kernel()
+def _place(q, n, pair, solids, placed, room, at, bodies):  # type: ignore[no-untyped-def]
+    """Bring two bodies to where they are at configuration n, and the joints, if they are not.
+
+    ``at`` tells at which configuration each body was placed last, and at its end the joints.
+    """
+    before_joint, axes, joint, joint_body = solids[:4]
+    if at[-1] < n:
+        at[-1] = n
+        for k in range(len(before_joint)):
+            _product(placed[k], before_joint[k], room[0])
+            _turn_about(axes[k], q[n, k], room[1])
+            _product(room[0], room[1], placed[k + 1])
+    for body in pair:
+        if at[body] < n and (at[body] < 0 or joint[body] > 0):
+            _product(placed[joint[body]], joint_body[body], bodies[body])
+            at[body] = n
+
+
+@kernel(
+    "void(" + _GIVEN + "float64[::1],float64[::1],int64[::1],boolean[:,::1],boolean[::1])",
+    early=True,
+)
+def separate(  # type: ignore[no-untyped-def]
+    q, solids, paired, enough, surely, more, last, apart, best, near, met
+):
+    """Go through configurations one after the other; see `Separation.near` and `near_or_met`.
 
     Kept up to date from one call to the next: joints ``last``, bounds ``apart``, directions
-    ``best``. What may be near is set in ``near``, the rest of which is left as it is.
+    ``best``. What may be near is set in ``near``, the rest of which is left as it is. Once a pair
+    is found to be within its ``surely``, -inf where that is not asked, ``met`` is set and no other
+    pair is looked at.
 
     ``solids`` are the arrays of `Bodies`; ``paired`` the bodies of the pairs, the order in which
     pairs are gone through, and of each group its first place in there, the one after its last, the
@@ -144,15 +152,15 @@ def separate(q, solids, paired, enough, more, last, apart, best, near):  # type:
     A group of pairs is looked at when something of it could have become near: by the joints that
     move one body of each and not the other, with the largest levers of the group.
     """
-    before_joint, axes, joint, joint_body, sizes, levers = solids
+    before_joint, _, joint, _, sizes, levers = solids
     pairs, order, groups, group_levers = paired
     n_joints, n_bodies = len(before_joint), len(joint)
     placed = np.zeros((n_joints + 1, 4, 4))  # of the joints in the world
     for k in range(4):
         placed[0, k, k] = 1.0
-    at_zero, turn = np.zeros((4, 4)), np.zeros((4, 4))
+    room = np.zeros((2, 4, 4))
     bodies = np.zeros((n_bodies, 4, 4))
-    at: np.ndarray = np.full(n_bodies, -1)  # number of the configuration a body was placed at
+    at: np.ndarray = np.full(n_bodies + 1, -1)
     radii = np.empty(n_bodies)
     for b in range(n_bodies):
         last_edge = max(sizes[b, 2], 0.0)
@@ -163,11 +171,17 @@ def separate(q, solids, paired, enough, more, last, apart, best, near):  # type:
     wakes, first_wakes = np.empty(len(pairs)), np.full(len(groups), -np.inf)
     for p in range(len(pairs)):
         wakes[p] = apart[p] - enough[p] - SLACK if apart[p] > enough[p] else -np.inf
+    struck = -1  # the pair that was within its distance the last time: it mostly still is
     for n in range(len(q)):
         for k in range(n_joints):
             turned[k] += abs(q[n, k] - last[k])
             last[k] = q[n, k]
-        chain = False
+        if struck >= 0:
+            a, b = pairs[struck, 0], pairs[struck, 1]
+            _place(q, n, (a, b), solids, placed, room, at, bodies)
+            if surely_within(bodies, sizes, a, b, surely[struck]):
+                met[n] = True
+                continue
         for g in range(len(groups)):
             low, high = groups[g, 2], groups[g, 3]
             moved = 0.0
@@ -187,16 +201,7 @@ def separate(q, solids, paired, enough, more, last, apart, best, near):  # type:
                     bound -= levers[b, k] * (turned[k] - seen[p, k])
                     seen[p, k] = turned[k]
                 if bound <= enough[p]:
-                    if not chain:
-                        chain = True
-                        for k in range(n_joints):
-                            _product(placed[k], before_joint[k], at_zero)
-                            _turn_about(axes[k], q[n, k], turn)
-                            _product(at_zero, turn, placed[k + 1])
-                    for body in (a, b):
-                        if at[body] < n and (at[body] < 0 or joint[body] > 0):
-                            _product(placed[joint[body]], joint_body[body], bodies[body])
-                            at[body] = n
+                    _place(q, n, (a, b), solids, placed, room, at, bodies)
                     x = bodies[b, 0, 3] - bodies[a, 0, 3]
                     y = bodies[b, 1, 3] - bodies[a, 1, 3]
                     z = bodies[b, 2, 3] - bodies[a, 2, 3]
@@ -205,14 +210,16 @@ def separate(q, solids, paired, enough, more, last, apart, best, near):  # type:
                         # what was the best direction the last time mostly still is
                         way = _direction(bodies, sizes, a, b, best[p])
                         bound = max(bound, _between(bodies, sizes, a, b, way))
-                        if bound <= enough[p]:
-                            for number in range(DIRECTIONS):
-                                way = _direction(bodies, sizes, a, b, number)
-                                along = _between(bodies, sizes, a, b, way)
-                                if along > bound:
-                                    bound, best[p] = along, number
-                                if along > enough[p] + more:
-                                    break
+                    if bound <= enough[p] and surely[p] > -np.inf:
+                        met[n] = surely_within(bodies, sizes, a, b, surely[p])
+                    if bound <= enough[p] and not met[n]:
+                        for number in range(DIRECTIONS):
+                            way = _direction(bodies, sizes, a, b, number)
+                            along = _between(bodies, sizes, a, b, way)
+                            if along > bound:
+                                bound, best[p] = along, number
+                            if along > enough[p] + more:
+                                break
                 apart[p] = bound
                 if bound > enough[p]:
                     wakes[p] = moved + (bound - enough[p]) - SLACK
@@ -220,7 +227,12 @@ def separate(q, solids, paired, enough, more, last, apart, best, near):  # type:
                     wakes[p] = -np.inf
                     near[n, p] = True
                 soonest = min(soonest, wakes[p])
+                if met[n]:
+                    struck = p
+                    break
             first_wakes[g] = soonest
+            if met[n]:
+                break
     for p in range(len(pairs)):
         b = pairs[p, 1]
         for k in range(joint[pairs[p, 0]], joint[b]):
@@ -228,16 +240,16 @@ def separate(q, solids, paired, enough, more, last, apart, best, near):  # type:
 
 
 @kernel(
-    "void(" + _GIVEN + "float64[:,::1],float64[:,::1],int64[:,::1],boolean[:,::1],int64)",
+    "void(" + _GIVEN + "float64[:,::1],float64[:,::1],int64[:,::1],boolean[:,::1],boolean[::1],"
+    "int64)",
     threads=True,
     early=True,
 )
 def separate_parts(  # type: ignore[no-untyped-def]
-    q, solids, paired, enough, more, last, apart, best, near, length
+    q, solids, paired, enough, surely, more, last, apart, best, near, met, length
 ):
     """Go through parts of this length as `separate` does, each with a state of its own."""
     for part in prange(len(last)):
         own = slice(part * length, min((part + 1) * length, len(q)))
-        separate(
-            q[own], solids, paired, enough, more, last[part], apart[part], best[part], near[own]
-        )
+        state = last[part], apart[part], best[part], near[own], met[own]
+        separate(q[own], solids, paired, enough, surely, more, *state)

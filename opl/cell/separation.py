@@ -18,6 +18,7 @@ from opl.files.kernels import threads_are_allowed
 from opl.geometry.frames import Array
 
 MORE = 0.05  # [m] that a bound is improved beyond what is asked: for that long it is left alone
+PLAIN = coal.Box, coal.Cylinder  # shapes that are taken as they are
 PART = 1024  # configurations that a thread goes through at a time
 
 
@@ -32,6 +33,7 @@ class Bodies:
         Ts_joint_body: Middle and axes of each body in the frame of that joint, shape (b, 4, 4).
         sizes: Half the edges of a box; radius, half length and -1 of a cylinder about z; in [m],
             shape (b, 3).
+        plain: Which are boxes or cylinders, not held by a box, shape (b,).
         levers: How far anything of each body can be from the axis of each joint that moves it, at
             any configuration, in [m]; 0 for the others; shape (b, j).
     """
@@ -41,6 +43,7 @@ class Bodies:
     joint: np.ndarray
     Ts_joint_body: Array
     sizes: Array
+    plain: np.ndarray
     levers: Array
 
     @classmethod
@@ -64,7 +67,8 @@ class Bodies:
                 place = Ts[k, :3, 3]
         moved_by = np.array([body.parentJoint for body in objects], dtype=np.int64)
         sizes = np.array([size for _, size in boxes])
-        return cls(Ts, axes, moved_by, np.array([T for T, _ in boxes]), sizes, levers)
+        plain = np.array([isinstance(body.geometry, PLAIN) for body in objects])
+        return cls(Ts, axes, moved_by, np.array([T for T, _ in boxes]), sizes, plain, levers)
 
 
 class Separation:
@@ -94,6 +98,7 @@ class Separation:
         lower_first = bodies.joint[pairs].argsort(axis=1, kind="stable")
         pairs = np.ascontiguousarray(np.take_along_axis(pairs, lower_first, axis=1))
         first, second = pairs.T
+        self.plain = bodies.plain[pairs].all(axis=1)  # pairs of plain bodies, shape (p,)
         number = np.arange(len(bodies.axes))
         between = (number >= bodies.joint[first, None]) & (number < bodies.joint[second, None])
         # by how much a pair can come apart while a joint turns by 1 rad, in [m], shape (p, j)
@@ -123,25 +128,41 @@ class Separation:
         Returns:
             Shape (n, p) of bool.
         """
+        return self.near_or_met(q, enough, np.full(len(enough), -np.inf))[0]
+
+    def near_or_met(self, q: Array, enough: Array, surely: Array) -> tuple[np.ndarray, np.ndarray]:
+        """Return what `near` does, and which configurations surely bring a pair as near as asked.
+
+        Args:
+            q: Configurations as of `near`.
+            enough: Distances as of `near`.
+            surely: Distances that pairs of plain bodies may surely be within in [m], below 0 if
+                they have to sink into each other, -inf for pairs that are not asked about; (p,).
+
+        Returns:
+            Shape (n, p) of bool, not complete where a pair is as near as asked; shape (n,) of bool.
+        """
         near: np.ndarray = np.zeros((len(q), len(self.apart)), dtype=bool)
+        met: np.ndarray = np.zeros(len(q), dtype=bool)
         given = (
             np.array(q, dtype=float, order="C"),  # compiled for arrays that can be written to
             self._solids,
             self._paired,
             enough,
+            surely,
             MORE,
         )
         if len(q) < 2 * PART or not threads_are_allowed():
-            separate(*given, self._last, self.apart, self._best, near)
-            return near
+            separate(*given, self._last, self.apart, self._best, near, met)
+            return near, met
         # each part begins with nothing known, whatever the number of threads
         n_parts = -(-len(q) // PART)
         last = np.zeros((n_parts, len(self._last)))
         apart = np.full((n_parts, len(self.apart)), -np.inf)
         best = np.tile(self._best, (n_parts, 1))
-        separate_parts(*given, last, apart, best, near, PART)
+        separate_parts(*given, last, apart, best, near, met, PART)
         self._last[:], self.apart[:], self._best[:] = last[-1], apart[-1], best[-1]
-        return near
+        return near, met
 
 
 def _box(body: pin.GeometryObject) -> tuple[Array, Array]:

@@ -132,6 +132,7 @@ def test_bounds_of_boxes_and_cylinders_apart_along_a_face_or_an_axis_are_exact()
             [pose(np.eye(3), np.array([x, y, 0.0])) for x, y in ((0, 0), (0.5, 0.15), (2, 0))]
         ),
         np.array([[0.1, 0.1, 0.1], [0.1, 0.1, 0.1], [0.4, 0.2, -1.0]]),
+        np.ones(3, dtype=bool),
         np.zeros((3, 1)),
     )
     separation = Separation(chain, np.array([[0, 1], [0, 2]]))
