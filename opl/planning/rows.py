@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
+from opl.planning.stretches import passed, stretches
 from opl.search.box import JointBox
-from opl.search.in_box import clipped
 from opl.search.ladder import Ladder
 
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
@@ -17,6 +17,7 @@ MOST_PARTS = 8  # into which an edge that bulges is cut at once
 FINE_SHARE = 3e-5  # of the box: what an edge may bulge
 SWEEP = 6.0  # belt units that the contact moves from cutter point to cutter point in a sweep
 SAME = 1e-5  # cutter points that two places are apart at the least
+SAME_PLACE = 1e-9  # cutter points that two stretches of a row are apart at the least
 
 
 @dataclass(frozen=True)
@@ -35,13 +36,10 @@ class Row:
 
     def inside(self, box: JointBox) -> Array:
         """Return where the box holds them: first and last place of every stretch, shape (k, 2)."""
-        enter, leave = (share[0] for share in clipped(self.q[None], box))
-        hit = np.flatnonzero(leave >= enter)
-        step = np.diff(self.places)[hit]
-        first = self.places[hit] + enter[hit] * step
-        last = self.places[hit] + leave[hit] * step
-        starts = np.append(True, first[1:] > last[:-1] + 1e-9)[: len(hit)]
-        return np.stack([first[starts], np.append(last[:-1][starts[1:]], last[-1:])], axis=1)
+        q = np.require(self.q, requirements=["C", "W"])
+        found = np.empty((len(q), 2))
+        count = stretches(q, np.array(self.places), box.lower, box.upper, SAME_PLACE, found)
+        return found[:count]
 
 
 @dataclass(frozen=True)
@@ -99,18 +97,18 @@ def shut_edges(places: Array, t: Array, rows: Sequence[Row], box: JointBox) -> n
 
     The nodes are at some places and contact positions, shape (n,) and (n, m).
     """
-    n_rows = t.shape[1]
-    shut = np.zeros((len(t) - 1, n_rows, n_rows), dtype=bool)
-    for row in rows:
-        first, last = row.inside(box).T
-        on = np.flatnonzero((places[:-1] >= row.places[0]) & (places[1:] <= row.places[-1]))
-        # a stretch of the row that begins before the end of the edge ends after its start
-        begun = np.searchsorted(first, places[on + 1] + SAME)
-        over = np.searchsorted(last, places[on] - SAME)
-        edge = on[begun <= over]
-        below = t < row.contact_position
-        shut[edge] |= below[edge][:, :, None] != below[edge + 1][:, None, :]
-    return np.flatnonzero(shut)
+    counts = np.zeros((2, len(t) - 1, t.shape[1]), dtype=np.int64)
+    if rows:
+        every = (
+            np.concatenate([row.q for row in rows]),
+            np.concatenate([row.places for row in rows]),
+            np.cumsum([0, *(len(row.places) for row in rows)]),
+            np.array([row.contact_position for row in rows]),
+        )
+        at = np.array(places), np.ascontiguousarray(t)
+        passed(*at, *every, box.lower, box.upper, SAME_PLACE, SAME, counts)
+    before, after = counts
+    return np.flatnonzero(before[:, :, None] != after[:, None, :])
 
 
 def bulging(places: Array, t: Array, edge: np.ndarray, excess: Array) -> list[Bulge]:

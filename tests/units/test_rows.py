@@ -1,4 +1,4 @@
-"""Where tracks get no further, held against every track of small ladders."""
+"""Where tracks get no further and what rows shut, against all tracks and edges one by one."""
 
 import itertools
 
@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opl.planning.rows import MOST_PARTS, bars, broken_at, crossed
+from opl.planning.rows import MOST_PARTS, SAME, Row, bars, broken_at, crossed, shut_edges
+from opl.search.box import JointBox
+from opl.search.in_box import clipped
 from opl.search.ladder import Ladder
 
 COLUMNS, ROWS = 4, 3
@@ -74,3 +76,62 @@ def test_a_way_that_cannot_be_made_is_cut_further_until_it_is_too_short():
     (bulge,) = broken_at(places, 0)
     assert (bulge.first, bulge.last, bulge.parts) == (0.0, 1.0, MOST_PARTS)
     assert broken_at(places, 1) == []
+
+
+def old_inside(row, box):
+    """The stretches of a row that a box holds, each chord joined to the one before it."""
+    enter, leave = (share[0] for share in clipped(row.q[None], box))
+    found = []
+    for k in np.flatnonzero(leave >= enter).tolist():
+        ends = row.places[k] + np.array([enter[k], leave[k]]) * (row.places[k + 1] - row.places[k])
+        if found and ends[0] <= found[-1][1] + 1e-9:
+            found[-1][1] = ends[1]
+        else:
+            found.append(ends)
+    return np.array(found).reshape(-1, 2)
+
+
+def random_rows(rng, n_rows):
+    """Rows of postures that wander in and out of a box, some of them missing."""
+    rows = []
+    for _ in range(n_rows):
+        places = 10.0 + np.cumsum(rng.uniform(0.01, 0.4, rng.integers(2, 40)))
+        q = np.cumsum(rng.normal(0.0, 0.12, (len(places), 6)), axis=0)
+        q[rng.uniform(size=len(q)) < 0.1] = np.nan
+        rows.append(Row(places, float(rng.integers(-3, 4)), q))
+    return rows
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_stretches_of_rows_are_the_chords_that_the_box_holds(seed):
+    rng = np.random.default_rng(seed)
+    box = JointBox(np.full(6, -0.4), np.full(6, 0.5))
+    for row in random_rows(rng, 60):
+        np.testing.assert_array_equal(row.inside(box), old_inside(row, box))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_edges_are_shut_where_any_row_between_their_ends_lies_outside_of_the_box(seed):
+    rng = np.random.default_rng(seed)
+    box = JointBox(np.full(6, -0.4), np.full(6, 0.5))
+    rows = random_rows(rng, 40)
+    places = np.sort(rng.uniform(9.5, 14.0, 60))
+    t = rng.uniform(-4.0, 4.0, (60, 7)).round(1)
+    expected = []
+    for k in range(len(places) - 1):
+        shut = [
+            row.contact_position
+            for row in rows
+            if row.places[0] <= places[k] and places[k + 1] <= row.places[-1]
+            and not any(
+                first < places[k + 1] + SAME and last >= places[k] - SAME
+                for first, last in old_inside(row, box)
+            )
+        ]  # fmt: skip
+        for a, b in itertools.product(range(7), repeat=2):
+            low, high = sorted((t[k, a], t[k + 1, b]))
+            if any(low < level <= high for level in shut):
+                expected.append((k * 7 + a) * 7 + b)
+    assert 0 < len(expected) < 59 * 49
+    np.testing.assert_array_equal(shut_edges(places, t, rows, box), expected)
+    assert not len(shut_edges(places, t, [], box))
