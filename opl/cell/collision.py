@@ -15,38 +15,24 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.coal_shapes import coal_mesh, coal_solid
-from opl.cell.robot_shapes import collision_shapes
+from opl.cell.cell_geometry import BodyPair as BodyPair
+from opl.cell.cell_geometry import cell_geometry
 from opl.cell.separation import Bodies, Separation
-from opl.cell.workcell import PART, SECOND_OPINION, SECOND_OPINION_OF_A_LINK, WHEEL, WorkCell
+from opl.cell.workcell import SECOND_OPINION, SECOND_OPINION_OF_A_LINK, WorkCell
 from opl.geometry.frames import Array, read_only, transform
 
-BodyPair = tuple[str, str]
 ROUND_OFF = 1e-6  # [m] of coal: bodies farther apart by more than this do not collide for it
 BLOCK = 4096  # configurations that are looked at in one call
 
 
 class CollisionScene:
-    """The cell as geometry, ready for collision checks.
-
-    Checked is every pair that could meet: links that are not neighbours, held bodies against all
-    links but the flange's, and links and held bodies against wheel and obstacles. Pairs with
-    something that is not the robot must keep the required clearance of the cell; links of the robot
-    must not touch each other (their primitives already enclose the real castings). Meshes of links
-    count as their convex hulls. The cell may have other rules for single pairs.
-    """
+    """The cell as geometry, ready for collision checks of all pairs of `cell_geometry`."""
 
     def __init__(self, cell: WorkCell) -> None:
-        self._model, self._geometry = collision_shapes(cell.robot)
-        for link in self._geometry.geometryObjects:
-            if isinstance(link.geometry, coal.BVHModelBase):
-                # as in the replay, which otherwise would refuse what is planned
-                link.geometry.buildConvexHull(False, "Qt")
-                link.geometry = link.geometry.convex
-        self._n_links = self._geometry.ngeoms
-        self._add_bodies(cell)
-        self._pairs: list[BodyPair] = []
-        self._needed = np.array(self._choose_pairs(cell))
+        solids = cell_geometry(cell)
+        self._model, self._geometry = solids.model, solids.geometry
+        self._n_links, self._T_base_world = solids.n_links, solids.T_base_world
+        self._pairs, self._needed = solids.pairs, solids.needed
         self._bodies = Bodies.of(self._model, self._geometry)
         meshes = [
             isinstance(body.geometry, coal.BVHModelBase) for body in self._geometry.geometryObjects
@@ -231,55 +217,6 @@ class CollisionScene:
         found = self._geometry_data.distanceResults[index]
         places = np.array([found.getNearestPoint1(), found.getNearestPoint2()])
         return transform(self._T_base_world, places)
-
-    def _add_bodies(self, cell: WorkCell) -> None:
-        """Add held bodies at the flange, wheel and obstacles at the base frame."""
-        flange = self._model.frames[self._model.getFrameId("tool0")]
-        base = self._model.frames[self._model.getFrameId("base")]
-        self._T_base_world = base.placement.inverse().homogeneous  # base does not move
-        self._add(PART, coal_mesh(cell.part), flange, cell.T_flange_workpiece)
-        for body in cell.fixture:
-            self._add(body.name, coal_solid(body), flange, body.T_parent_body)
-        for body in (cell.wheel_body(), *cell.obstacles):
-            self._add(body.name, coal_solid(body), base, body.T_parent_body)
-
-    def _add(
-        self, name: str, shape: coal.CollisionGeometry, frame: pin.Frame, T_frame_body: Array
-    ) -> None:
-        placement = frame.placement * pin.SE3(T_frame_body)
-        self._geometry.addGeometryObject(
-            pin.GeometryObject(name, frame.parentJoint, placement, shape)
-        )
-
-    def _choose_pairs(self, cell: WorkCell) -> list[float]:
-        """Enter the pairs to be checked and return the margin of each in [m]."""
-        joints = [geometry.parentJoint for geometry in self._geometry.geometryObjects]
-        margins = []
-        for second in range(len(joints)):
-            for first in range(second):
-                both_links = second < self._n_links
-                apart = abs(joints[first] - joints[second])
-                pair = (self._name(first), self._name(second))
-                # nothing moves within one joint; neighbouring links share a bearing
-                if apart == 0 or (both_links and apart == 1) or pair == (PART, WHEEL):
-                    continue
-                # joint 0 is what does not move: next to the first link, but not its neighbour
-                held_at_wrist = apart == 1 and min(joints[first], joints[second]) > 0
-                usual = 0.0 if both_links or held_at_wrist else cell.required_clearance
-                margin = cell.pairs.between(*pair, otherwise=usual)
-                if margin is None:
-                    continue
-                self._geometry.addCollisionPair(pin.CollisionPair(first, second))
-                self._pairs.append(pair)
-                margins.append(margin)
-        return margins
-
-    def _name(self, index: int) -> str:
-        """Return the link's name for a piece of the robot, else the body's own name."""
-        geometry = self._geometry.geometryObjects[index]
-        if index < self._n_links:
-            return str(self._model.frames[geometry.parentFrame].name)
-        return str(geometry.name)
 
 
 def _begin_anew(data: pin.GeometryData) -> None:
