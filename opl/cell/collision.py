@@ -22,6 +22,7 @@ from opl.cell.workcell import SECOND_OPINION, SECOND_OPINION_OF_A_LINK, WorkCell
 from opl.geometry.frames import Array, read_only, transform
 
 ROUND_OFF = 1e-6  # [m] of coal: bodies farther apart by more than this do not collide for it
+FIRST_BLOCK = 8  # configurations that are looked at together where the first that collides ends it
 BLOCK = 4096  # configurations that are looked at in one call
 
 
@@ -135,13 +136,30 @@ class CollisionScene:
     def collides(self, q: Array) -> np.ndarray:
         """Return which configurations in [rad], shape (n, 6), collide; shape (n,) of bool."""
         self._asked[0] += len(q)
-        found: np.ndarray = np.zeros(len(q), dtype=bool)
-        for first in range(0, len(q), BLOCK):
-            block = q[first : first + BLOCK]
-            near, met = self._separation.near_or_met(block, self._enough, self._surely)
-            found[first : first + BLOCK] = met
-            for k in (near.any(axis=1) & ~met).nonzero()[0].tolist():
-                found[first + k] = next(self._hits(block[k], near[k]), None) is not None
+        blocks = [self._look(q[first : first + BLOCK]) for first in range(0, len(q), BLOCK)]
+        return np.concatenate(blocks) if blocks else np.zeros(0, dtype=bool)
+
+    def first_colliding(self, q: Array) -> int:
+        """Return which configuration in [rad], shape (n, 6), is the first to collide, n for none.
+
+        Those behind it are not asked about.
+        """
+        begin, count = 0, FIRST_BLOCK
+        while begin < len(q):
+            hits = self._look(q[begin : begin + count])
+            if hits.any():
+                first = begin + int(hits.argmax())
+                self._asked[0] += first + 1
+                return first
+            begin, count = begin + count, 2 * count
+        self._asked[0] += len(q)
+        return len(q)
+
+    def _look(self, q: Array) -> np.ndarray:
+        """Return which configurations collide, as `collides` does."""
+        near, found = self._separation.near_or_met(q, self._enough, self._surely)
+        for k in (near.any(axis=1) & ~found).nonzero()[0].tolist():
+            found[k] = next(self._hits(q[k], near[k]), None) is not None
         return found
 
     def collides_throughout(self, q: Array, turned: Array) -> np.ndarray:

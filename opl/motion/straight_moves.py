@@ -55,10 +55,10 @@ class StraightMoves:
             return False  # limits are linear in the joints: what both ends keep, the move keeps
         dense, _ = densify(np.stack([start, end]), RESOLUTION)
         # the middle first, then the quarters: a move that is not free is mostly known so sooner
-        for configuration in dense[_halving(len(dense))]:
-            self.checked += 1
-            if self._scene.collides(configuration[None])[0]:
-                return False
+        first = self._scene.first_colliding(dense[_halving(len(dense))])
+        self.checked += min(first + 1, len(dense))
+        if first < len(dense):
+            return False
         if self._too_near_wheel(dense, 0.0).any():
             return False
         pieces = np.array([[0.0, 1.0]])

@@ -102,6 +102,20 @@ def test_collisions_in_parts_are_the_same_in_threads_and_without_any(monkeypatch
     np.testing.assert_array_equal(scene.collides(q), hit)
 
 
+def test_the_first_that_collides_is_the_one_asked_one_by_one_and_so_are_the_queries():
+    cell = crowded("mh24", seed=5)
+    scene = CollisionScene(cell)
+    q = configurations(cell.robot, seed=6, n=80)
+    hit = scene.collides(q)
+    free, shut = q[~hit], q[hit]
+    for count in (0, 1, 7, 8, 9, 30):
+        for some in (free[:count], np.concatenate([free[:count], shut[:2], free[:3]])):
+            before = scene.queries
+            first = scene.first_colliding(some)
+            assert first == count
+            assert scene.queries - before == min(count + 1, len(some))
+
+
 def test_configurations_may_be_read_only():
     scene = CollisionScene(v_job().cell)
     q = np.tile(v_job().process.home, (3, 1))

@@ -100,6 +100,9 @@ class Ghosts:
         away = np.linalg.norm(np.asarray(q)[:, None] - self._q, axis=-1)
         return (away < self._radius).any(axis=1)
 
+    def first_colliding(self, q):
+        return next((k for k, one in enumerate(q) if self.collides(one[None])[0]), len(q))
+
     def colliding_pairs(self, q):
         return [("R_link", "ghost")] if self.collides(q[None])[0] else []
 
