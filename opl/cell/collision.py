@@ -66,7 +66,8 @@ class CollisionScene:
         self._enough[list(unchecked)] = -np.inf
         self._separation = self.separation(np.arange(len(margins)))
         # and need not look where a pair of plain solids is certainly nearer than that
-        self._surely = np.where(self._separation.plain, self._enough - 2.0 * ROUND_OFF, -np.inf)
+        surely = np.where(self._separation.plain, self._enough - 2.0 * ROUND_OFF, -np.inf)
+        self._surely = surely[None]
 
     def for_second_opinion(self) -> CollisionScene:
         """Return the scene with as much more clearance as the replay may find less.
@@ -174,10 +175,11 @@ class CollisionScene:
             turned: How far each joint may turn from there in [rad], shape (n, 6).
         """
         self._asked[0] += len(q)
-        near = self._separation.near(q, self._enough)
         apart = turned @ self._separation.levers.T
-        hits = [self._stay(*of_one) for of_one in zip(q, near, apart, strict=True)]
-        return np.array(hits, dtype=bool)
+        near, stay = self._separation.near_or_met(q, self._enough, self._surely - apart)
+        for k in (near.any(axis=1) & ~stay).nonzero()[0].tolist():
+            stay[k] = self._stay(q[k], near[k], apart[k])
+        return stay
 
     def _stay(self, q: Array, near: np.ndarray, apart: Array) -> bool:
         """Return whether one of the pairs marked collides even with so much less clearance."""

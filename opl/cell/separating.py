@@ -21,7 +21,7 @@ _GIVEN = (
     "Tuple((float64[:,:,::1],float64[:,::1],int64[::1],float64[:,:,::1],float64[:,::1],"
     "float64[:,::1])),"
     "Tuple((int64[:,::1],int64[::1],int64[:,::1],float64[:,::1])),"
-    "float64[::1],float64[::1],float64,"
+    "float64[::1],float64[:,::1],float64,"
 )
 
 
@@ -143,7 +143,7 @@ def separate(  # type: ignore[no-untyped-def]
     Kept up to date from one call to the next: joints ``last``, bounds ``apart``, directions
     ``best``. What may be near is set in ``near``, the rest of which is left as it is. Once a pair
     is found to be within its ``surely``, -inf where that is not asked, ``met`` is set and no other
-    pair is looked at.
+    pair is looked at; one row of it for all configurations or one for each.
 
     ``solids`` are the arrays of `Bodies`; ``paired`` the bodies of the pairs, the order in which
     pairs are gone through, and of each group its first place in there, the one after its last, the
@@ -176,10 +176,11 @@ def separate(  # type: ignore[no-untyped-def]
         for k in range(n_joints):
             turned[k] += abs(q[n, k] - last[k])
             last[k] = q[n, k]
-        if struck >= 0:
+        within = surely[min(n, len(surely) - 1)]
+        if struck >= 0 and within[struck] > -np.inf:
             a, b = pairs[struck, 0], pairs[struck, 1]
             _place(q, n, (a, b), solids, placed, room, at, bodies)
-            if surely_within(bodies, sizes, a, b, surely[struck]):
+            if surely_within(bodies, sizes, a, b, within[struck]):
                 met[n] = True
                 continue
         for g in range(len(groups)):
@@ -210,8 +211,8 @@ def separate(  # type: ignore[no-untyped-def]
                         # what was the best direction the last time mostly still is
                         way = _direction(bodies, sizes, a, b, best[p])
                         bound = max(bound, _between(bodies, sizes, a, b, way))
-                    if bound <= enough[p] and surely[p] > -np.inf:
-                        met[n] = surely_within(bodies, sizes, a, b, surely[p])
+                    if bound <= enough[p] and within[p] > -np.inf:
+                        met[n] = surely_within(bodies, sizes, a, b, within[p])
                     if bound <= enough[p] and not met[n]:
                         for number in range(DIRECTIONS):
                             way = _direction(bodies, sizes, a, b, number)
@@ -252,4 +253,5 @@ def separate_parts(  # type: ignore[no-untyped-def]
     for part in prange(len(last)):
         own = slice(part * length, min((part + 1) * length, len(q)))
         state = last[part], apart[part], best[part], near[own], met[own]
-        separate(q[own], solids, paired, enough, surely, more, *state)
+        within = surely if len(surely) == 1 else surely[own]
+        separate(q[own], solids, paired, enough, within, more, *state)

@@ -128,7 +128,7 @@ class Separation:
         Returns:
             Shape (n, p) of bool.
         """
-        return self.near_or_met(q, enough, np.full(len(enough), -np.inf))[0]
+        return self.near_or_met(q, enough, np.full((1, len(enough)), -np.inf))[0]
 
     def near_or_met(self, q: Array, enough: Array, surely: Array) -> tuple[np.ndarray, np.ndarray]:
         """Return what `near` does, and which configurations surely bring a pair as near as asked.
@@ -137,7 +137,8 @@ class Separation:
             q: Configurations as of `near`.
             enough: Distances as of `near`.
             surely: Distances that pairs of plain bodies may surely be within in [m], below 0 if
-                they have to sink into each other, -inf for pairs that are not asked about; (p,).
+                they have to sink into each other, -inf for pairs that are not asked about; of all
+                configurations or of each, shape (1, p) or (n, p).
 
         Returns:
             Shape (n, p) of bool, not complete where a pair is as near as asked; shape (n,) of bool.
