@@ -100,14 +100,13 @@ class BoxNodes:
         self.spare, self._spacing = spare, spacing
         problem = search.problem
         near = columns.free & in_box.nearest(columns.q, columns.free, box)
-        q = np.where(near[..., None], columns.q, np.nan)
         pass_index, sampler = columns.points.pass_index, search.sampler
         flips = []
         for flip, move in enumerate(sampler.flips):
             slots = np.array([placed.slot(flip) for placed in columns.placements])
             if not sampler.collisions or flip == sampler.mirrored:
                 flips.append((slots[pass_index], *move))
-        matrices = everywhere(problem.cell, columns.t, q, flips)
+        matrices = everywhere(problem.cell, columns.t, columns.q, near, flips)
         self.problem = replace(
             problem,
             points=columns.points,

@@ -17,11 +17,16 @@ from opl.planning.nodes import NodeMatrix
 from opl.planning.open_matrix import OpenMatrix, Track
 from opl.planning.turned import Kept
 
+ROUNDING = 1e-9  # of full turns
 SAME_SUM = 1e-6  # [rad] two tracks whose joint range sums differ by less are equally good
 
 
 def everywhere(
-    cell: WorkCell, t: Array, q: Array, flips: Sequence[tuple[np.ndarray, Array, Array]]
+    cell: WorkCell,
+    t: Array,
+    q: Array,
+    chosen: np.ndarray,
+    flips: Sequence[tuple[np.ndarray, Array, Array]],
 ) -> list[NodeMatrix]:
     """Return the matrices that make some postures anywhere within the limits.
 
@@ -30,28 +35,35 @@ def everywhere(
     Args:
         cell: The cell.
         t: Contact positions of each place in belt units, shape (n, m).
-        q: Their postures in [rad], NaN where there are none, shape (n, m, 6).
+        q: Postures at them in [rad], shape (n, m, 6).
+        chosen: Which of these are made, shape (n, m).
         flips: Of each flip of the wrist the IK branch of each place, shape (n,), and sign and shift
             of the joints, shape (6,).
     """
     robot, index = cell.robot, np.arange(q.shape[1])
     found: list[tuple[float, int, NodeMatrix]] = []
+    per_place = chosen.sum(axis=1)
+    if not per_place.all():
+        return []
+    begin, postures = np.cumsum(per_place) - per_place, q[chosen]
     for ik_branch, sign, shift in flips:
-        moved = q * sign + shift
-        low, high = np.nanmin(moved, axis=(0, 1)), np.nanmax(moved, axis=(0, 1))
-        first = np.ceil((robot.lower - high) / (2.0 * np.pi))
-        last = np.floor((robot.upper - low) / (2.0 * np.pi))
+        moved = postures * sign + shift
+        # every place has a posture at or beyond the lower limit, and one at or before the upper
+        low = np.minimum.reduceat(moved, begin).max(axis=0)
+        high = np.maximum.reduceat(moved, begin).min(axis=0)
+        first = np.ceil((robot.lower - high) / (2.0 * np.pi) - ROUNDING)
+        last = np.floor((robot.upper - low) / (2.0 * np.pi) + ROUNDING)
         counts = [np.arange(a, b + 1) for a, b in zip(first, last, strict=True)]
         for count in np.stack(np.meshgrid(*counts, indexing="ij"), axis=-1).reshape(-1, 6):
             turned = moved + 2.0 * np.pi * count
             within = cell.within_limits(turned)
-            if not within.any(axis=1).all():
+            if not np.logical_or.reduceat(within, begin).all():
                 continue
-            at = np.where(within[..., None], turned, np.nan)
-            margin = np.minimum(turned - robot.lower, robot.upper - turned)
-            near = float((1.0 / np.maximum(np.nanmin(margin, axis=(0, 1)), 1e-3)).sum())
-            nodes = NodeMatrix(ik_branch, Kept(np.ascontiguousarray(at)), t, index)
-            found.append((near, len(found), nodes))
+            at = np.full(q.shape, np.nan)
+            at[chosen] = np.where(within[:, None], turned, np.nan)
+            margin = np.minimum(turned - robot.lower, robot.upper - turned).min(axis=0)
+            near = float((1.0 / np.maximum(margin, 1e-3)).sum())
+            found.append((near, len(found), NodeMatrix(ik_branch, Kept(at), t, index)))
     return [nodes for _, _, nodes in sorted(found, key=lambda entry: entry[:2])]
 
 
