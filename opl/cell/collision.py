@@ -158,7 +158,9 @@ class CollisionScene:
 
     def _look(self, q: Array) -> np.ndarray:
         """Return which configurations collide, as `collides` does."""
-        near, found = self._separation.near_or_met(q, self._enough, self._surely)
+        near, found = self._separation.near_or_met(
+            q, self._enough, self._enough[None], self._surely
+        )
         for k in (near.any(axis=1) & ~found).nonzero()[0].tolist():
             found[k] = next(self._hits(q[k], near[k]), None) is not None
         return found
@@ -176,7 +178,9 @@ class CollisionScene:
         """
         self._asked[0] += len(q)
         apart = turned @ self._separation.levers.T
-        near, stay = self._separation.near_or_met(q, self._enough, self._surely - apart)
+        near, stay = self._separation.near_or_met(
+            q, self._enough, self._enough - apart, self._surely - apart
+        )
         for k in (near.any(axis=1) & ~stay).nonzero()[0].tolist():
             stay[k] = self._stay(q[k], near[k], apart[k])
         return stay

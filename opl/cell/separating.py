@@ -21,7 +21,7 @@ _GIVEN = (
     "Tuple((float64[:,:,::1],float64[:,::1],int64[::1],float64[:,:,::1],float64[:,::1],"
     "float64[:,::1])),"
     "Tuple((int64[:,::1],int64[::1],int64[:,::1],float64[:,::1])),"
-    "float64[::1],float64[:,::1],float64,"
+    "float64[::1],float64[:,::1],float64[:,::1],float64,"
 )
 
 
@@ -136,14 +136,15 @@ def _place(q, n, pair, solids, placed, room, at, bodies):  # type: ignore[no-unt
     early=True,
 )
 def separate(  # type: ignore[no-untyped-def]
-    q, solids, paired, enough, surely, more, last, apart, best, near, met
+    q, solids, paired, enough, closer, surely, more, last, apart, best, near, met
 ):
     """Go through configurations one after the other; see `Separation.near` and `near_or_met`.
 
     Kept up to date from one call to the next: joints ``last``, bounds ``apart``, directions
-    ``best``. What may be near is set in ``near``, the rest of which is left as it is. Once a pair
-    is found to be within its ``surely``, -inf where that is not asked, ``met`` is set and no other
-    pair is looked at; one row of it for all configurations or one for each.
+    ``best``. What may be within its ``closer``, which is no more than ``enough``, is set in
+    ``near``, the rest of which is left as it is. Once a pair is found to be within its ``surely``,
+    -inf where that is not asked, ``met`` is set and no other pair is looked at. Both have one row
+    for all configurations or one for each.
 
     ``solids`` are the arrays of `Bodies`; ``paired`` the bodies of the pairs, the order in which
     pairs are gone through, and of each group its first place in there, the one after its last, the
@@ -176,7 +177,7 @@ def separate(  # type: ignore[no-untyped-def]
         for k in range(n_joints):
             turned[k] += abs(q[n, k] - last[k])
             last[k] = q[n, k]
-        within = surely[min(n, len(surely) - 1)]
+        asked, within = closer[min(n, len(closer) - 1)], surely[min(n, len(surely) - 1)]
         if struck >= 0 and within[struck] > -np.inf:
             a, b = pairs[struck, 0], pairs[struck, 1]
             _place(q, n, (a, b), solids, placed, room, at, bodies)
@@ -226,7 +227,7 @@ def separate(  # type: ignore[no-untyped-def]
                     wakes[p] = moved + (bound - enough[p]) - SLACK
                 else:
                     wakes[p] = -np.inf
-                    near[n, p] = True
+                    near[n, p] = bound <= asked[p]
                 soonest = min(soonest, wakes[p])
                 if met[n]:
                     struck = p
@@ -247,11 +248,12 @@ def separate(  # type: ignore[no-untyped-def]
     early=True,
 )
 def separate_parts(  # type: ignore[no-untyped-def]
-    q, solids, paired, enough, surely, more, last, apart, best, near, met, length
+    q, solids, paired, enough, closer, surely, more, last, apart, best, near, met, length
 ):
     """Go through parts of this length as `separate` does, each with a state of its own."""
     for part in prange(len(last)):
         own = slice(part * length, min((part + 1) * length, len(q)))
         state = last[part], apart[part], best[part], near[own], met[own]
+        asked = closer if len(closer) == 1 else closer[own]
         within = surely if len(surely) == 1 else surely[own]
-        separate(q[own], solids, paired, enough, within, more, *state)
+        separate(q[own], solids, paired, enough, asked, within, more, *state)

@@ -128,17 +128,24 @@ class Separation:
         Returns:
             Shape (n, p) of bool.
         """
-        return self.near_or_met(q, enough, np.full((1, len(enough)), -np.inf))[0]
+        nothing = np.full((1, len(enough)), -np.inf)
+        return self.near_or_met(q, enough, enough[None], nothing)[0]
 
-    def near_or_met(self, q: Array, enough: Array, surely: Array) -> tuple[np.ndarray, np.ndarray]:
-        """Return what `near` does, and which configurations surely bring a pair as near as asked.
+    def near_or_met(
+        self, q: Array, enough: Array, closer: Array, surely: Array
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return which pairs may be as near as asked, and at which configurations one surely is.
+
+        What is asked is the same at all configurations or not: ``closer`` and ``surely`` are of
+        shape (1, p) or (n, p).
 
         Args:
             q: Configurations as of `near`.
-            enough: Distances as of `near`.
-            surely: Distances that pairs of plain bodies may surely be within in [m], below 0 if
-                they have to sink into each other, -inf for pairs that are not asked about; of all
-                configurations or of each, shape (1, p) or (n, p).
+            enough: What is farther apart than this is left alone for long, in [m], shape (p,).
+            closer: Which pairs may be as near as this is told, below 0 if they have to sink into
+                each other; no more than ``enough``; in [m].
+            surely: Distances that pairs of plain bodies may surely be within in [m], -inf for pairs
+                that are not asked about.
 
         Returns:
             Shape (n, p) of bool, not complete where a pair is as near as asked; shape (n,) of bool.
@@ -150,6 +157,7 @@ class Separation:
             self._solids,
             self._paired,
             enough,
+            closer,
             surely,
             MORE,
         )

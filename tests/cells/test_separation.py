@@ -152,3 +152,18 @@ def test_bounds_of_boxes_and_cylinders_apart_along_a_face_or_an_axis_are_exact()
     separation = Separation(chain, np.array([[0, 1], [0, 2]]))
     separation.near(np.zeros((1, 1)), np.full(2, 10.0))
     np.testing.assert_allclose(separation.apart, [0.3, 1.5], atol=1e-12)
+
+
+def test_how_near_a_pair_may_be_is_asked_of_each_configuration():
+    cell = crowded("mh24", seed=5)
+    scene = CollisionScene(cell)
+    q = configurations(cell.robot, seed=6, n=80)
+    rng = np.random.default_rng(1)
+    turned = rng.uniform(0.0, 0.2, q.shape) * rng.integers(0, 2, q.shape)
+    apart = turned @ scene._separation.levers.T
+    wanted = [
+        scene._stay(one, np.ones(len(scene._pairs), dtype=bool), less)
+        for one, less in zip(q, apart, strict=True)
+    ]
+    assert 0.05 < np.mean(wanted) < 0.95
+    np.testing.assert_array_equal(scene.collides_throughout(q, turned), wanted)
