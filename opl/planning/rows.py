@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.stretches import passed, stretches
+from opl.planning.stretches import held, passed
 from opl.search.box import JointBox
 from opl.search.ladder import Ladder
 
@@ -34,13 +34,6 @@ class Row:
     contact_position: float
     q: Array
 
-    def inside(self, box: JointBox) -> Array:
-        """Return where the box holds them: first and last place of every stretch, shape (k, 2)."""
-        q = np.require(self.q, requirements=["C", "W"])
-        found = np.empty((len(q), 2))
-        count = stretches(q, np.array(self.places), box.lower, box.upper, SAME_PLACE, found)
-        return found[:count]
-
 
 @dataclass(frozen=True)
 class Bulge:
@@ -64,17 +57,24 @@ def levels(places: Array, rows: Sequence[Row], box: JointBox, otherwise: Array) 
 
     Where there are fewer than at another place, ``otherwise``, shape (n, 1), is repeated.
     """
-    found: list[list[float]] = [[] for _ in places]
-    for row in rows:
-        for first, last in row.inside(box):
-            low, high = np.searchsorted(places, [first - SAME, last + SAME])
-            for k in range(low, high):
-                found[k].append(row.contact_position)
-    most = max(len(levels) for levels in found)
-    levels = np.repeat(otherwise, most, axis=1)
-    for k, own in enumerate(found):
-        levels[k, : len(own)] = own
-    return levels
+    counts = np.zeros(len(places), dtype=np.int64)
+    found = np.empty((len(places), 0))
+    if rows:
+        given = np.array(places), _one_after_the_other(rows), box.lower, box.upper, SAME_PLACE, SAME
+        held(*given, counts, found)
+        found = np.repeat(otherwise, counts.max(), axis=1)
+        held(*given, counts, found)
+    return found
+
+
+def _one_after_the_other(rows: Sequence[Row]) -> tuple[Array, Array, np.ndarray, Array]:
+    """Return rows as the compiled loops take them."""
+    return (
+        np.concatenate([row.q for row in rows]),
+        np.concatenate([row.places for row in rows]),
+        np.cumsum([0, *(len(row.places) for row in rows)]),
+        np.array([row.contact_position for row in rows]),
+    )
 
 
 def crossed(places: Array, crossings: Array, otherwise: Array) -> Array:
@@ -99,14 +99,8 @@ def shut_edges(places: Array, t: Array, rows: Sequence[Row], box: JointBox) -> n
     """
     counts = np.zeros((2, len(t) - 1, t.shape[1]), dtype=np.int64)
     if rows:
-        every = (
-            np.concatenate([row.q for row in rows]),
-            np.concatenate([row.places for row in rows]),
-            np.cumsum([0, *(len(row.places) for row in rows)]),
-            np.array([row.contact_position for row in rows]),
-        )
         at = np.array(places), np.ascontiguousarray(t)
-        passed(*at, *every, box.lower, box.upper, SAME_PLACE, SAME, counts)
+        passed(*at, _one_after_the_other(rows), box.lower, box.upper, SAME_PLACE, SAME, counts)
     before, after = counts
     return np.flatnonzero(before[:, :, None] != after[:, None, :])
 

@@ -7,7 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opl.planning.rows import MOST_PARTS, SAME, Row, bars, broken_at, crossed, shut_edges
+from opl.planning.rows import (
+    MOST_PARTS,
+    SAME,
+    SAME_PLACE,
+    Row,
+    bars,
+    broken_at,
+    crossed,
+    levels,
+    shut_edges,
+)
+from opl.planning.stretches import stretches
 from opl.search.box import JointBox
 from opl.search.in_box import clipped
 from opl.search.ladder import Ladder
@@ -78,7 +89,7 @@ def test_a_way_that_cannot_be_made_is_cut_further_until_it_is_too_short():
     assert broken_at(places, 1) == []
 
 
-def old_inside(row, box):
+def inside(row, box):
     """The stretches of a row that a box holds, each chord joined to the one before it."""
     enter, leave = (share[0] for share in clipped(row.q[None], box))
     found = []
@@ -107,7 +118,9 @@ def test_stretches_of_rows_are_the_chords_that_the_box_holds(seed):
     rng = np.random.default_rng(seed)
     box = JointBox(np.full(6, -0.4), np.full(6, 0.5))
     for row in random_rows(rng, 60):
-        np.testing.assert_array_equal(row.inside(box), old_inside(row, box))
+        found = np.empty((len(row.q), 2))
+        count = stretches(row.q, row.places, box.lower, box.upper, SAME_PLACE, found)
+        np.testing.assert_array_equal(found[:count], inside(row, box))
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -125,7 +138,7 @@ def test_edges_are_shut_where_any_row_between_their_ends_lies_outside_of_the_box
             if row.places[0] <= places[k] and places[k + 1] <= row.places[-1]
             and not any(
                 first < places[k + 1] + SAME and last >= places[k] - SAME
-                for first, last in old_inside(row, box)
+                for first, last in inside(row, box)
             )
         ]  # fmt: skip
         for a, b in itertools.product(range(7), repeat=2):
@@ -135,3 +148,27 @@ def test_edges_are_shut_where_any_row_between_their_ends_lies_outside_of_the_box
     assert 0 < len(expected) < 59 * 49
     np.testing.assert_array_equal(shut_edges(places, t, rows, box), expected)
     assert not len(shut_edges(places, t, [], box))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_levels_at_a_place_are_the_rows_that_the_box_holds_there(seed):
+    rng = np.random.default_rng(seed)
+    box = JointBox(np.full(6, -0.4), np.full(6, 0.5))
+    rows = random_rows(rng, 40)
+    places = np.sort(rng.uniform(9.5, 14.0, 60))
+    otherwise = rng.uniform(-4.0, 4.0, (60, 1))
+    found = levels(places, rows, box, otherwise)
+    own = [
+        [
+            row.contact_position
+            for row in rows
+            for first, last in inside(row, box)
+            if first - SAME <= place < last + SAME
+        ]
+        for place in places
+    ]
+    assert found.shape == (60, max(len(levels) for levels in own)) and found.shape[1] > 1
+    for k, wanted in enumerate(own):
+        np.testing.assert_array_equal(found[k, : len(wanted)], wanted)
+        assert (found[k, len(wanted) :] == otherwise[k]).all()
+    assert levels(places, [], box, otherwise).shape == (60, 0)
