@@ -149,7 +149,8 @@ def _numba() -> Any:
 
     # numba's own first loads all that it compiles with, which takes half as long as numba itself:
     # what is compiled needs none of it, and whatever compiles loads it then
-    FunctionCache.load_overload = load  # type: ignore[method-assign]
+    if {"_load_overload", "_guard_against_spurious_io_errors"} <= set(dir(FunctionCache)):
+        FunctionCache.load_overload = load  # type: ignore[method-assign]
 
     @typeof_impl.register(Kernel)
     def type_of(made: Kernel, _context: Any) -> Any:
