@@ -2,9 +2,10 @@
 
 Each job is drawn, written as files into a folder of its own, and run as `opl run` does up to its
 path, or to its program with --whole, in a process that is ended when it takes too long; as many
-side by side as --workers says. A job that is refused before its search, or has no path, counts with
-its cause and is drawn again, until as many as asked for were searched. The same seed draws the same
-jobs, which --cases picks from: `--cases 3.0 17.2`. With --write the table goes into STRANGERS.md.
+side by side as --workers says, which share the cores. A job that is refused before its search, or
+has no path, counts with its cause and is drawn again, until as many as asked for were searched. The
+same seed draws the same jobs, which --cases picks from: `--cases 3.0 17.2`. With --write the table
+goes into STRANGERS.md.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
+import os
 import shutil
 import time
 from collections import defaultdict
@@ -24,10 +26,13 @@ from queue import SimpleQueue
 from threading import Lock
 from typing import Any
 
+import numpy as np
+
 import opl
 from benchmarks.stranger_jobs import Stranger, draw_job
 from benchmarks.stranger_table import HEAD, SEARCHED, Outcome, page, row
 from opl.files.kernels import use_threads
+from opl.geometry.frames import Array
 from opl.run.preparing import prepare
 from opl.run.searches import search_path
 
@@ -38,26 +43,28 @@ Facts = dict[str, Any]  # fields of an outcome
 Draw = tuple[int, int]  # which job, and which draw of it
 
 
-class Processor:
-    """Processor time of the stages of a run."""
+class Clock:
+    """Time of the stages of a run: on the wall, and of the processor."""
 
     def __init__(self) -> None:
-        self._seconds: dict[str, float] = defaultdict(float)
-        self._start: dict[str, float] = {}
+        self._seconds: dict[str, Array] = defaultdict(lambda: np.zeros(2))
+        self._start: dict[str, Array] = {}
 
     def __call__(self, stage: opl.Stage, fraction: float) -> None:
-        """Take note of the end of a stage."""
-        now = time.process_time()
+        """Take note of the beginning or the end of a stage."""
         if fraction == 0.0:
-            self._start[stage.value] = now
+            self._start[stage.value] = _now()
         elif fraction == 1.0:
-            self._seconds[stage.value] += now - self._start.pop(stage.value)
+            self._seconds[stage.value] += _now() - self._start.pop(stage.value)
 
-    def of(self, stage: str) -> float:
-        """Return that of a stage in [s], until now if it was broken off."""
+    def of(self, stage: str) -> Array:
+        """Return both times of a stage in [s], until now if it was broken off, shape (2,)."""
         begun = self._start.get(stage)
-        so_far = 0.0 if begun is None else time.process_time() - begun
-        return self._seconds[stage] + so_far
+        return self._seconds[stage] + (0.0 if begun is None else _now() - begun)
+
+
+def _now() -> Array:
+    return np.array([time.perf_counter(), time.process_time()])
 
 
 def _path(job: opl.Job, watch: opl.Watch) -> Facts:
@@ -94,21 +101,22 @@ def _program(job: opl.Job, out: Path, watch: opl.Watch) -> Facts:
     return facts
 
 
-def _serve(pipe: Connection, whole: bool) -> None:
+def _serve(pipe: Connection, whole: bool, threads: int) -> None:
     """Run the jobs that come through a pipe, until None comes."""
-    use_threads(1)
+    use_threads(threads)
     while (path := pipe.recv()) is not None:
-        processor = Processor()
+        clock = Clock()
         facts: Facts
         try:
-            job, watch = opl.load_job(path), opl.Watch(processor)
+            job, watch = opl.load_job(path), opl.Watch(clock)
             facts = _program(job, path.parent / "out", watch) if whole else _path(job, watch)
         except opl.InputError as error:
             cause = str(error).replace(f"{path.parent}/", "")  # the same wherever it is run
             facts = {"status": "bad input", "cause": cause}
         except Exception as error:  # what breaks here is a case, not the end of the benchmark
             facts = {"status": "error", "cause": f"{type(error).__name__}: {error}"}
-        facts["search_s"] = processor.of("search") + processor.of("clearance")
+        both = clock.of("search") + clock.of("clearance")
+        facts["search_s"], facts["processor_s"] = both.tolist()
         pipe.send(facts)
 
 
@@ -117,16 +125,17 @@ class Worker:
 
     Args:
         whole: Whether jobs are run to their end, not only to their path.
+        threads: How many threads it may use.
     """
 
-    def __init__(self, whole: bool) -> None:
-        self._whole = whole
+    def __init__(self, whole: bool, threads: int) -> None:
+        self._given = whole, threads
         self._start()
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, other = context.Pipe()
-        self._process = context.Process(target=_serve, args=(other, self._whole), daemon=True)
+        self._process = context.Process(target=_serve, args=(other, *self._given), daemon=True)
         self._process.start()
         other.close()
 
@@ -171,7 +180,7 @@ def run_strangers(
     """
     idle: SimpleQueue[Worker] = SimpleQueue()
     for _ in range(workers):
-        idle.put(Worker(whole))
+        idle.put(Worker(whole, max((os.cpu_count() or 1) // workers, 1)))
     lock = Lock()
 
     def run(job: Sequence[Draw]) -> None:
