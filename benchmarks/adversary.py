@@ -10,7 +10,7 @@ kinematics and opl's own check of motions on the wheel, with the clearances of t
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -545,14 +545,18 @@ def attacked(path: Path, tries: int, seed: int) -> bool:
 
 
 def main() -> None:
-    """Attack the parts named, or job files; the first argument may be the number of tries."""
-    arguments = sys.argv[1:]
-    tries = int(arguments.pop(0)) if arguments and arguments[0].isdigit() else TRIES
+    """Attack the parts or job files that are named."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "parts", nargs="*", default=CASES, help="parts of workpieces/, or job files"
+    )
+    parser.add_argument("--tries", type=int, default=TRIES, help="motions looked at for each")
+    arguments = parser.parse_args()
     paths = [
         Path(one) if one.endswith(".yaml") else WORKPIECES / one / "job.yaml"
-        for one in arguments or CASES
+        for one in arguments.parts
     ]
-    held = [attacked(path, tries, seed) for seed, path in enumerate(paths)]
+    held = [attacked(path, arguments.tries, seed) for seed, path in enumerate(paths)]
     raise SystemExit(0 if all(held) else 1)
 
 

@@ -7,8 +7,8 @@ the bound rests on that.
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 import time
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -157,8 +157,10 @@ def check(case: str) -> bool:
 
 
 def main() -> None:
-    """Check the cases, or those that arguments name."""
-    agreed = [check(case) for case in sys.argv[1:] or CASES]
+    """Check the cases that are named."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("cases", nargs="*", default=CASES, help=f"such as {', '.join(CASES)}")
+    agreed = [check(case) for case in parser.parse_args().cases]
     raise SystemExit(0 if all(agreed) else 1)
 
 
