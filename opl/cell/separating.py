@@ -113,22 +113,12 @@ def _turn_about(axis, angle, T):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _place(q, n, pair, solids, placed, room, at, bodies):  # type: ignore[no-untyped-def]
-    """Bring two bodies to where they are at configuration n, and the joints, if they are not.
-
-    ``at`` tells at which configuration each body was placed last, and at its end the joints.
-    """
-    before_joint, axes, joint, joint_body = solids[:4]
-    if at[-1] < n:
-        at[-1] = n
-        for k in range(len(before_joint)):
-            _product(placed[k], before_joint[k], room[0])
-            _turn_about(axes[k], q[n, k], room[1])
-            _product(room[0], room[1], placed[k + 1])
-    for body in pair:
-        if at[body] < n and (at[body] < 0 or joint[body] > 0):
-            _product(placed[joint[body]], joint_body[body], bodies[body])
-            at[body] = n
+def _place_joints(q, n, before_joint, axes, placed, at_zero, turn):  # type: ignore[no-untyped-def]
+    """Bring the joints to where they are at configuration n."""
+    for k in range(len(before_joint)):
+        _product(placed[k], before_joint[k], at_zero)
+        _turn_about(axes[k], q[n, k], turn)
+        _product(at_zero, turn, placed[k + 1])
 
 
 @kernel(
@@ -153,13 +143,13 @@ def separate(  # type: ignore[no-untyped-def]
     A group of pairs is looked at when something of it could have become near: by the joints that
     move one body of each and not the other, with the largest levers of the group.
     """
-    before_joint, _, joint, _, sizes, levers = solids
+    before_joint, axes, joint, joint_body, sizes, levers = solids
     pairs, order, groups, group_levers = paired
     n_joints, n_bodies = len(before_joint), len(joint)
     placed = np.zeros((n_joints + 1, 4, 4))  # of the joints in the world
     for k in range(4):
         placed[0, k, k] = 1.0
-    room = np.zeros((2, 4, 4))
+    at_zero, turn = np.zeros((4, 4)), np.zeros((4, 4))
     bodies = np.zeros((n_bodies, 4, 4))
     at: np.ndarray = np.full(n_bodies + 1, -1)
     radii = np.empty(n_bodies)
@@ -172,16 +162,23 @@ def separate(  # type: ignore[no-untyped-def]
     wakes, first_wakes = np.empty(len(pairs)), np.full(len(groups), -np.inf)
     for p in range(len(pairs)):
         wakes[p] = apart[p] - enough[p] - SLACK if apart[p] > enough[p] else -np.inf
+    # bodies are placed as they are needed, written out twice: a call for it costs half of the rest
     struck = -1  # the pair that was within its distance the last time: it mostly still is
     for n in range(len(q)):
         for k in range(n_joints):
             turned[k] += abs(q[n, k] - last[k])
             last[k] = q[n, k]
-        asked, within = closer[min(n, len(closer) - 1)], surely[min(n, len(surely) - 1)]
-        if struck >= 0 and within[struck] > -np.inf:
+        asked, within = min(n, len(closer) - 1), min(n, len(surely) - 1)
+        if struck >= 0 and surely[within, struck] > -np.inf:
             a, b = pairs[struck, 0], pairs[struck, 1]
-            _place(q, n, (a, b), solids, placed, room, at, bodies)
-            if surely_within(bodies, sizes, a, b, within[struck]):
+            if at[-1] < n:
+                _place_joints(q, n, before_joint, axes, placed, at_zero, turn)
+                at[-1] = n
+            for body in (a, b):
+                if at[body] < n and (at[body] < 0 or joint[body] > 0):
+                    _product(placed[joint[body]], joint_body[body], bodies[body])
+                    at[body] = n
+            if surely_within(bodies, sizes, a, b, surely[within, struck]):
                 met[n] = True
                 continue
         for g in range(len(groups)):
@@ -203,7 +200,13 @@ def separate(  # type: ignore[no-untyped-def]
                     bound -= levers[b, k] * (turned[k] - seen[p, k])
                     seen[p, k] = turned[k]
                 if bound <= enough[p]:
-                    _place(q, n, (a, b), solids, placed, room, at, bodies)
+                    if at[-1] < n:
+                        _place_joints(q, n, before_joint, axes, placed, at_zero, turn)
+                        at[-1] = n
+                    for body in (a, b):
+                        if at[body] < n and (at[body] < 0 or joint[body] > 0):
+                            _product(placed[joint[body]], joint_body[body], bodies[body])
+                            at[body] = n
                     x = bodies[b, 0, 3] - bodies[a, 0, 3]
                     y = bodies[b, 1, 3] - bodies[a, 1, 3]
                     z = bodies[b, 2, 3] - bodies[a, 2, 3]
@@ -212,9 +215,7 @@ def separate(  # type: ignore[no-untyped-def]
                         # what was the best direction the last time mostly still is
                         way = _direction(bodies, sizes, a, b, best[p])
                         bound = max(bound, _between(bodies, sizes, a, b, way))
-                    if bound <= enough[p] and within[p] > -np.inf:
-                        met[n] = surely_within(bodies, sizes, a, b, within[p])
-                    if bound <= enough[p] and not met[n]:
+                    if bound <= enough[p]:
                         for number in range(DIRECTIONS):
                             way = _direction(bodies, sizes, a, b, number)
                             along = _between(bodies, sizes, a, b, way)
@@ -222,12 +223,14 @@ def separate(  # type: ignore[no-untyped-def]
                                 bound, best[p] = along, number
                             if along > enough[p] + more:
                                 break
+                    if bound <= enough[p] and surely[within, p] > -np.inf:
+                        met[n] = surely_within(bodies, sizes, a, b, surely[within, p])
                 apart[p] = bound
                 if bound > enough[p]:
                     wakes[p] = moved + (bound - enough[p]) - SLACK
                 else:
                     wakes[p] = -np.inf
-                    near[n, p] = bound <= asked[p]
+                    near[n, p] = bound <= closer[asked, p]
                 soonest = min(soonest, wakes[p])
                 if met[n]:
                     struck = p
