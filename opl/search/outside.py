@@ -68,19 +68,26 @@ def outside(q, free, low, high, longest, missing, at):  # type: ignore[no-untype
         at: Filled with the fractional row of that point, shape (n_columns,).
     """
     n_columns, n_joints, n_rows = q.shape
+    # joint by joint along the rows, which lie side by side: the compiler takes several at once
+    away, beside = np.empty(n_rows), np.empty(n_rows)
     for column in range(n_columns):
+        away[:] = 0.0
+        beside[:] = 0.0
+        for joint in range(n_joints):
+            angles, least, most = q[column, joint], low[joint], high[joint]
+            for row in range(n_rows):
+                value = angles[row]
+                away[row] += max(value - most, 0.0) + max(least - value, 0.0)
+            for row in range(n_rows - 1):
+                start = min(angles[row], angles[row + 1])
+                end = max(angles[row], angles[row + 1])
+                beside[row] += max(start - most, 0.0) + max(least - end, 0.0)
         best, place = np.inf, -1.0
         for row in range(n_rows):
-            if not free[column, row]:
-                continue
-            away = 0.0
-            for joint in range(n_joints):
-                value = q[column, joint, row]
-                away += max(value - high[joint], 0.0) + max(low[joint] - value, 0.0)
-            if away < best:
-                best, place = away, float(row)
+            if free[column, row] and away[row] < best:
+                best, place = away[row], float(row)
         for row in range(n_rows - 1):
-            if not (free[column, row] and free[column, row + 1]):
+            if not (free[column, row] and free[column, row + 1] and beside[row] < best - 1e-12):
                 continue
             start, end = q[column, :, row], q[column, :, row + 1]
             jump = False
