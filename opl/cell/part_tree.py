@@ -1,7 +1,7 @@
 """The triangles of the held part in a tree, whose nodes can be skipped at once.
 
-What a node holds lies in a sphere and, as surfaces are flat from near by, in a thin slab. The
-sphere tells of what is far from the wheel, the slab of what lies along it.
+What a node holds lies in a sphere, in a box and, as surfaces are flat from near by, in a thin slab.
+The sphere tells of what is far from the wheel, slab and box of what lies along it.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ class PartTree:
         spheres: Centre and radius of a sphere about each node in [m], shape (c, 4).
         slabs: A slab about each node: its unit normal, and from where to where along that, seen
             from the centre of the sphere, in [m], shape (c, 5).
+        boxes: Half the sides of a box about that centre, along the axes of the workpiece frame, in
+            [m], shape (c, 3).
         first: Index of each node's first triangle, shape (c,).
         end: Index after each node's last triangle, shape (c,).
         child: Index of each node's first child, the second follows it; 0 for a leaf, shape (c,).
@@ -33,6 +35,7 @@ class PartTree:
     triangles: Array
     spheres: Array
     slabs: Array
+    boxes: Array
     first: np.ndarray
     end: np.ndarray
     child: np.ndarray
@@ -47,7 +50,7 @@ def part_tree(mesh: TriangleMesh) -> PartTree:
     normals = np.cross(edges[:, 0], edges[:, 1])
     order = np.arange(len(triangles))
     first, end = np.array([0]), np.array([len(triangles)])
-    spheres, slabs, firsts, ends, children, known = [], [], [], [], [], 0
+    spheres, slabs, boxes, firsts, ends, children, known = [], [], [], [], [], [], 0
     while len(first):  # a level of the tree
         sizes = end - first
         starts = np.cumsum(sizes) - sizes
@@ -66,6 +69,7 @@ def part_tree(mesh: TriangleMesh) -> PartTree:
         slab.append(np.maximum.reduceat(along.max(axis=1), starts))
         spheres.append(np.column_stack([centre, away]))
         slabs.append(np.column_stack([normal, *slab]))
+        boxes.append(np.maximum.reduceat(high[own], starts) - centre)
         firsts.append(first)
         ends.append(end)
         known += len(first)
@@ -82,6 +86,7 @@ def part_tree(mesh: TriangleMesh) -> PartTree:
         np.ascontiguousarray(triangles[order]),
         np.concatenate(spheres),
         np.concatenate(slabs),
+        np.concatenate(boxes),
         np.concatenate(firsts),
         np.concatenate(ends),
         np.concatenate(children),

@@ -44,7 +44,8 @@ def signed_wheel_distance(
         Distance per pose, shape (...); where the part cuts into the wheel minus the longest of its
         triangles' ways out. Too large by `TOLERANCE` at most where the part is too near, so what is
         nearer than ``needed`` by more than that is less than ``needed``; otherwise that of some
-        point of the part. Less than ``enough`` where the least is, too large by any amount there.
+        point of the part, or infinite. Less than ``enough`` where the least is, too large by any
+        amount there.
     """
     shape = Ts_contact0_workpiece.shape[:-2]
     needs = np.array(np.broadcast_to(needed, shape), dtype=float).reshape(-1)
@@ -53,15 +54,17 @@ def signed_wheel_distance(
     distances, looks = np.empty(len(flat)), np.empty(len(flat), dtype=np.int64)
     # to call threads costs as much as dozens of poses, and many times that on a busy machine
     kernel = _distances if len(flat) > FEW and threads_are_allowed() else _few_distances
-    tree = part.triangles, part.spheres, part.slabs, part.first, part.child
+    tree = part.triangles, part.spheres, part.slabs, part.boxes, part.first, part.child
     kernel(flat, tree, wheel.width / 2.0, wheel.radius, needs, stops, distances, looks)
     part.looks[0] += looks.sum()
     return distances.reshape(shape)
 
 
-@kernel("float64(float64[:,::1],float64[:,::1],float64[:,::1],int64,float64,float64)")
-def _bound(T, spheres, slabs, index, half_width, radius):  # type: ignore[no-untyped-def]
-    """Lower bound on the distance of anything in a sphere and its slab.
+@kernel(
+    "float64(float64[:,::1],float64[:,::1],float64[:,::1],float64[:,::1],int64,float64,float64)"
+)
+def _bound(T, spheres, slabs, boxes, index, half_width, radius):  # type: ignore[no-untyped-def]
+    """Lower bound on the distance of anything in a sphere, its slab and its box.
 
     The distance is convex: nothing is nearer than the slope at the centre tells. And what is moved
     along that slope until it is beyond the wheel is out of it.
@@ -71,22 +74,28 @@ def _bound(T, spheres, slabs, index, half_width, radius):  # type: ignore[no-unt
     y = T[1, 0] * p + T[1, 1] * q + T[1, 2] * r + T[1, 3]
     z = T[2, 0] * p + T[2, 1] * q + T[2, 2] * r + T[2, 3]
     value, gx, gy, gz = distance_of_point(x, y, z, half_width, radius)
+    # the slope in the workpiece frame, and what of it is not along the normal of the slab
+    u = gx * T[0, 0] + gy * T[1, 0] + gz * T[2, 0]
+    v = gx * T[0, 1] + gy * T[1, 1] + gz * T[2, 1]
+    w = gx * T[0, 2] + gy * T[1, 2] + gz * T[2, 2]
     p, q, r = slabs[index, 0], slabs[index, 1], slabs[index, 2]
-    along = gx * (T[0, 0] * p + T[0, 1] * q + T[0, 2] * r)
-    along += gy * (T[1, 0] * p + T[1, 1] * q + T[1, 2] * r)
-    along += gz * (T[2, 0] * p + T[2, 1] * q + T[2, 2] * r)
+    a, b, c = boxes[index, 0], boxes[index, 1], boxes[index, 2]
+    along = u * p + v * q + w * r
     nearest = along * (slabs[index, 3] if along > 0.0 else slabs[index, 4])
     aside = np.sqrt(max(1.0 - along * along, 0.0)) * reach
-    return value + max(nearest - aside, -reach)
+    aside = min(aside, abs(u - along * p) * a + abs(v - along * q) * b + abs(w - along * r) * c)
+    return value + max(nearest - aside, -reach, -(abs(u) * a + abs(v) * b + abs(w) * c))
 
 
-_TREE = "Tuple((float64[:,:,::1],float64[:,::1],float64[:,::1],int64[::1],int64[::1]))"
+_TREE = (
+    "Tuple((float64[:,:,::1],float64[:,::1],float64[:,::1],float64[:,::1],int64[::1],int64[::1]))"
+)
 
 
 @kernel(f"Tuple((float64,int64))(float64[:,::1],{_TREE},float64,float64,float64,float64)")
 def _part_distance(T, tree, half_width, radius, needed, enough):  # type: ignore[no-untyped-def]
     """Distance of the part in one pose, and how many looks that took."""
-    triangles, spheres, slabs, first, child = tree
+    triangles, spheres, slabs, boxes, first, child = tree
     room = np.empty((DEEPEST + 1, 9))
     waiting = np.empty(64, dtype=np.int64)  # deeper than any halving of an array can go
     bounds = np.empty(64)
@@ -106,8 +115,8 @@ def _part_distance(T, tree, half_width, radius, needed, enough):  # type: ignore
             )
             continue
         one, other = child[node], child[node] + 1
-        low = _bound(T, spheres, slabs, one, half_width, radius)
-        high = _bound(T, spheres, slabs, other, half_width, radius)
+        low = _bound(T, spheres, slabs, boxes, one, half_width, radius)
+        high = _bound(T, spheres, slabs, boxes, other, half_width, radius)
         if low > high:
             one, other = other, one
             low, high = high, low

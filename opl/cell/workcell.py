@@ -134,7 +134,10 @@ class WorkCell:
 
     def within_limits(self, q: Array) -> np.ndarray:
         """Return which configurations, shape (..., 6) in [rad], keep every limit, shape (...)."""
-        kept = ((q >= self.robot.lower) & (q <= self.robot.upper)).all(axis=-1)
+        lower, upper = self.robot.lower, self.robot.upper
+        kept = np.ones(q.shape[:-1], dtype=bool)
+        for joint in range(q.shape[-1]):  # one by one: to ask for all of a few takes numpy longer
+            kept &= (q[..., joint] >= lower[joint]) & (q[..., joint] <= upper[joint])
         for limit in self.limits:
             kept &= limit.holds(q)
         return np.asarray(kept)

@@ -233,13 +233,14 @@ def test_poses_need_not_be_contiguous():
     np.testing.assert_array_equal(signed_wheel_distance(part, wheel, Ts[::2], EXACT), expected[::2])
 
 
-def test_every_sphere_and_slab_holds_its_triangles_and_every_triangle_is_there():
+def test_every_sphere_slab_and_box_holds_its_triangles_and_every_triangle_is_there():
     mesh = random_mesh(np.random.default_rng(0), 333, 0.3)
     tree = part_tree(mesh)
-    nodes = zip(tree.spheres, tree.slabs, tree.first, tree.end, strict=True)
-    for (x, y, z, radius), (*normal, low, high), first, end in nodes:
+    nodes = zip(tree.spheres, tree.slabs, tree.boxes, tree.first, tree.end, strict=True)
+    for (x, y, z, radius), (*normal, low, high), half, first, end in nodes:
         from_centre = tree.triangles[first:end] - [x, y, z]
         assert np.linalg.norm(from_centre, axis=2).max() <= radius * (1 + 1e-12)
+        assert (np.abs(from_centre) <= half + 1e-12).all()
         assert abs(np.linalg.norm(normal) - 1.0) < 1e-12
         assert low - 1e-12 <= (from_centre @ normal).min()
         assert (from_centre @ normal).max() <= high + 1e-12
