@@ -7,6 +7,7 @@ Python calls are loaded.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -135,6 +136,8 @@ def use_threads(count: int) -> None:
 def _numba() -> Any:
     """Return numba, to which a kernel is the compiled function."""
     settle_kernel_cache(Path(__file__).parents[1])  # before numba looks for it
+    # threads that wait for work leave the core to the copy of the process, unless told otherwise
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     with _without(_LINEAR_ALGEBRA):
         import numba
         import numba.np.arraymath
