@@ -23,11 +23,12 @@ from opl.report.canvas import (
     FAINT,
     INK,
     RULE,
-    blank_figure,
+    Margins,
+    charts,
     draw_pass_borders,
     house_style,
-    legend_below,
     line_by_pass,
+    points_wide,
 )
 
 # one per state, free first; they differ in lightness too, for colour-blind eyes and grey printers
@@ -49,6 +50,9 @@ FIXED: dict[str, Any] = {
     "label": "contact kept at t = 0",
 }
 LIMIT: dict[str, Any] = {"color": "#c8102e", "linewidth": 1.4, "label": "joint limit"}
+CONTACT = Margins(left=84.0, right=76.0, top=48.0, bottom=50.0)
+JOINTS = Margins(left=64.0, right=14.0, top=50.0, bottom=50.0, beside=46.0, between=30.0)
+OUTER = 7.0  # [point] from the left side of a figure to the labels along charts
 LEAST_SPAN = 10.0  # [deg] shown of a joint, lest one that hardly moves look busy
 NEAR = 0.1  # of the span shown: a limit farther away than this is left out
 ZONES = ("left edge", "flat", "right edge")  # of the wheel, from small t to large
@@ -80,8 +84,20 @@ def contact_chart(
         path: The path found.
         held_at: Cutter points that keep the joint range sum from being smaller.
     """
-    figure = blank_figure(title)
-    axes = figure.subplots()
+    counts = np.bincount(states.ravel())
+    handles: list[Patch | Line2D] = [
+        Patch(
+            facecolor=_state_colour(code),
+            edgecolor=RULE,
+            linewidth=0.8,
+            label=f"{state_names[code]} {_percent(counts[code] / states.size)}",
+        )
+        for code in np.flatnonzero(counts).tolist()
+    ]
+    handles.append(Line2D([], [], **FOUND))
+    if len(held_at):
+        handles.append(Line2D([], [], **HOLDS))
+    figure, (axes,) = charts(title, 1, 1, CONTACT, handles)
     step = np.ptp(contact_positions) / max(len(contact_positions) - 1, 1) or 1.0
     bottom, top = contact_positions[0] - step / 2.0, contact_positions[-1] + step / 2.0
     palette = np.array([_state_colour(code) for code in range(len(state_names))])
@@ -99,30 +115,17 @@ def contact_chart(
     _mark_zones(axes, flat_end, bottom, top)
     draw_pass_borders(axes, pass_index)
     _number_passes(axes, pass_index)
-    counts = np.bincount(states.ravel())
-    handles: list[Patch | Line2D] = [
-        Patch(
-            facecolor=_state_colour(code),
-            edgecolor=RULE,
-            linewidth=0.8,
-            label=f"{state_names[code]} {_percent(counts[code] / states.size)}",
-        )
-        for code in np.flatnonzero(counts).tolist()
-    ]
     line = line_by_pass(path.pass_index, path.cutter_point, path.contact_position)
     axes.plot(*line, color="white", linewidth=2.0 * FOUND["linewidth"])
     axes.plot(*line, **FOUND, gid="found")
-    handles.append(Line2D([], [], **FOUND))
     if len(held_at):
         at = np.interp(held_at, path.cutter_point, path.contact_position)
         axes.plot(held_at, at, **HOLDS, gid="holds")
-        handles.append(Line2D([], [], **HOLDS))
     axes.set_ylim(bottom, top)
     axes.xaxis.set_major_locator(MaxNLocator(12, integer=True, min_n_ticks=1))
     axes.yaxis.set_major_locator(MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]))
     axes.set_xlabel("cutter point")
-    axes.set_ylabel("contact position t\n(mm on the flat, degrees on the edges)")
-    legend_below(figure, handles)
+    _label_up(axes, "contact position t\n(mm on the flat, degrees on the edges)", CONTACT)
     return figure
 
 
@@ -145,22 +148,24 @@ def joint_chart(
             None.
         pass_index: Pass of each cutter point, 0, 1, ..., shape (N,).
     """
-    figure = blank_figure(title)
-    panels = figure.subplots(2, 3, sharex=True)
     points = np.arange(len(pass_index), dtype=float)
     limits = np.rad2deg(np.stack([robot.lower, robot.upper], axis=-1))
-    limit_seen = False
-    for joint, axes in enumerate(panels.flat):
-        shown = found = np.rad2deg(path.q[:, joint])
-        heading = f"range {np.ptp(found):.1f} deg"
+    found = np.rad2deg(path.q)
+    shown = found if fixed_q is None else np.concatenate([found, np.rad2deg(fixed_q)])
+    spans = [_span(angles, limit) for angles, limit in zip(shown.T, limits, strict=True)]
+    limit_seen = any(len(near) for near, _, _ in spans)
+    styles = [FOUND, *([FIXED] if fixed_q is not None else []), *([LIMIT] if limit_seen else [])]
+    handles = [Line2D([], [], **style) for style in styles]
+    figure, panels = charts(title, 2, 3, JOINTS, handles)
+    for joint, axes in enumerate(panels):
+        heading = f"range {np.ptp(found[:, joint]):.1f} deg"
         if fixed_q is not None:
             fixed = np.rad2deg(fixed_q[:, joint])
-            shown = np.append(found, fixed)
             heading += f" (fixed {np.ptp(fixed):.1f} deg)"
             axes.plot(*line_by_pass(pass_index, points, fixed), **FIXED, gid=f"fixed_{joint}")
-        line = line_by_pass(path.pass_index, path.cutter_point, found)
+        line = line_by_pass(path.pass_index, path.cutter_point, found[:, joint])
         axes.plot(*line, **FOUND, gid=f"found_{joint}")
-        limit_seen |= _frame_angles(axes, shown, limits[joint])
+        _frame_angles(axes, *spans[joint])
         draw_pass_borders(axes, pass_index)
         # y is where it is anyhow: else it is looked for, a sixth of the time to draw
         name = robot.joint_names[joint]
@@ -169,13 +174,17 @@ def joint_chart(
         axes.set_xlim(-0.5, len(points) - 0.5)
         axes.xaxis.set_major_locator(MaxNLocator(6, integer=True, min_n_ticks=1))
         axes.spines[["top", "right"]].set_visible(False)
-    for axes in panels[:, 0]:
-        axes.set_ylabel("joint angle (deg)")
-    for axes in panels[-1]:
+    for axes in panels[::3]:
+        _label_up(axes, "joint angle (deg)", JOINTS)
+    for axes in panels[3:]:
         axes.set_xlabel("cutter point")
-    styles = [FOUND, *([FIXED] if fixed_q is not None else []), *([LIMIT] if limit_seen else [])]
-    legend_below(figure, [Line2D([], [], **style) for style in styles])
     return figure
+
+
+def _label_up(axes: Axes, text: str, margins: Margins) -> None:
+    """Write along the left side of charts, at the same place whatever their numbers are."""
+    axes.set_ylabel(text, va="top")
+    axes.yaxis.set_label_coords((OUTER - margins.left) / points_wide(axes), 0.5)
 
 
 def _state_colour(code: int) -> tuple[float, float, float]:
@@ -216,21 +225,25 @@ def _number_passes(axes: Axes, pass_index: np.ndarray) -> None:
             taken = place
 
 
-def _frame_angles(axes: Axes, angles: Array, limits: Array) -> bool:
-    """Choose what a panel shows of angles in [deg]; draw limits, shape (2,), in it or near.
+def _span(angles: Array, limits: Array) -> tuple[Array, float, float]:
+    """Choose what a panel shows of angles in [deg], and of limits, shape (2,).
 
     Returns:
-        Whether a limit was drawn.
+        The limits in it or near, and from where to where it shows angles.
     """
     middle = (angles.min() + angles.max()) / 2.0
     half = max(np.ptp(angles), LEAST_SPAN) / 2.0
     near = limits[np.abs(limits - middle) <= half * (1.0 + 2.0 * NEAR)]
-    for limit in near:
-        axes.axhline(limit, **LIMIT)
     ends = np.append(near, [middle - half, middle + half])
     margin = 0.06 * np.ptp(ends)
-    axes.set_ylim(ends.min() - margin, ends.max() + margin)
+    return near, ends.min() - margin, ends.max() + margin
+
+
+def _frame_angles(axes: Axes, near: Array, bottom: float, top: float) -> None:
+    """Draw the limits in a panel or near, and set what it shows, as `_span` chooses."""
+    for limit in near:
+        axes.axhline(limit, **LIMIT)
+    axes.set_ylim(bottom, top)
     axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 3, 5, 10]))
     axes.grid(axis="y", color="#e6eaed", linewidth=0.8)
     axes.set_axisbelow(True)
-    return bool(len(near))
