@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from opl.planning.images import Seams
 from opl.planning.optimal import OptimalSearch
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
@@ -32,6 +33,7 @@ def plan_optimal(
     fallback: Plan | None,
     report: Callable[[float], None] = lambda _: None,
     otherwise: Callable[[float], Plan | None] | None = None,
+    seams: Seams | None = None,
 ) -> Plan:
     """Find the collision-free motion with the least joint range sum, the smoothest of these.
 
@@ -42,6 +44,7 @@ def plan_optimal(
         report: Given how much of the work allowed is done, after every step; may raise.
         otherwise: Looks for a motion in another way, where the proof finds none, given how many
             units of work are left for that.
+        seams: Where full turns are counted from, where that is known.
 
     Returns:
         The plan with its lower bound.
@@ -49,7 +52,7 @@ def plan_optimal(
     Raises:
         NoMotionError: If no motion was known and none was found.
     """
-    search = OptimalSearch(problem, settings, fallback)
+    search = OptimalSearch(problem, settings, fallback, seams)
     share = 1.0 if otherwise is None else 1.0 - OTHERWISE_SHARE
 
     def go_on(share: float) -> None:

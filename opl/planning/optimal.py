@@ -17,6 +17,7 @@ from opl.planning.costs import PushAway
 from opl.planning.families import few_columns, grown
 from opl.planning.holders import Holder, holders
 from opl.planning.hope import Hope
+from opl.planning.images import Seams
 from opl.planning.obstructed import Obstructions
 from opl.planning.passages import NO_PASSAGES, Passages
 from opl.planning.placement import Placement
@@ -24,7 +25,7 @@ from opl.planning.plan import AT_REST, Plan
 from opl.planning.postures import Columns
 from opl.planning.problem import GrindingProblem
 from opl.planning.rows import Bulge
-from opl.planning.search_space import SearchSpace
+from opl.planning.search_space import SearchSpace, seams_in
 from opl.planning.settings import OptimalSettings
 from opl.planning.work import Work
 from opl.search.box import JointBox
@@ -46,10 +47,15 @@ class OptimalSearch:
         problem: What is to be planned.
         settings: What is wanted.
         fallback: A motion that is known.
+        seams: Where full turns are counted from, where that is known.
     """
 
     def __init__(
-        self, problem: GrindingProblem, settings: OptimalSettings, fallback: Plan | None
+        self,
+        problem: GrindingProblem,
+        settings: OptimalSettings,
+        fallback: Plan | None,
+        seams: Seams | None = None,
     ) -> None:
         self._problem = problem
         self._settings = settings
@@ -59,7 +65,7 @@ class OptimalSearch:
         if fallback is not None:
             largest = fallback.path.joint_range_sum
             most = Travel(fallback.path.joint_travel, fallback.path.contact_travel)
-        space = SearchSpace.of(problem, largest)
+        space = SearchSpace.of(problem, seams or seams_in(problem), largest)
         self._walls, self._families = space.walls, space.families
         self._sampler, self._rectangles = space.sampler, space.rectangles
         costs, most_change = settings.costs, settings.max_contact_change

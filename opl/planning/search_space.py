@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from opl.geometry.frames import Array
 from opl.planning.barriers import all_sides
 from opl.planning.box_columns import ColumnSampler
 from opl.planning.columns import ColumnWalls
 from opl.planning.cut_cells import whole_cells
 from opl.planning.families import Families, few_columns
-from opl.planning.images import Images, seams_of
+from opl.planning.images import Images, Seams, seams_of
 from opl.planning.passages import Rectangles
 from opl.planning.problem import GrindingProblem
+
+
+def seams_in(problem: GrindingProblem) -> Seams:
+    """Return where the full turns of a problem are counted from."""
+    return seams_of(_few_postures(problem))
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +37,17 @@ class SearchSpace:
     rectangles: Rectangles
 
     @classmethod
-    def of(cls, problem: GrindingProblem, largest: float) -> SearchSpace:
-        """Return that of a problem, for boxes up to a size in [rad]."""
-        cell, points = problem.cell, problem.points
-        q = problem.solutions(few_columns(points.pass_index))
-        seams = seams_of(q)
+    def of(cls, problem: GrindingProblem, seams: Seams, largest: float) -> SearchSpace:
+        """Return that of a problem with its seams, for boxes up to a size in [rad]."""
+        cell, points, q = problem.cell, problem.points, _few_postures(problem)
         images = Images(cell.robot, seams, largest)
         sides, t = all_sides(problem), problem.field.contact_positions
         walls = ColumnWalls(cell, problem.scene.part, points, images, sides)
         families = Families(images, q, problem.cuts, points.pass_index, t, sides)
         sampler = ColumnSampler(problem, seams, images.limits)
         return cls(walls, families, sampler, Rectangles(sampler, points, whole_cells(cell.wheel)))
+
+
+def _few_postures(problem: GrindingProblem) -> Array:
+    """Return inverse solutions at `few_columns` in [rad], shape (n, M, 8, 6)."""
+    return problem.solutions(few_columns(problem.points.pass_index))

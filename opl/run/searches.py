@@ -6,12 +6,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from opl.errors import NoPathError
+from opl.files.beside import Later
 from opl.job.search import Method, Objective, Search
 from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.motion.short_ways import shortened
 from opl.planning.borders import Nameable, clear_of_borders
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.equals import quickest_of_equals
+from opl.planning.images import Seams
 from opl.planning.least_cost import least_cost
 from opl.planning.least_range import NoMotionError, plan_optimal
 from opl.planning.multi_start import RecursiveSearch, only_apart, plan_recursive, try_recursive
@@ -49,6 +51,7 @@ def search_path(
     problem: GrindingProblem,
     nameable: Nameable | None = None,
     report: Callable[[float], None] = lambda _: None,
+    seams: Later[Seams] | None = None,
 ) -> FoundPaths:
     """Search the path by the method and for the objective of a job.
 
@@ -57,12 +60,13 @@ def search_path(
         problem: What is to be planned.
         nameable: Which configurations the program names without doubt; None for all.
         report: Given how much of the work allowed is done, often; may raise.
+        seams: Where full turns are counted from, where that is worked out beside.
 
     Raises:
         NoPathError: If there is none.
     """
-    if search.method is Method.OPTIMAL and search.objective is Objective.RANGE:
-        plan, recursive = _search_range(search, problem, report)
+    if proves_range(search):
+        plan, recursive = _search_range(search, problem, report, seams)
     else:
         plan = recursive = plan_recursive(problem, search.start)
         if search.method is Method.OPTIMAL:
@@ -70,8 +74,16 @@ def search_path(
     return FoundPaths(_finished(search, problem, plan, nameable), recursive)
 
 
+def proves_range(search: Search) -> bool:
+    """Return whether the least joint range sum is searched for, with its proof."""
+    return search.method is Method.OPTIMAL and search.objective is Objective.RANGE
+
+
 def _search_range(
-    search: Search, problem: GrindingProblem, report: Callable[[float], None]
+    search: Search,
+    problem: GrindingProblem,
+    report: Callable[[float], None],
+    seams: Later[Seams] | None,
 ) -> tuple[Plan, Plan | None]:
     """Return the plan of least joint range sum, and the recursive one where there is one."""
     in_turns = RecursiveSearch(problem, search.start)
@@ -89,7 +101,8 @@ def _search_range(
     # cannot be ground on one IK branch, it gives each its own
     others = None if isinstance(last, Exhausted) else otherwise
     try:
-        best = plan_optimal(problem, search.optimal, known, report, others)
+        counted = None if seams is None else seams.value()
+        best = plan_optimal(problem, search.optimal, known, report, others, counted)
     except NoMotionError as error:
         least, proven = error.lower_bound, error.proven
     else:

@@ -12,6 +12,7 @@ from opl.motion.timing import Timing
 from opl.planning.borders import Nameable
 from opl.planning.plan import Plan
 from opl.planning.positions import HALVINGS, with_fewest_positions, with_shorter_moves
+from opl.planning.search_space import seams_in
 from opl.planning.speed_steps import with_speed_steps
 from opl.planning.survey import survey_nodes
 from opl.program.posts import find_post
@@ -22,7 +23,7 @@ from opl.run.exporting import draw_charts, job_date, load_pictures, render_progr
 from opl.run.page_data import drawn_run
 from opl.run.preparing import prepare
 from opl.run.remedies import find_remedies
-from opl.run.searches import compare, search_path
+from opl.run.searches import compare, proves_range, search_path
 from opl.run.surfacing import cut_surface
 from opl.run.values import (
     Charted,
@@ -112,11 +113,14 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
     cell, points = job.cell, surfaced.points
     scene = problem.scene
     beside.start(job, cell, surfaced, points, problem, scene, scene.part, prepared, *comparison)
+    seams = Later(seams_in, problem)
+    if proves_range(job.search):
+        beside.begin(seams)
     for later in (*comparison, Later(load_pictures)):
         beside.begin(later)
     try:
         with watch.stage(Stage.SEARCH) as report:
-            found = search_path(job.search, problem, _nameable(job), report)
+            found = search_path(job.search, problem, _nameable(job), report, seams)
     except NoPathError as error:
         return _without_path(prepared, error, watch)
     charted = Later(_charted, prepared, found.plan)
