@@ -8,8 +8,8 @@ How deep one is that cuts into the wheel is how far it has to be moved to be out
 second opinion has it too. At the rim that is more than its deepest point is below the surface, by
 up to the square root of two: a face that cuts the corner of the wheel off has to go all the way to
 the corner. Any direction gives a way out; the shortest is along the axle, away from it at a corner
-of the triangle, along its normal, or square to one of its edges where that crosses the rim. Only
-those of the last kind have to be looked for.
+of the triangle, along its normal, or square to one of its edges where that touches the rim. Only
+those of the last kind have to be looked for, where an edge is so near to the rim.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ DEEPEST = 96  # pieces that wait at once; halving to the tolerance needs far few
 # Square to an edge, evenly. Between two the way out can be shorter than about both only if it is
 # a least one there, and then by no more than a thousandth.
 DIRECTIONS = 64
+_COS = np.cos(2.0 * np.pi / DIRECTIONS * np.arange(DIRECTIONS))
+_SIN = np.sin(2.0 * np.pi / DIRECTIONS * np.arange(DIRECTIONS))
 _CLOSER = 24  # times that the bracket around a shortest one is made smaller, by the golden section
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
@@ -43,10 +45,12 @@ def _out_along(corners, half_width, radius, nx, ny, nz):  # type: ignore[no-unty
     return (least - half_width * abs(nx) - radius * np.sqrt(ny * ny + nz * nz)) / length
 
 
-@kernel("float64(float64[:,::1],float64,float64,float64[:,::1],float64)")
-def _out_around(corners, half_width, radius, across, angle):  # type: ignore[no-untyped-def]
-    """Return the same for the direction at an angle between the two of ``across``, shape (2, 3)."""
-    c, s = np.cos(angle), np.sin(angle)
+@kernel("float64(float64[:,::1],float64,float64,float64[:,::1],float64,float64)")
+def _out_around(corners, half_width, radius, across, c, s):  # type: ignore[no-untyped-def]
+    """Return the same for the direction between the two of ``across``, shape (2, 3).
+
+    It is at an angle whose cosine and sine are given.
+    """
     return _out_along(
         corners,
         half_width,
@@ -55,6 +59,18 @@ def _out_around(corners, half_width, radius, across, angle):  # type: ignore[no-
         c * across[0, 1] + s * across[1, 1],
         c * across[0, 2] + s * across[1, 2],
     )
+
+
+@kernel("boolean(float64[::1],float64[::1],float64,float64,float64)")
+def _may_cross_rim(a, b, half_width, radius, way):  # type: ignore[no-untyped-def]
+    """Return whether an edge from a to b can touch the rim of the wheel after so short a way.
+
+    What does was no farther from it than that: from the side of the wheel, and from its radius.
+    Only where an edge touches the rim, a direction square to it can be the shortest way out.
+    """
+    one, other = np.sqrt(a[1] * a[1] + a[2] * a[2]), np.sqrt(b[1] * b[1] + b[2] * b[2])
+    beside = max(abs(a[0]), abs(b[0])) + way
+    return beside >= half_width and max(one, other) + way >= radius
 
 
 @kernel("float64(float64[::1],float64,float64,float64)")
@@ -72,7 +88,7 @@ def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-de
         most = max(most, _out_along(corners, half_width, radius, sign, 0.0, 0.0))
     for k in range(3):
         most = max(most, _out_along(corners, half_width, radius, 0.0, corners[k, 1], corners[k, 2]))
-    if most >= enough:
+    if most >= min(enough, 0.0):
         return most
     edges = np.empty((3, 3))
     for k in range(3):
@@ -84,18 +100,17 @@ def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-de
     for sign in (-1.0, 1.0):
         most = max(most, _out_along(corners, half_width, radius, sign * nx, sign * ny, sign * nz))
     for k in range(3):
-        # away from the axle where an edge is nearest to it: mostly that is enough
-        ey, ez = edges[k, 1], edges[k, 2]
-        square = ey * ey + ez * ez
-        share = -(corners[k, 1] * ey + corners[k, 2] * ez) / square if square > 0.0 else 0.0
-        y, z = corners[k, 1] + share * ey, corners[k, 2] + share * ez
-        if 0.0 < share < 1.0:
-            most = max(most, _out_along(corners, half_width, radius, 0.0, y, z))
+        # square to an edge and to the axle: mostly that is enough
+        for sign in (-1.0, 1.0):
+            ey, ez = sign * edges[k, 1], sign * edges[k, 2]
+            most = max(most, _out_along(corners, half_width, radius, 0.0, -ez, ey))
     across, tried = np.empty((2, 3)), np.empty(DIRECTIONS)
     turn = 2.0 * np.pi / DIRECTIONS
     for k in range(3):
-        if most >= enough:
+        if most >= min(enough, 0.0):
             return most
+        if not _may_cross_rim(corners[k], corners[(k + 1) % 3], half_width, radius, -most):
+            continue
         ex, ey, ez = edges[k, 0], edges[k, 1], edges[k, 2]
         length, square = np.sqrt(ex * ex + ey * ey + ez * ez), np.sqrt(ey * ey + ez * ez)
         if length == 0.0:
@@ -107,23 +122,27 @@ def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-de
         across[1, 1] = -ex * across[0, 2] / length
         across[1, 2] = ex * across[0, 1] / length
         for d in range(DIRECTIONS):
-            tried[d] = _out_around(corners, half_width, radius, across, d * turn)
+            tried[d] = _out_around(corners, half_width, radius, across, _COS[d], _SIN[d])
         for d in range(DIRECTIONS):
             if tried[d] < tried[d - 1] or tried[d] < tried[(d + 1) % DIRECTIONS]:
                 continue
             low, high = (d - 1.0) * turn, (d + 1.0) * turn
             first, second = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-            one = _out_around(corners, half_width, radius, across, first)
-            other = _out_around(corners, half_width, radius, across, second)
+            one = _out_around(corners, half_width, radius, across, np.cos(first), np.sin(first))
+            other = _out_around(corners, half_width, radius, across, np.cos(second), np.sin(second))
             for _ in range(_CLOSER):
                 if one > other:
                     high, second, other = second, first, one
                     first = high - _GOLDEN * (high - low)
-                    one = _out_around(corners, half_width, radius, across, first)
+                    one = _out_around(
+                        corners, half_width, radius, across, np.cos(first), np.sin(first)
+                    )
                 else:
                     low, first, one = first, second, other
                     second = low + _GOLDEN * (high - low)
-                    other = _out_around(corners, half_width, radius, across, second)
+                    other = _out_around(
+                        corners, half_width, radius, across, np.cos(second), np.sin(second)
+                    )
             most = max(most, tried[d], one, other)
     return most
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
@@ -129,6 +129,24 @@ def test_a_triangle_in_the_wheel_is_as_deep_as_its_shortest_way_out(seed, width,
         assert found == pytest.approx(tried, rel=1e-3, abs=1e-5)
     else:
         assert tried <= found + TOLERANCE
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_a_triangle_about_the_axle_gets_out_across_the_edge_next_to_the_axle(seed):
+    random = np.random.default_rng(seed)
+    wheel = wheel_of(10.0, 0.15)  # out at a side is far
+    turns = np.sort(random.uniform(0.0, 2 * np.pi / 3, 3) + 2 * np.pi / 3 * np.arange(3))
+    y, z = random.uniform(0.02, 0.3, 3) * np.array([np.cos(turns), np.sin(turns)])
+    about = np.column_stack([random.uniform(-0.05, 0.05, 3), y, z])
+    before, after = about[:, 1:], np.roll(about[:, 1:], -1, axis=0)
+    across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    past_axle = across / np.linalg.norm(after - before, axis=1)
+    assume((past_axle > 0.0).all())  # the axle goes through it
+    found = signed_wheel_distance(
+        part_tree(mesh_of(about[None] + [0.0, 0.0, wheel.radius])), wheel, np.eye(4), EXACT
+    )
+    assert found == pytest.approx(-wheel.radius - past_axle.min(), abs=TOLERANCE)
 
 
 def test_dense_samples_come_as_near_as_the_exact_distance():
