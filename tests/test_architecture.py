@@ -60,7 +60,7 @@ HOMES = {
     "uvicorn": {"service"},
     "distributed": {"work/cluster"},
     "sqlite3": {"store"},
-    "numba": {"files/kernels"},
+    "numba": {"files/kernels", "files/kept_kernels"},
 }
 
 # rooms that run inside of other programs, with Python's own library and what the host has

@@ -141,19 +141,11 @@ def _numba() -> Any:
     with _without(_LINEAR_ALGEBRA):
         import numba
         import numba.np.arraymath
-    from numba.core.caching import FunctionCache
-    from numba.core.runtime.nrt import rtsys
     from numba.extending import typeof_impl
 
-    def load(kept: Any, signature: Any, context: Any) -> Any:
-        rtsys.initialize(context)
-        with kept._guard_against_spurious_io_errors():
-            return kept._load_overload(signature, context)
+    from opl.files.kept_kernels import load_without_compiler
 
-    # numba's own first loads all that it compiles with, which takes half as long as numba itself:
-    # what is compiled needs none of it, and whatever compiles loads it then
-    if {"_load_overload", "_guard_against_spurious_io_errors"} <= set(dir(FunctionCache)):
-        FunctionCache.load_overload = load  # type: ignore[method-assign]
+    load_without_compiler()
 
     @typeof_impl.register(Kernel)
     def type_of(made: Kernel, _context: Any) -> Any:

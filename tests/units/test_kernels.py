@@ -1,5 +1,6 @@
 """Kernels are loaded when they are called, not before."""
 
+import os
 import subprocess
 import sys
 
@@ -70,3 +71,44 @@ print(all("compiled" in vars(made) for made in kernels._made))
         ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     said = ["False", "False False", "_few_distances", "True"]  # nor what numba compiles with
     assert ended.stdout.splitlines() == said, ended.stderr
+
+
+def test_what_was_kept_is_taken_into_what_is_compiled_later(tmp_path):
+    (tmp_path / "kept.py").write_text(
+        """
+import numpy as np
+from opl.files.kernels import kernel
+
+@kernel("float64(float64[::1])")
+def inner(x):
+    y = np.empty(len(x))
+    for k in range(len(x)):
+        y[k] = 2.0 * x[k]
+    return y.sum()
+
+@kernel("float64(float64[::1])")
+def outer(x):
+    return inner(x) + inner(x[1:])
+"""
+    )
+    script = """
+import sys
+import numpy as np
+import kept
+for name in sys.argv[1:]:
+    made = getattr(kept, name)
+    hits = sum(made.compiled.stats.cache_hits.values())
+    print(name, made(np.arange(4.0)), hits)
+"""
+    keeps = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(tmp_path)}
+    said = []
+    for names in (["inner"], ["inner", "outer"], ["outer"], ["outer", "inner"]):
+        ended = subprocess.run(
+            [sys.executable, "-c", script, *names], capture_output=True, text=True, env=keeps
+        )
+        assert not ended.stderr
+        said += ended.stdout.splitlines()
+    assert said == [
+        *("inner 12.0 0", "inner 12.0 1", "outer 24.0 0"),
+        *("outer 24.0 1", "outer 24.0 1", "inner 12.0 1"),
+    ]
