@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.recheck import recheck
 from opl.cell.collision import CollisionScene
-from opl.cell.robot import load_robot
+from opl.cell.robot_loading import load_robot
 from opl.geometry.frames import Array, transform
 from opl.job.load import Job, load_job
 from opl.planning.barriers import all_sides

@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 
-from opl.cell.robot import load_robot
+from opl.cell.robot_loading import load_robot
 from opl.motion.rounded import rounded_line
 from opl.motion.time_law import JointLimits, fastest_law
 

@@ -100,10 +100,10 @@ from opl.version import VERSION
 
 if TYPE_CHECKING:
     from opl.cell.robot import Robot as Robot
-    from opl.cell.robot import known_robots as known_robots
-    from opl.cell.robot import load_robot as load_robot
-    from opl.cell.robot import robot_path as robot_path
     from opl.cell.robot_file import read_robot_file as read_robot_file
+    from opl.cell.robot_loading import known_robots as known_robots
+    from opl.cell.robot_loading import load_robot as load_robot
+    from opl.cell.robot_loading import robot_path as robot_path
     from opl.cell.urdf_import import import_urdf as import_urdf
     from opl.errors import Cancelled as Cancelled
     from opl.errors import InputError as InputError
@@ -192,8 +192,9 @@ __version__ = VERSION
 
 # where each name is defined
 _HOMES = {
-    "opl.cell.robot": "Robot known_robots load_robot robot_path",
+    "opl.cell.robot": "Robot",
     "opl.cell.robot_file": "read_robot_file",
+    "opl.cell.robot_loading": "known_robots load_robot robot_path",
     "opl.cell.urdf_import": "import_urdf",
     "opl.errors": "Cancelled InputError NoFreeMoveError NoPathError OplError UnsafeError",
     "opl.files.claiming": "release_folders write_files",

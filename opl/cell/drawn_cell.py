@@ -11,8 +11,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from opl.cell.robot import Robot, link_names
-from opl.cell.robot_file import N_JOINTS
+from opl.cell.robot import N_JOINTS, Robot, link_names
 from opl.cell.robot_shapes import collision_shapes
 from opl.cell.workcell import PART, WorkCell
 from opl.geometry.frames import Array

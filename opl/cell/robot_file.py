@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from opl.cell.robot import N_JOINTS
 from opl.files.documents import Document, read
 from opl.files.quantities import Number, Positive
 
-N_JOINTS = 6
 FROM_URDF = "from the URDF"
 
 
@@ -131,7 +131,7 @@ class RobotFile(Document):
     base: Base
     arm: ArmNumbers
     payload: Payload | None = None
-    acceleration: Acceleration | None = None  # None: as `opl.cell.robot` assumes it
+    acceleration: Acceleration | None = None  # None: as `opl.cell.robot_loading` assumes it
     shapes: Sourced | None = None  # of the shapes in the URDF
     joints: Annotated[list[Joint], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
 

@@ -18,7 +18,7 @@ import pinocchio as pin
 from opl.cell.full_turns import principal
 from opl.cell.inverse_kinematics import Arm
 from opl.cell.parallel_axes import ParallelAxesArm
-from opl.cell.robot_file import N_JOINTS
+from opl.cell.robot import N_JOINTS
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.errors import InputError
 from opl.geometry.frames import Array

@@ -19,8 +19,9 @@ import numpy as np
 from opl.cell.full_turns import FULL_TURN, angular_distance
 from opl.cell.inverse_kinematics import Arm, inverse_kinematics, singularity_margins
 from opl.cell.parallel_axes import ParallelAxesArm
-from opl.cell.robot import Robot, forward_kinematics, load_robot
+from opl.cell.robot import Robot, forward_kinematics
 from opl.cell.robot_file import FROM_URDF
+from opl.cell.robot_loading import load_robot
 from opl.cell.urdf_arm import UrdfArm, arm_of_urdf
 from opl.cell.urdf_tree import UrdfTree
 from opl.cell.xacro_file import SUFFIX, expand

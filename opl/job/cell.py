@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from opl.cell.robot import Robot, link_names, load_robot
+from opl.cell.robot import Robot, link_names
+from opl.cell.robot_loading import load_robot
 from opl.cell.workcell import PART, WHEEL, JointLimit, wheel_solid
 from opl.errors import InputError
 from opl.files.documents import read

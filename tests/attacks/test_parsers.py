@@ -16,7 +16,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from opl.cell.robot import load_robot
+from opl.cell.robot_loading import load_robot
 from opl.cell.urdf_arm import arm_of_urdf
 from opl.cell.urdf_tree import UrdfTree
 from opl.errors import InputError, OplError

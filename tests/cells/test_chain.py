@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from opl.cell import chain as module
 from opl.cell.chain import FEW
-from opl.cell.robot import known_robots, load_robot
+from opl.cell.robot_loading import known_robots, load_robot
 from opl.cell.urdf_chain import read_chain
 from opl.cell.urdf_tree import UrdfTree
 from opl.files.kernels import load_kernels

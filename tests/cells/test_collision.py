@@ -8,7 +8,8 @@ import pytest
 
 from opl.cell.collision import CollisionScene
 from opl.cell.nearest import nearest_pairs
-from opl.cell.robot import forward_kinematics, load_robot
+from opl.cell.robot import forward_kinematics
+from opl.cell.robot_loading import load_robot
 from opl.geometry.frames import pose
 from opl.geometry.shapes import Body, Box, Cylinder
 from tests.support.bare_cells import bare_cell, block, random_configurations, with_obstacle

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import opl.proof.too_wide
-from opl.cell.robot import forward_kinematics, load_robot
+from opl.cell.robot import forward_kinematics
+from opl.cell.robot_loading import load_robot
 from opl.files.beside import Beside
 from opl.geometry.frames import inverse
 from opl.motion.fewest import ChainRule, fewest

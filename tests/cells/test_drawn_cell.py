@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 from opl.cell.collision import CollisionScene
 from opl.cell.drawn_cell import drawn_chain, drawn_links
 from opl.cell.nearest import nearest_pairs
-from opl.cell.robot import forward_kinematics, known_robots, link_names, load_robot
+from opl.cell.robot import forward_kinematics, link_names
+from opl.cell.robot_loading import known_robots, load_robot
 from opl.geometry.mesh import TriangleMesh
 from opl.job.load import load_job
 from tests.support.jobs import V_JOB

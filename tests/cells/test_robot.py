@@ -9,7 +9,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from opl.cell.robot import forward_kinematics, known_robots, load_robot
+from opl.cell.robot import forward_kinematics
+from opl.cell.robot_loading import known_robots, load_robot
 from opl.errors import InputError
 from opl.files.resources import folder
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from opl.cell import separation as separation_module
 from opl.cell.collision import CollisionScene
 from opl.cell.nearest import nearest_pairs
-from opl.cell.robot import load_robot
+from opl.cell.robot_loading import load_robot
 from opl.cell.separation import Bodies, Separation
 from opl.geometry.frames import pose
 from opl.geometry.rotations import from_rotation_vector

@@ -10,8 +10,9 @@ import trimesh
 
 from opl.cell.collision import CollisionScene
 from opl.cell.drawing import drawn_arm
-from opl.cell.robot import controller_poses, forward_kinematics, known_robots, load_robot
+from opl.cell.robot import controller_poses, forward_kinematics
 from opl.cell.robot_file import read_robot_file
+from opl.cell.robot_loading import known_robots, load_robot
 from opl.cell.urdf_arm import arm_of_urdf
 from opl.cell.urdf_import import import_urdf
 from opl.errors import InputError

@@ -7,7 +7,8 @@ import pytest
 
 from opl.cell.drawing import drawn_arm, wrist_reach
 from opl.cell.inverse_kinematics import inverse_kinematics
-from opl.cell.robot import forward_kinematics, known_robots, load_robot
+from opl.cell.robot import forward_kinematics
+from opl.cell.robot_loading import known_robots, load_robot
 from opl.report.arm_view import arm_view
 from tests.support.jobs import opl
 

@@ -11,7 +11,8 @@ import trimesh
 import yaml
 from scipy.spatial.transform import Rotation
 
-from opl.cell.robot import link_names, load_robot
+from opl.cell.robot import link_names
+from opl.cell.robot_loading import load_robot
 from opl.errors import InputError
 from opl.files.resources import folder
 from opl.geometry.frames import pose, rotation_angle, transform

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from opl.cell.robot import known_robots
+from opl.cell.robot_loading import known_robots
 from opl.errors import InputError
 from opl.geometry.frames import inverse
 from opl.job.load import load_job

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from opl.cell.robot import forward_kinematics, load_robot
+from opl.cell.robot import forward_kinematics
+from opl.cell.robot_loading import load_robot
 from opl.job.load import load_job
 from opl.run.delivery import deliver
 from opl.run.preparing import prepare

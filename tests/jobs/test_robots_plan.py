@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 
-from opl.cell.robot import load_robot
+from opl.cell.robot_loading import load_robot
 from opl.cell.urdf_import import import_urdf
 from opl.errors import InputError, UnsafeError
 from opl.job.load import load_job

@@ -14,7 +14,8 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from opl.cell.robot import forward_kinematics, known_robots, load_robot
+from opl.cell.robot import forward_kinematics
+from opl.cell.robot_loading import known_robots, load_robot
 from opl.files.resources import folder
 from opl.job.cell import load_cell
 from opl.job.load import load_job

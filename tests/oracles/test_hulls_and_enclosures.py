@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from opl.cell.flange_jets import contact_jets
 from opl.cell.inverse_jets import joint_derivatives
 from opl.cell.inverse_kinematics import inverse_kinematics
-from opl.cell.robot import load_robot
+from opl.cell.robot_loading import load_robot
 from opl.geometry.frames import pose
 from opl.geometry.wheel import ContactWheel
 from opl.search.relaxation import least_box

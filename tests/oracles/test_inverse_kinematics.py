@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from opl.cell import many_poses
 from opl.cell.full_turns import full_turns
 from opl.cell.inverse_kinematics import N_IK_BRANCHES, ik_branch_name, inverse_kinematics
-from opl.cell.robot import forward_kinematics, load_robot
+from opl.cell.robot import forward_kinematics
+from opl.cell.robot_loading import load_robot
 from opl.cell.spherical_wrist import SphericalWristArm
 from opl.geometry.frames import pose
 from tests.support.closed_forms import difference, opw_solutions

@@ -12,7 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from opl.cell.inverse_kinematics import inverse_kinematics, singularity_margins
 from opl.cell.parallel_axes import ParallelAxesArm
-from opl.cell.robot import controller_poses, forward_kinematics, known_robots, load_robot
+from opl.cell.robot import controller_poses, forward_kinematics
+from opl.cell.robot_loading import known_robots, load_robot
 from opl.planning.nodes import _unrolled
 from tests.support.closed_forms import difference
 

@@ -10,14 +10,9 @@ import pytest
 
 from opl.cell.full_turns import full_turns
 from opl.cell.inverse_kinematics import inverse_kinematics
-from opl.cell.robot import (
-    controller_poses,
-    forward_kinematics,
-    known_robots,
-    load_robot,
-    robot_path,
-)
+from opl.cell.robot import controller_poses, forward_kinematics
 from opl.cell.robot_file import read_robot_file
+from opl.cell.robot_loading import known_robots, load_robot, robot_path
 from opl.cell.urdf_import import closure_error
 from opl.files.documents import read
 from opl.files.resources import folder

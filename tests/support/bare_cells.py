@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from opl.cell.robot import load_robot
+from opl.cell.robot_loading import load_robot
 from opl.cell.workcell import WorkCell
 from opl.geometry.frames import pose
 from opl.geometry.mesh import TriangleMesh

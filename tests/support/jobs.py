@@ -11,7 +11,8 @@ import numpy as np
 import trimesh
 import yaml
 
-from opl.cell.robot import forward_kinematics, load_robot
+from opl.cell.robot import forward_kinematics
+from opl.cell.robot_loading import load_robot
 from opl.cli.commands import main
 from opl.files.resources import folder
 from opl.geometry.frames import pose

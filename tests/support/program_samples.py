@@ -5,7 +5,7 @@ from datetime import datetime
 
 import numpy as np
 
-from opl.cell.robot import load_robot
+from opl.cell.robot_loading import load_robot
 from opl.motion.motion import Motion, MoveKind, TimedMotion, VerifiedMotion
 from opl.program.pulses import PulseScale
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from opl.cell.full_turns import angular_distance, full_turns, nearest_turn, principal
-from opl.cell.robot import load_robot
+from opl.cell.robot_loading import load_robot
 
 MH24 = load_robot("mh24")
 ANGLES = st.floats(-30.0, 30.0)

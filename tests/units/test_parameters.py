@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from opl.cell.robot import load_robot
+from opl.cell.robot_loading import load_robot
 from opl.cli.commands import main
 from opl.errors import InputError, SettingError
 from opl.program.parameters import read_parameters

@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 import pytest
 
-from opl.cell.robot import load_robot
+from opl.cell.robot_loading import load_robot
 from opl.motion.path import GrindingPath
 from opl.report import chart, pictures
 from opl.report.canvas import png, svg

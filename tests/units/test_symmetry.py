@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from opl.cell.robot import load_robot
+from opl.cell.robot_loading import load_robot
 from opl.cell.workcell import JointLimit
 from opl.planning.symmetry import everywhere
 from tests.support.planned import v_job
