@@ -21,7 +21,8 @@ from benchmarks.recheck import recheck
 from opl.cell.collision import CollisionScene
 from opl.cell.robot_loading import load_robot
 from opl.geometry.frames import Array, transform
-from opl.job.load import Job, load_job
+from opl.job.load import load_job
+from opl.job.values import Job
 from opl.planning.barriers import all_sides
 from opl.planning.multi_start import plan_recursive
 from opl.planning.optimal import OptimalSearch

@@ -16,7 +16,7 @@ from opl.cell.collision import CollisionScene
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.files.kernels import load_kernels
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.planning.multi_start import plan_recursive
 from opl.planning.problem import GrindingProblem, build_problem, wheel_distances
 from opl.planning.scene import planning_scene

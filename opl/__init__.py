@@ -125,12 +125,12 @@ if TYPE_CHECKING:
     from opl.geometry.mesh import TriangleMesh as TriangleMesh
     from opl.geometry.nurbs import NurbsSurface as NurbsSurface
     from opl.job import keys as keys
-    from opl.job.cell import Cell as Cell
     from opl.job.cell import load_cell as load_cell
-    from opl.job.load import Job as Job
     from opl.job.load import load_job as load_job
     from opl.job.reference import json_schema as json_schema
     from opl.job.reference import keys_page as keys_page
+    from opl.job.values import Cell as Cell
+    from opl.job.values import Job as Job
     from opl.program.posts import find_post as find_post
     from opl.program.posts import known_posts as known_posts
     from opl.program.ratios import import_pulse_ratios as import_pulse_ratios
@@ -206,9 +206,10 @@ _HOMES = {
     "opl.geometry.mesh": "TriangleMesh",
     "opl.geometry.nurbs": "NurbsSurface",
     "opl.job": "keys",
-    "opl.job.cell": "Cell load_cell",
-    "opl.job.load": "Job load_job",
+    "opl.job.cell": "load_cell",
+    "opl.job.load": "load_job",
     "opl.job.reference": "json_schema keys_page",
+    "opl.job.values": "Cell Job",
     "opl.program.posts": "find_post known_posts",
     "opl.program.ratios": "import_pulse_ratios with_ratios",
     "opl.report.arm_view": "arm_view",

@@ -6,8 +6,6 @@ two: what both give would have to be looked up in both.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from opl.cell.workcell import PairRules, WorkCell
@@ -15,32 +13,11 @@ from opl.errors import InputError
 from opl.geometry.frames import Array
 from opl.job import keys
 from opl.job.bodies import MM, bodies_in_si
-from opl.job.cell import Cell, load_cell, robot_of
+from opl.job.cell import load_cell, robot_of
 from opl.job.file import JobFile
 from opl.job.pairs import NO_PAIRS
 from opl.job.source import Source
-from opl.job.wheel import PlacedWheel
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """What is around the part: from the job file, or from the cell file that it names.
-
-    Attributes:
-        cell: The cell; that of a job without a cell file has no path.
-        placed: The wheel, and how it was found.
-        pairs: The pairs that keep another distance, or none.
-        home: Joint positions in [rad], shape (6,).
-        home_key: File and key that give them.
-        wheel_key: What gives the place of the wheel.
-    """
-
-    cell: Cell
-    placed: PlacedWheel
-    pairs: PairRules
-    home: Array
-    home_key: str
-    wheel_key: str
+from opl.job.values import Cell, Surroundings
 
 
 def surroundings(source: Source, file: JobFile) -> Surroundings:

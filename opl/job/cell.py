@@ -8,78 +8,22 @@ robot's base frame.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from opl.cell.robot import Robot, link_names
 from opl.cell.robot_loading import load_robot
-from opl.cell.workcell import PART, WHEEL, JointLimit, wheel_solid
+from opl.cell.workcell import PART, WHEEL, JointLimit
 from opl.errors import InputError
 from opl.files.documents import read
 from opl.geometry.frames import Array, from_roll_pitch_yaw, inverse, pose
 from opl.geometry.shapes import Body
 from opl.job.bodies import MM, bodies_in_si
 from opl.job.cell_file import CellFile, MountingFace, Range
-from opl.job.pairs import FIXTURE, ROBOT, GivenPairs, PairNames, given_pairs
+from opl.job.pairs import FIXTURE, ROBOT, PairNames, given_pairs
 from opl.job.source import Source
-from opl.job.wheel import PlacedWheel
-
-
-@dataclass(frozen=True)
-class Cell:
-    """What a cell file says, validated, in SI, in the base frame of its robot.
-
-    Attributes:
-        path: The file, None if a job gives all this itself.
-        robot: The arm.
-        T_cell_base: Where its base frame is in the frame of the cell, shape (4, 4).
-        wheels: The wheels.
-        obstacles: What stands around, in the base frame.
-        gripper: Bodies fixed to the flange, in the flange frame.
-        clearance: Distance to keep where no pair says otherwise, in [m].
-        pairs: The pairs that may touch or keep another distance.
-        limits: Limits of joints and sums of joints beside the robot's own.
-        home: Joint positions in [rad], shape (6,); None if the job says them.
-    """
-
-    path: Path | None
-    robot: Robot
-    T_cell_base: Array
-    wheels: tuple[PlacedWheel, ...]
-    obstacles: tuple[Body, ...]
-    gripper: tuple[Body, ...]
-    clearance: float
-    pairs: GivenPairs
-    limits: tuple[JointLimit, ...]
-    home: Array | None
-
-    def pick(self, name: str | None, where: str) -> PlacedWheel:
-        """Return the wheel of a name, the only one without.
-
-        Args:
-            name: The name, None if none is given.
-            where: What is to blame for a wrong one.
-
-        Raises:
-            InputError: If there is none of the name, or several and none is named.
-        """
-        names = [wheel.name for wheel in self.wheels]
-        if name is None:
-            if len(names) > 1:
-                raise InputError(where, f"is missing: {self.path} has wheels {', '.join(names)}")
-            return self.wheels[0]
-        if name not in names:
-            raise InputError(where, f"no wheel {name!r} in {self.path}; has: {', '.join(names)}")
-        return self.wheels[names.index(name)]
-
-    def around(self, picked: PlacedWheel) -> tuple[Body, ...]:
-        """Return the obstacles, the wheels that are not picked among them."""
-        others = (
-            wheel_solid(wheel.wheel, wheel.name) for wheel in self.wheels if wheel is not picked
-        )
-        return (*self.obstacles, *others)
+from opl.job.values import Cell
 
 
 def load_cell(path: Path) -> Cell:

@@ -6,7 +6,7 @@ Its sections, and the cell file that many jobs share, are the other modules of t
 from __future__ import annotations
 
 from collections.abc import Mapping, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,49 +15,19 @@ from opl.errors import InputError
 from opl.files.documents import check, content_of
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.nurbs import NurbsSurface
-from opl.geometry.passes import MachinedSurface, Passes
+from opl.geometry.passes import MachinedSurface
 from opl.geometry.patchwork import Face, Patchwork
-from opl.job.around import Surroundings, check_home, surroundings
+from opl.job.around import check_home, surroundings
 from opl.job.bodies import bodies_in_si, pose_of
 from opl.job.file import JobFile
 from opl.job.inputs import input_digests
-from opl.job.search import Method, Search
+from opl.job.methods import Method
 from opl.job.source import Source
 from opl.job.sweeps import with_value
 from opl.job.user_frame import home_in_user_frame
+from opl.job.values import Job
 from opl.job.workpiece import GIVEN
-from opl.motion.process_settings import ProcessSettings
 from opl.program.led import StationaryTool
-from opl.program.settings import ProgramSettings
-
-
-@dataclass(frozen=True)
-class Job:
-    """Everything a job file says, validated, in SI.
-
-    Attributes:
-        source: The file or mapping; for messages.
-        name: Name of the program.
-        cell: Robot, wheel, part and surroundings.
-        around: Where the surroundings come from.
-        surface: The surface to be ground, in the workpiece frame.
-        passes: How the surface is cut.
-        search: How the path is searched.
-        process: Speeds, approach and home.
-        program: How the program is written.
-        inputs: SHA-256 of everything it is made of, by name; see `opl.job.inputs`.
-    """
-
-    source: Source
-    name: str
-    cell: WorkCell
-    around: Surroundings
-    surface: MachinedSurface
-    passes: Passes
-    search: Search
-    process: ProcessSettings
-    program: ProgramSettings
-    inputs: Mapping[str, str] = field(default_factory=dict)
 
 
 def load_job(

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import Enum
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -13,6 +11,7 @@ from pydantic import ConfigDict, Field, model_validator
 from opl.files.documents import Document
 from opl.files.quantities import NotNegative, between
 from opl.job.bodies import MM
+from opl.job.methods import Method, Objective, Search
 from opl.planning.settings import (
     CostWeights,
     Interpolation,
@@ -26,22 +25,6 @@ _BeltUnits = Annotated[float, Field(ge=0.05, le=10_000.0, json_schema_extra={"un
 MAX_JOINT_STEP = np.deg2rad(15.0)  # between adjacent nodes; more is a jump through a singularity
 
 SixNotNegative = Annotated[list[NotNegative], Field(min_length=6, max_length=6)]
-
-
-class Method(str, Enum):
-    """How the path is searched."""
-
-    RECURSIVE = "recursive"  # the paper's
-    OPTIMAL = "optimal"  # the best there is, with proof
-
-
-class Objective(str, Enum):
-    """What the optimal method keeps small."""
-
-    RANGE = "range"  # joint range sum; inside its box the smoothest motion
-    TRAVEL = "travel"  # joint travel
-    TIME = "time"  # time on the wheel
-    WEIGHTED = "weighted"  # a weighted sum of the three
 
 
 class WeightsSection(Document):
@@ -201,40 +184,3 @@ class SearchSection(Document):
                 max_subproblems=self.max_subproblems,
             ),
         )
-
-
-@dataclass(frozen=True)
-class Search:
-    """How the path is searched.
-
-    Attributes:
-        method: The search.
-        objective: What the optimal method keeps small.
-        objective_weights: What the weighted objective charges.
-        start: Start node of the recursive method.
-        n_contact_positions: M, the number of values of t.
-        max_contact_error: Largest distance of the ground point from the wheel's surface in [m].
-        interpolation: How the path between nodes is filled in.
-        optimal: What is wanted of the optimal method.
-    """
-
-    method: Method
-    objective: Objective
-    objective_weights: ObjectiveWeights
-    start: Start
-    n_contact_positions: int
-    max_contact_error: float
-    interpolation: Interpolation
-    optimal: OptimalSettings
-
-    @property
-    def requested_weights(self) -> ObjectiveWeights | None:
-        """The weights of the objective, if it is a weighted sum."""
-        return self.objective_weights if self.objective is Objective.WEIGHTED else None
-
-    @property
-    def counts_ranges(self) -> bool:
-        """Whether the joint range sum is among what the method keeps small."""
-        if self.method is Method.RECURSIVE or self.objective is Objective.RANGE:
-            return True
-        return self.objective is Objective.WEIGHTED and self.objective_weights.joint_range > 0.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -18,6 +17,7 @@ from opl.geometry.touched import KINDS, TouchedError, TouchedFit, fit_touched
 from opl.geometry.wheel import ContactWheel
 from opl.job.bodies import MM, Matrix, Triple, pose_of
 from opl.job.source import Source
+from opl.job.values import PlacedWheel
 
 # robot: as its controller's pendant shows positions in the robot's own frame
 Frame = Literal["robot", "cell"]
@@ -206,20 +206,3 @@ class CellWheelSection(WheelSection):
         if self.T_cell_contact0_mm is not None:
             return T_base_cell @ pose_of(self.T_cell_contact0_mm)
         return super()._matrix(T_base_cell)
-
-
-@dataclass(frozen=True)
-class PlacedWheel:
-    """A wheel in the base frame, and how it came there.
-
-    Attributes:
-        name: What the cell calls it.
-        wheel: The wheel.
-        max_belt_penetration: How deep a part may sink into its belt in [m].
-        fit: How its touched points fit; None if it was given as a pose.
-    """
-
-    name: str
-    wheel: ContactWheel
-    max_belt_penetration: float
-    fit: TouchedFit | None

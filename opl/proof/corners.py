@@ -13,7 +13,7 @@ from opl.files.beside import Beside
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array, inverse
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.motion.motion import Motion
 from opl.program.played import Playback
 from opl.proof.roundings import DEPTHS, Rounding, roundings, tool_points_of, zones_of

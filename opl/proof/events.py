@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from opl.cell.robot import SAME_CONFIGURATION
 from opl.findings import Finding, Level
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.motion.motion import Motion
 from opl.program.events import Event, meanings
 from opl.program.moves import START_SPEED, Move, Program

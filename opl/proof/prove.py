@@ -11,7 +11,7 @@ from opl.files.beside import Beside
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
 from opl.job import keys
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.motion.motion import TimedMotion
 from opl.program.posts import Reader, find_post, readers
 from opl.proof.common_shift import common_shift

@@ -20,7 +20,7 @@ from opl.findings import Finding, Level
 from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import box_corners
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.motion.motion import Motion, VerifiedMotion
 from opl.planning.positions import PositionRule
 from opl.program.moves import Program

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.motion.motion import Motion
 from opl.motion.timing import Timing, time_motion
 from opl.proof.prove import rule_of

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import Array
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.motion.motion import Motion, Phase
 from opl.program.played import ReadMove
 

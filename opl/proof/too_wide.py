@@ -13,7 +13,7 @@ from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import signed_wheel_distance
 from opl.geometry.frames import inverse
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.motion.motion import Motion
 from opl.proof.corners import contact_errors, looked_at
 from opl.proof.roundings import Rounding, roundings, tool_points_of

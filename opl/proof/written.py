@@ -10,7 +10,7 @@ from opl.cell.robot import SAME_CONFIGURATION
 from opl.findings import Finding, Level
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.motion.motion import Motion, TimedMotion
 from opl.motion.timing import time_motion
 from opl.program.moves import Purpose

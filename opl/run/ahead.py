@@ -12,7 +12,8 @@ from pathlib import Path
 
 from opl.files.beside import Beside, Later
 from opl.files.kernels import load_kernels
-from opl.job.load import Job, check_job, job_in_si
+from opl.job.load import check_job, job_in_si
+from opl.job.values import Job
 from opl.run.values import Surfaced
 
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from opl.cell.robot import Robot
-from opl.geometry.faces import FaceSummary
 from opl.geometry.frames import Array, roll_pitch_yaw
 from opl.geometry.shapes import Body, Box, Cylinder
-from opl.job.cell import Cell
-from opl.job.wheel import PlacedWheel
+from opl.job.values import Cell, PlacedWheel
 from opl.run.values import Surfaced
+
+if TYPE_CHECKING:  # what reads part files is not loaded for a run
+    from opl.geometry.faces import FaceSummary
 
 MM = 1e3
 PENDANT = ("X", "Y", "Z", "Rx", "Ry", "Rz")

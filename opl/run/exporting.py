@@ -15,7 +15,7 @@ from opl.errors import InputError
 from opl.files.digests import STAMP, stamped
 from opl.geometry.frames import transform
 from opl.geometry.mesh import box_corners
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.planning.plan import Plan
 from opl.planning.survey import NodeState, NodeSurvey
 from opl.program.export import StraightLimit, export_program

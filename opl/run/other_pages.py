@@ -7,7 +7,7 @@ import numpy as np
 from opl.cell.drawn_cell import BASE, FLANGE, DrawnSolid, drawn_chain, drawn_links
 from opl.cell.workcell import PART, wheel_solid
 from opl.geometry.shapes import Body
-from opl.job.cell import Cell
+from opl.job.values import Cell
 from opl.report.drawn import drawn_cell, drawn_wheel, views, views_of_part
 from opl.report.html import bullets, page, section, text
 from opl.report.packing import Packer

@@ -8,7 +8,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.wheel import ContactWheel
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.planning.survey import NodeState, NodeSurvey
 from opl.report.html import bars, bullets, section, table
 from opl.run.descriptions import pendant_figures

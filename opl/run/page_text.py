@@ -8,7 +8,7 @@ import numpy as np
 
 from opl.cell.robot import Robot
 from opl.cell.workcell import WorkCell
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.report.html import bullets, section, table, text
 from opl.run.result import Report
 

@@ -10,7 +10,7 @@ from opl.errors import InputError
 from opl.files.beside import Later
 from opl.geometry.toolpath import CutterPoints
 from opl.job import keys
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.planning.fixed_contact import keep_contact, runs_of
 from opl.planning.problem import GrindingProblem, build_problem
 from opl.planning.reasons import unreachable_points

@@ -12,8 +12,8 @@ from opl.files.digests import keeps_stamp
 from opl.files.reading import read_bytes
 from opl.findings import Finding
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job
 from opl.job.refusals import keys_named
+from opl.job.values import Job
 from opl.program.posts import find_post
 from opl.proof.digest import changed_since, digests_in, other_inputs, read_result
 from opl.proof.prove import Proof, prove

@@ -11,7 +11,7 @@ from opl.cell.workcell import WorkCell
 from opl.geometry.frames import from_roll_pitch_yaw
 from opl.geometry.toolpath import CutterPoints
 from opl.job import keys
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.planning.multi_start import try_recursive
 from opl.planning.plan import Found
 from opl.planning.problem import GrindingProblem

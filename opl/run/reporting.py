@@ -9,7 +9,7 @@ import numpy as np
 from opl.cell.inverse_kinematics import ik_branch_name
 from opl.cell.robot import Robot
 from opl.files.digests import digest
-from opl.job.search import Objective
+from opl.job.methods import Objective
 from opl.motion.feed import SlowStretch
 from opl.planning.fixed_contact import runs_of
 from opl.program.moves import CycleTime

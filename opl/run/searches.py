@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from opl.errors import NoPathError
 from opl.files.beside import Later
-from opl.job.search import Method, Objective, Search
+from opl.job.methods import Method, Objective, Search
 from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.motion.short_ways import shortened
 from opl.planning.borders import Nameable, clear_of_borders

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from opl.errors import NoFreeMoveError, NoPathError
 from opl.files.beside import Beside, Later
-from opl.job.load import Job
 from opl.job.refusals import dwell_refusal, keys_named
+from opl.job.values import Job
 from opl.motion.feed import slow_stretches
 from opl.motion.motion import Motion, TimedMotion
 from opl.motion.timing import Timing

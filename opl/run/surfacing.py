@@ -10,7 +10,7 @@ from opl.geometry.nurbs import DegenerateNormalError
 from opl.geometry.passes import PassesError, lay_passes
 from opl.geometry.surface_on_solid import heights_of_solid
 from opl.job import keys
-from opl.job.load import Job
+from opl.job.values import Job
 from opl.motion.pass_order import quickest_order
 from opl.run.values import Surfaced
 from opl.run.watch import Stage, Watch

@@ -21,7 +21,7 @@ if TYPE_CHECKING:  # what a stage makes of a value is loaded with the stage
     from opl.geometry.inspection import Inspection
     from opl.geometry.passes import LaidPasses
     from opl.geometry.toolpath import CutterPoints
-    from opl.job.load import Job
+    from opl.job.values import Job
     from opl.motion.feed import SlowStretch
     from opl.motion.figures import Figures
     from opl.motion.motion import Motion, TimedMotion, VerifiedMotion

@@ -20,7 +20,8 @@ from opl.files.kernels import load_kernels, use_threads
 from opl.files.resources import folder
 from opl.geometry.faces import list_faces
 from opl.job import keys
-from opl.job.load import Job, load_job
+from opl.job.load import load_job
+from opl.job.values import Job
 from opl.run.delivery import deliver
 from opl.run.descriptions import describe_job, face_figures
 from opl.run.job_folder import claim_folder

@@ -23,7 +23,8 @@ from opl.files.resources import folder
 from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job, load_job
+from opl.job.load import load_job
+from opl.job.values import Job
 from opl.program.pulses import PulseScale
 from opl.proof.prove import prove, reader_of
 from opl.run.surfacing import cut_surface

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job, load_job
+from opl.job.load import load_job
+from opl.job.values import Job
 from opl.program.posts import find_post
 from opl.proof.prove import prove
 from opl.run.surfacing import cut_surface

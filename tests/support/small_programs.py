@@ -20,7 +20,8 @@ import yaml
 from opl.files.digests import digest
 from opl.files.resources import folder
 from opl.geometry.toolpath import CutterPoints
-from opl.job.load import Job, load_job
+from opl.job.load import load_job
+from opl.job.values import Job
 from opl.motion.motion import Motion
 from opl.proof.prove import reader_of
 from opl.run import stages
