@@ -30,6 +30,9 @@ class InputError(OplError):
         self.where = where
         self.message = message
 
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str]]:
+        return type(self), (self.where, self.message)  # as it is made, in another process too
+
 
 class SettingError(InputError):
     """A setting of a job is unusable; the room that finds it knows its name, not its key.

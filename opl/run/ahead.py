@@ -1,6 +1,7 @@
 """A job that is read and cut in a copy of this process, while this one loads what plans.
 
-The one needs SciPy, the other numba, and each takes as long to load as the other.
+What reads and checks files, and SciPy, which cuts, are loaded in the copy alone: this process needs
+neither for a job that can be used. A refusal is a value, so that nothing is read once more for it.
 """
 
 from __future__ import annotations
@@ -9,12 +10,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from opl.errors import InputError
 from opl.files.beside import Beside, Later
 from opl.files.kernels import load_kernels
-from opl.job.load import check_job, job_in_si
-from opl.job.values import Job
-from opl.run.values import Surfaced
+
+if TYPE_CHECKING:
+    from opl.job.values import Job
+    from opl.run.values import Surfaced
+
+_BOTH_NEED = ("job.values",)
+_WHILE_CHECKED = ("run.searches", "run.exporting")  # takes about as long as the check in the copy
+_THEN = ("run.stages", "run.reporting", "run.delivery")
 
 
 @contextmanager
@@ -32,19 +40,61 @@ def job_ahead(
         InputError: If anything in the job is unusable.
     """
     with Beside(workers > 1) as beside:
-        checked = check_job(source)
-        job = Later(job_in_si, checked, method)
+        refusal = Later(_refusal, source)
+        job = Later(_read, source, method)
         surfaced = Later(_cut, job)
-        if beside.start(checked):
-            beside.begin(job)
-            beside.begin(surfaced)
-            for module in ("stages", "reporting", "delivery"):
-                import_module(f"opl.run.{module}")
+        _load(_BOTH_NEED)
+        if beside.start():
+            for later in (refusal, job, surfaced):
+                beside.begin(later)
+            _load(_WHILE_CHECKED)
+            refused = refusal.value()
+            if refused is not None:
+                raise refused
+            _load(_THEN)
             load_kernels(early=True)
-        yield job.value(), surfaced
+        yield _usable(job), surfaced
 
 
-def _cut(job: Later[Job]) -> Surfaced:
+def _load(modules: tuple[str, ...]) -> None:
+    for module in modules:
+        import_module(f"opl.{module}")
+
+
+def _refusal(source: Path) -> InputError | None:
+    """Return why a job is refused for what it says itself; None if that is in order."""
+    from opl.job.load import check_job
+
+    try:
+        check_job(source)
+    except InputError as error:
+        return error
+    return None
+
+
+def _read(source: Path, method: str | None) -> Job | InputError:
+    """Return a job, or why it is refused."""
+    from opl.job.load import load_job
+
+    try:
+        return load_job(source, method=method)
+    except InputError as error:
+        return error
+
+
+def _usable(job: Later[Job | InputError]) -> Job:
+    """Return a job that was read.
+
+    Raises:
+        InputError: If it is refused.
+    """
+    read = job.value()
+    if isinstance(read, InputError):
+        raise read
+    return read
+
+
+def _cut(job: Later[Job | InputError]) -> Surfaced:
     from opl.run.surfacing import cut_surface  # not for a job that is refused
 
-    return cut_surface(job.value())
+    return cut_surface(_usable(job))
