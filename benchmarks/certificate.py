@@ -23,14 +23,14 @@ from opl.cell.robot_loading import load_robot
 from opl.geometry.frames import Array, transform
 from opl.job.load import load_job
 from opl.job.values import Job
-from opl.planning.barriers import all_sides
+from opl.least.optimal import OptimalSearch
 from opl.planning.multi_start import plan_recursive
-from opl.planning.optimal import OptimalSearch
 from opl.planning.problem import GrindingProblem
 from opl.planning.scene import planning_scene
 from opl.run.preparing import problem_in
 from opl.run.surfacing import cut_surface
 from opl.search.walls import Wall
+from opl.walls.barriers import all_sides
 
 WORKPIECES = Path(__file__).resolve().parent.parent / "workpieces"
 CASES = (

@@ -24,6 +24,8 @@ FLOORS = [
     {"cell", "search"},
     {"motion"},
     {"planning", "verification", "program", "report"},
+    {"walls"},
+    {"least"},
     {"job"},
     {"proof"},
     {"run"},

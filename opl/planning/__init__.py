@@ -1,1 +1,1 @@
-"""From cutter points to a motion."""
+"""From cutter points to a problem, and to motions that are free."""

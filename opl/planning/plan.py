@@ -16,7 +16,6 @@ from opl.geometry.frames import Array
 from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
 from opl.planning.blocking import block
-from opl.planning.holders import Holder
 from opl.planning.open_matrix import OpenMatrix, Track
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import no_path
@@ -42,6 +41,24 @@ class ObjectiveValue:
     def gap(self) -> float:
         """Fraction by which the path may miss the least."""
         return 1.0 - self.lower_bound / self.value if self.value > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Holder:
+    """A place that keeps the joint range sum from being smaller.
+
+    Attributes:
+        place: Cutter point, fractional between two.
+        pass_index: Its pass.
+        joints: Those whose range it holds, the dearest first.
+        bound_without: No motion has a smaller joint range sum even if this place need not be
+            ground, in [rad].
+    """
+
+    place: float
+    pass_index: int
+    joints: tuple[int, ...]
+    bound_without: float
 
 
 @dataclass(frozen=True)

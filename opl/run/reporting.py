@@ -29,7 +29,7 @@ from opl.verification.replay import Verification
 from opl.version import VERSION
 
 if TYPE_CHECKING:
-    from opl.planning.holders import Holder
+    from opl.planning.plan import Holder
 
 
 MM = 1e3

@@ -8,21 +8,21 @@ from dataclasses import dataclass, replace
 from opl.errors import NoPathError
 from opl.files.beside import Later
 from opl.job.methods import Method, Objective, Search
+from opl.least.borders import Nameable, clear_of_borders
+from opl.least.equals import quickest_of_equals
+from opl.least.least_cost import least_cost
+from opl.least.least_range import NoMotionError, plan_optimal
+from opl.least.weighted import plan_weighted
 from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.motion.short_ways import shortened
-from opl.planning.borders import Nameable, clear_of_borders
 from opl.planning.cheapest import plan_cheapest
-from opl.planning.equals import quickest_of_equals
-from opl.planning.images import Seams
-from opl.planning.least_cost import least_cost
-from opl.planning.least_range import NoMotionError, plan_optimal
 from opl.planning.multi_start import RecursiveSearch, only_apart, plan_recursive, try_recursive
 from opl.planning.plan import Exhausted, Found, ObjectiveValue, OutOfBudget, Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import explain, no_path
 from opl.planning.settings import ObjectiveWeights, Start
-from opl.planning.weighted import plan_weighted
 from opl.run.values import Prepared
+from opl.walls.images import Seams
 
 # of motions from the paper's start node, which are searched for comparison only
 MOST_CHECKS = 20

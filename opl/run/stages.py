@@ -6,13 +6,13 @@ from opl.errors import NoFreeMoveError, NoPathError
 from opl.files.beside import Beside, Later
 from opl.job.refusals import dwell_refusal, keys_named
 from opl.job.values import Job
+from opl.least.borders import Nameable
+from opl.least.search_space import seams_in
 from opl.motion.feed import slow_stretches
 from opl.motion.motion import Motion, TimedMotion
 from opl.motion.timing import Timing
-from opl.planning.borders import Nameable
 from opl.planning.plan import Plan
 from opl.planning.positions import HALVINGS, with_fewest_positions, with_shorter_moves
-from opl.planning.search_space import seams_in
 from opl.planning.speed_steps import with_speed_steps
 from opl.planning.survey import survey_nodes
 from opl.program.posts import find_post

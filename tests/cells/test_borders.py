@@ -3,9 +3,9 @@
 import numpy as np
 
 from opl.cell.robot import forward_kinematics
+from opl.least.borders import MARGIN, clear_of_borders
+from opl.least.equals import quickest_of_equals
 from opl.motion.motion import MoveKind
-from opl.planning.borders import MARGIN, clear_of_borders
-from opl.planning.equals import quickest_of_equals
 from tests.support.planned import small_plan, small_problem
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
+from opl.least.equals import CLEAR_OF_LIMITS, quickest_of_equals
 from opl.motion.timing import time_motion
-from opl.planning.equals import CLEAR_OF_LIMITS, quickest_of_equals
 from opl.planning.track_check import Free, check_path
 from tests.support.planned import small_plan, small_problem, with_scene
 

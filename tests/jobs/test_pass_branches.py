@@ -14,7 +14,7 @@ from opl.cell.full_turns import principal
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.job.load import load_job
-from opl.planning.least_range import plan_optimal
+from opl.least.least_range import plan_optimal
 from opl.planning.multi_start import only_apart, plan_recursive
 from opl.planning.open_matrix import open_matrices
 from opl.planning.survey import survey_nodes

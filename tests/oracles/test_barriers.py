@@ -11,11 +11,11 @@ from benchmarks.stranger_jobs import draw_job
 from opl.cell.wheel_distance import signed_wheel_distance
 from opl.geometry.frames import inverse, transform
 from opl.job.load import load_job
-from opl.planning.barriers import all_sides, barriers
-from opl.planning.cut_cells import cells_of, rows_of
-from opl.planning.sides import ANY_SIDE, Barrier, sides_of
 from opl.run.searches import search_path
 from opl.search.walls import Line, Piece
+from opl.walls.barriers import all_sides, barriers
+from opl.walls.cut_cells import cells_of, rows_of
+from opl.walls.sides import ANY_SIDE, Barrier, sides_of
 from tests.support.planned import problem_of, small_problem
 
 

@@ -12,6 +12,9 @@ from scipy.sparse.csgraph import dijkstra
 from opl.cell.collision import CollisionScene
 from opl.cell.full_turns import full_turns
 from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.least.least_cost import least_cost
+from opl.least.least_range import NoMotionError, plan_optimal
+from opl.least.weighted import plan_weighted
 from opl.motion.collision_check import RESOLUTION, colliding_moves, densify
 from opl.motion.figures import figures_of_path
 from opl.motion.free_leads import FreeLeads
@@ -20,16 +23,13 @@ from opl.motion.motion import Motion, MoveKind
 from opl.motion.path import PassEnd
 from opl.motion.whole_motion import UnreachableApproachError
 from opl.planning.cheapest import plan_cheapest
-from opl.planning.columns import ColumnWalls
-from opl.planning.images import Images, seams_of
-from opl.planning.least_cost import least_cost
-from opl.planning.least_range import NoMotionError, plan_optimal
 from opl.planning.multi_start import plan_recursive
-from opl.planning.obstructed import Obstructions
 from opl.planning.settings import ObjectiveWeights
-from opl.planning.shut_leads import ShutLeads
-from opl.planning.weighted import plan_weighted
 from opl.verification.replay import replay
+from opl.walls.columns import ColumnWalls
+from opl.walls.images import Images, seams_of
+from opl.walls.obstructed import Obstructions
+from opl.walls.shut_leads import ShutLeads
 from tests.support.bare_cells import Ghosts
 from tests.support.fcl_scene import FclScene
 from tests.support.jobs import opl, write_job

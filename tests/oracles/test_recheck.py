@@ -18,7 +18,7 @@ from benchmarks.recheck_bodies import Bodies
 from benchmarks.recheck_walls import COARSE, Machine
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
-from opl.planning.optimal import OptimalSearch
+from opl.least.optimal import OptimalSearch
 from tests.oracles.test_optimal import SETTINGS, recursive, v_row
 from tests.support.planned import problem_of
 

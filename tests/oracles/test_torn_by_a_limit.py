@@ -10,11 +10,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from opl.planning.families import Families, few_columns
-from opl.planning.images import Images, seams_of
-from opl.planning.optimal import OptimalSearch
-from opl.planning.sides import ANY_SIDE
+from opl.least.optimal import OptimalSearch
 from opl.search.joint_limits import about
+from opl.walls.families import Families, few_columns
+from opl.walls.images import Images, seams_of
+from opl.walls.sides import ANY_SIDE
 from tests.support.planned import problem_of, small_job, v_job, with_positions, with_scene
 
 LARGEST = 50.0  # [rad] boxes of that size are of no interest

@@ -4,11 +4,11 @@ from functools import cache
 
 import numpy as np
 
-from opl.planning.box_columns import ColumnSampler
-from opl.planning.families import Families, few_columns
-from opl.planning.images import Images, seams_of
-from opl.planning.sides import ANY_SIDE
+from opl.least.box_columns import ColumnSampler
 from opl.search.joint_limits import UNLIMITED
+from opl.walls.families import Families, few_columns
+from opl.walls.images import Images, seams_of
+from opl.walls.sides import ANY_SIDE
 from tests.support.planned import small_problem
 
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from opl.cell.robot import forward_kinematics
-from opl.planning.box_track import nearest_about
-from opl.planning.field_at_places import FieldAtPlaces
-from opl.planning.postures import BESIDE
-from opl.planning.rectangle import Rectangle
-from opl.planning.sides import Barrier, Side
+from opl.least.box_track import nearest_about
+from opl.least.field_at_places import FieldAtPlaces
+from opl.least.postures import BESIDE
+from opl.least.rectangle import Rectangle
 from opl.search.box import JointBox
+from opl.walls.sides import Barrier, Side
 from tests.support.boxes import near_a_box
 from tests.support.planned import small_problem
 

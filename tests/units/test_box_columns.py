@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from opl.planning.box_columns import LESS, ColumnSampler
-from opl.planning.shut_leads import RESERVE
+from opl.least.box_columns import LESS, ColumnSampler
 from opl.search.box import JointBox
 from opl.search.in_box import missing, missing_chords
+from opl.walls.shut_leads import RESERVE
 from tests.support.boxes import near_a_box
 from tests.support.planned import small_problem
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from opl.planning.holders import holders
+from opl.least.holders import holders
 from opl.search.least_box import BoxProof
 from opl.search.walls import Image, Line, Piece, Wall
 

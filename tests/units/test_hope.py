@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from opl.planning.hope import FIRST_GUESS, Hope
+from opl.least.hope import FIRST_GUESS, Hope
 
 
 def test_nothing_is_guessed_where_a_motion_tells():

@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from opl.least.box_columns import ColumnSampler
 from opl.planning import open_matrix, turned
-from opl.planning.box_columns import ColumnSampler
-from opl.planning.families import Families, few_columns
-from opl.planning.images import Images, seams_of
 from opl.planning.multi_start import tracks_from_best_start
 from opl.planning.nodes import build_nodes
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
 from opl.planning.problem import nearer_nodes, wheel_distances
-from opl.planning.sides import ANY_SIDE
 from opl.planning.symmetry import twins
 from opl.planning.turned import Kept
 from opl.search.joint_limits import UNLIMITED
 from opl.search.recursive import descend
+from opl.walls.families import Families, few_columns
+from opl.walls.images import Images, seams_of
+from opl.walls.sides import ANY_SIDE
 from tests.support.planned import small_problem
 
 

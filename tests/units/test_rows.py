@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opl.planning.rows import (
+from opl.least.rows import (
     MOST_PARTS,
     SAME,
     SAME_PLACE,
@@ -18,7 +18,7 @@ from opl.planning.rows import (
     levels,
     shut_edges,
 )
-from opl.planning.stretches import stretches
+from opl.least.stretches import stretches
 from opl.search.box import JointBox
 from opl.search.in_box import clipped
 from opl.search.ladder import Ladder

@@ -7,16 +7,11 @@ import numpy as np
 from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import inverse
-from opl.motion.collision_check import CollidingMove
-from opl.motion.motion import Phase
-from opl.planning import box_nodes
-from opl.planning.box_nodes import BoxNodes, TrackSearch
-from opl.planning.box_track import BoxTracks
-from opl.planning.costs import PushAway
-from opl.planning.multi_start import tracks_from_best_start
-from opl.planning.open_matrix import open_matrices
-from opl.planning.passages import NO_PASSAGES
-from opl.planning.sinking import (
+from opl.least import box_nodes
+from opl.least.box_nodes import BoxNodes, TrackSearch
+from opl.least.box_track import BoxTracks
+from opl.least.passages import NO_PASSAGES
+from opl.least.sinking import (
     HARDLY,
     MORE,
     passed_where_struck,
@@ -28,6 +23,11 @@ from opl.planning.sinking import (
     struck_between,
     sunk_between,
 )
+from opl.motion.collision_check import CollidingMove
+from opl.motion.motion import Phase
+from opl.planning.costs import PushAway
+from opl.planning.multi_start import tracks_from_best_start
+from opl.planning.open_matrix import open_matrices
 from opl.planning.track_check import Collides, check_track
 from opl.search.smooth import Travel
 from tests.support.boxes import near_a_box

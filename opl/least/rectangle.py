@@ -13,12 +13,12 @@ from itertools import pairwise
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.box_columns import ColumnSampler
-from opl.planning.placement import Placement
-from opl.planning.rows import MOST_PARTS, SMALLEST_EDGE, Bulge, Row
+from opl.least.box_columns import ColumnSampler
+from opl.least.rows import MOST_PARTS, SMALLEST_EDGE, Bulge, Row
 from opl.search.box import JointBox
 from opl.search.in_box import missing, missing_chords, nearest_points
 from opl.search.passage import Corner, edges_missed
+from opl.walls.placement import Placement
 
 HALVINGS = 10  # of the way between contact positions at which the part begins to cut
 NEAR = 0.01  # [rad] from a box within which postures are looked at for collisions

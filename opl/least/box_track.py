@@ -10,18 +10,18 @@ from __future__ import annotations
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.box_columns import ColumnSampler
-from opl.planning.box_nodes import SAMPLES, BoxNodes, Learn, TrackSearch
-from opl.planning.families import grown
+from opl.least.box_columns import ColumnSampler
+from opl.least.box_nodes import SAMPLES, BoxNodes, Learn, TrackSearch
+from opl.least.passages import NO_PASSAGES, Passages
+from opl.least.postures import Columns
+from opl.least.rows import bars, crossed, levels
+from opl.least.sinking import DEEP, places_for, shallower, spare_for
 from opl.planning.open_matrix import Track
-from opl.planning.passages import NO_PASSAGES, Passages
 from opl.planning.plan import Plan
-from opl.planning.postures import Columns
-from opl.planning.rows import bars, crossed, levels
-from opl.planning.sinking import DEEP, places_for, shallower, spare_for
 from opl.search import in_box
 from opl.search.box import JointBox
 from opl.search.joint_limits import cut_at
+from opl.walls.families import grown
 
 BULGE = 1.75  # times the room of a motion: how far it may leave its box between two places
 EDGES_OF_WORK = 3e5  # that cost a unit of work to search, all rounds

@@ -14,14 +14,14 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.box_columns import ColumnSampler
-from opl.planning.families import grown
-from opl.planning.placement import Placement
-from opl.planning.rectangle import Rectangle
-from opl.planning.rows import Bulge, Row
+from opl.least.box_columns import ColumnSampler
+from opl.least.rectangle import Rectangle
+from opl.least.rows import Bulge, Row
 from opl.search.box import JointBox
 from opl.search.passage import Corner, barred, chain, passage
 from opl.search.walls import Chain
+from opl.walls.families import grown
+from opl.walls.placement import Placement
 
 PARTS = 8  # into which a stretch between two places is cut
 SHORTEST = 1.0 / 500.0  # of the stretch between cutter points that is still cut

@@ -1,6 +1,6 @@
 """Stretches of rows that a box holds, and edges that pass the rows elsewhere: compiled loops.
 
-A row is places at one contact position with a posture each, as of `opl.planning.rows`.
+A row is places at one contact position with a posture each, as of `opl.least.rows`.
 """
 
 from __future__ import annotations

@@ -25,11 +25,11 @@ from opl.cell.workcell import WorkCell
 from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.cut_cells import cells_of, cut_finer, rows_of
-from opl.planning.enclosed import ROUND_OFF, EnclosedCells, enclosing
-from opl.planning.images import Images
-from opl.planning.sides import ANY_SIDE, Side
 from opl.search.walls import Chain, Image, Line, Piece, Wall
+from opl.walls.cut_cells import cells_of, cut_finer, rows_of
+from opl.walls.enclosed import ROUND_OFF, EnclosedCells, enclosing
+from opl.walls.images import Images
+from opl.walls.sides import ANY_SIDE, Side
 
 MOST_CUTS = 3  # of such cells, each finer than the one before
 ROW_PARTS = 8  # cells between two cutter points along a contact position, before any is cut finer

@@ -18,10 +18,10 @@ from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.motion.straight_moves import WHERE_BEGUN
-from opl.planning.cut_cells import surely_nearer
-from opl.planning.enclosed import ROUND_OFF
-from opl.planning.images import TOUCHING
 from opl.planning.problem import GrindingProblem
+from opl.walls.cut_cells import surely_nearer
+from opl.walls.enclosed import ROUND_OFF
+from opl.walls.images import TOUCHING
 
 AT_ONCE = 4  # configurations of a lead that are looked at together
 

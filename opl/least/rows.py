@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.stretches import held, passed
+from opl.least.stretches import held, passed
 from opl.search.box import JointBox
 from opl.search.ladder import Ladder
 

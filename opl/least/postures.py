@@ -9,9 +9,9 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.placement import Placement
 from opl.search.box import JointBox
 from opl.search.in_box import missing_chords
+from opl.walls.placement import Placement
 
 BESIDE = 0.02  # cutter points: what is so near to a place that is missed as well is beside it
 

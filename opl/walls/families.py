@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.images import Images
-from opl.planning.placement import Placement
-from opl.planning.sides import Side
 from opl.search.box import JointBox
 from opl.search.cells import Key
 from opl.search.chords import JUMP
 from opl.search.joint_limits import about
 from opl.search.outside import outside
+from opl.walls.images import Images
+from opl.walls.placement import Placement
+from opl.walls.sides import Side
 
 MOST_COLUMNS = 1000  # at which a box is held against the families
 FEW_COLUMNS = 40  # over which a box is grown at first

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opl.least.least_cost import least_cost
+from opl.least.least_range import plan_optimal
 from opl.motion.figures import figures_of_path
 from opl.planning.costs import track_cost
-from opl.planning.least_cost import least_cost
-from opl.planning.least_range import plan_optimal
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
 from opl.planning.plan import Found, ObjectiveValue, Plan, propose_and_check
 from opl.planning.problem import GrindingProblem

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.sides import ANY_SIDE, Side
+from opl.walls.sides import ANY_SIDE, Side
 
 
 @dataclass(frozen=True)

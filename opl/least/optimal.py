@@ -11,27 +11,27 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from opl.planning.box_nodes import TrackSearch
-from opl.planning.box_track import BoxTracks
+from opl.least.box_nodes import TrackSearch
+from opl.least.box_track import BoxTracks
+from opl.least.holders import holders
+from opl.least.hope import Hope
+from opl.least.passages import NO_PASSAGES, Passages
+from opl.least.postures import Columns
+from opl.least.rows import Bulge
+from opl.least.search_space import SearchSpace, seams_in
+from opl.least.work import Work
 from opl.planning.costs import PushAway
-from opl.planning.families import few_columns, grown
-from opl.planning.holders import Holder, holders
-from opl.planning.hope import Hope
-from opl.planning.images import Seams
-from opl.planning.obstructed import Obstructions
-from opl.planning.passages import NO_PASSAGES, Passages
-from opl.planning.placement import Placement
-from opl.planning.plan import AT_REST, Plan
-from opl.planning.postures import Columns
+from opl.planning.plan import AT_REST, Holder, Plan
 from opl.planning.problem import GrindingProblem
-from opl.planning.rows import Bulge
-from opl.planning.search_space import SearchSpace, seams_in
 from opl.planning.settings import OptimalSettings
-from opl.planning.work import Work
 from opl.search.box import JointBox
 from opl.search.forbidden import Forbidden, crossed_by_any
 from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
+from opl.walls.families import few_columns, grown
+from opl.walls.images import Seams
+from opl.walls.obstructed import Obstructions
+from opl.walls.placement import Placement
 
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
 CLEARLY_LESS = 0.005  # of the best: what a motion in a box not settled should be better by

@@ -13,12 +13,12 @@ import numpy as np
 
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.geometry.frames import Array
-from opl.planning.columns import ColumnWalls
-from opl.planning.enclosed import ROUND_OFF
-from opl.planning.images import Images, seams_of
 from opl.planning.problem import GrindingProblem
 from opl.search.shortest_way import Cells, WayPrices, cheapest_over_ends, cheapest_ways
 from opl.search.walls import UNKNOWN, Wall
+from opl.walls.columns import ColumnWalls
+from opl.walls.enclosed import ROUND_OFF
+from opl.walls.images import Images, seams_of
 
 PLACES = 16  # cutter points of a pass that are looked at first
 FEWEST = 4  # that are looked at

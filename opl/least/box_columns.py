@@ -9,19 +9,19 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.planning.cut_cells import shut_along
-from opl.planning.families import GROWN, grown
-from opl.planning.field_at_places import FieldAtPlaces
-from opl.planning.images import Seams, image_within_limits, wrist_flips
+from opl.least.field_at_places import FieldAtPlaces
+from opl.least.postures import Columns
 from opl.planning.nodes import inverse_solutions
-from opl.planning.placement import Placement
-from opl.planning.postures import Columns
 from opl.planning.problem import GrindingProblem, nearer_nodes
-from opl.planning.shut_leads import RESERVE, ShutLeads
 from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
 from opl.search.in_box import hidden, missing, nearest_points, sampled
 from opl.search.joint_limits import about
+from opl.walls.cut_cells import shut_along
+from opl.walls.families import GROWN, grown
+from opl.walls.images import Seams, image_within_limits, wrist_flips
+from opl.walls.placement import Placement
+from opl.walls.shut_leads import RESERVE, ShutLeads
 
 FINE = 33  # contact positions of a place at which a box is held against it
 POSTURES_OF_WORK = 400  # that cost a unit of work

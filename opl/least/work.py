@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from opl.planning.box_nodes import TrackSearch
-from opl.planning.columns import ColumnWalls
-from opl.planning.families import Families
+from opl.least.box_nodes import TrackSearch
 from opl.planning.plan import WORK_OF_A_CHECK
 from opl.planning.scene import QUERIES, PlanningScene
 from opl.search.least_box import BoxProof
+from opl.walls.columns import ColumnWalls
+from opl.walls.families import Families
 
 # what makes a unit, or how many units one makes
 NUMBERS = 2.5e6  # worked on in linear programs

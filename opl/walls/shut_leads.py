@@ -16,10 +16,10 @@ from opl.geometry.frames import Array
 from opl.motion.free_leads import SHARES
 from opl.motion.motion import MoveKind
 from opl.motion.straight_moves import WHERE_BEGUN
-from opl.planning.images import wrist_flips
-from opl.planning.lead_cells import LeadCells, Seen
 from opl.planning.problem import GrindingProblem
 from opl.search.walls import Piece
+from opl.walls.images import wrist_flips
+from opl.walls.lead_cells import LeadCells, Seen
 
 CELLS_OF_WORK = 15  # enclosed along a lead, that cost a unit of work
 NODES_OF_WORK = 100  # looked at along a lead, likewise

@@ -18,11 +18,11 @@ from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.wheel_triangle import TOLERANCE
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
+from opl.least.rows import MOST_PARTS, SMALLEST_EDGE, Bulge
 from opl.motion.motion import Phase
 from opl.planning.open_matrix import Track
 from opl.planning.plan import Same
 from opl.planning.problem import GrindingProblem
-from opl.planning.rows import MOST_PARTS, SMALLEST_EDGE, Bulge
 from opl.planning.track_check import Collides
 
 LOOKS = 8  # along a move that sinks too deep

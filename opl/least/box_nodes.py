@@ -11,17 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.box_columns import ColumnSampler
-from opl.planning.costs import PushAway, track_cost
-from opl.planning.filling import BrokenEdgeError, fill_in
-from opl.planning.nodes import NodeField
-from opl.planning.open_matrix import Track, close_collisions, open_matrices
-from opl.planning.plan import Found, Plan, Same, propose_and_check
-from opl.planning.postures import Columns
-from opl.planning.problem import GrindingProblem
-from opl.planning.rows import SMALLEST_EDGE, Bulge, Row, broken_at, bulging, shut_edges
-from opl.planning.settings import CostWeights
-from opl.planning.sinking import (
+from opl.least.box_columns import ColumnSampler
+from opl.least.postures import Columns
+from opl.least.rows import SMALLEST_EDGE, Bulge, Row, broken_at, bulging, shut_edges
+from opl.least.sinking import (
     first_sunk,
     passed_where_struck,
     past_help,
@@ -30,6 +23,13 @@ from opl.planning.sinking import (
     sunk_at_ends,
     until_sunk,
 )
+from opl.planning.costs import PushAway, track_cost
+from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.nodes import NodeField
+from opl.planning.open_matrix import Track, close_collisions, open_matrices
+from opl.planning.plan import Found, Plan, Same, propose_and_check
+from opl.planning.problem import GrindingProblem
+from opl.planning.settings import CostWeights
 from opl.planning.symmetry import everywhere, twins
 from opl.planning.track_check import Collides
 from opl.search import in_box

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from opl.geometry.frames import Array
-from opl.planning.barriers import all_sides
-from opl.planning.box_columns import ColumnSampler
-from opl.planning.columns import ColumnWalls
-from opl.planning.cut_cells import whole_cells
-from opl.planning.families import Families, few_columns
-from opl.planning.images import Images, Seams, seams_of
-from opl.planning.passages import Rectangles
+from opl.least.box_columns import ColumnSampler
+from opl.least.passages import Rectangles
 from opl.planning.problem import GrindingProblem
+from opl.walls.barriers import all_sides
+from opl.walls.columns import ColumnWalls
+from opl.walls.cut_cells import whole_cells
+from opl.walls.families import Families, few_columns
+from opl.walls.images import Images, Seams, seams_of
 
 
 def seams_in(problem: GrindingProblem) -> Seams:

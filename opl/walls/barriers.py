@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.planning.cut_cells import cells_of, shut_along
 from opl.planning.problem import GrindingProblem
-from opl.planning.sides import Barrier, Side, sides_of
+from opl.walls.cut_cells import cells_of, shut_along
+from opl.walls.sides import Barrier, Side, sides_of
 
 MOST_LOOKED_AT = 8  # runs of cutter points of a pass, the longest
 MOST_SIDES = 8  # of a pass

@@ -8,11 +8,11 @@ below: no change at that place alone can gain more than the difference.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from opl.geometry.frames import Array
+from opl.planning.plan import Holder
 from opl.search.box import JointBox
 from opl.search.forbidden import Forbidden
 from opl.search.joint_limits import UNLIMITED
@@ -25,24 +25,6 @@ MOST_HOLDERS = 6
 MOST_SUBPROBLEMS = 500  # for what a box needs without a wall
 MOST_NUMBERS = 3e8  # worked on in linear programs for it
 GAP = 2e-3  # to which these proofs are taken
-
-
-@dataclass(frozen=True)
-class Holder:
-    """A place that keeps the joint range sum from being smaller.
-
-    Attributes:
-        place: Cutter point, fractional between two.
-        pass_index: Its pass.
-        joints: Those whose range it holds, the dearest first.
-        bound_without: No motion has a smaller joint range sum even if this place need not be
-            ground, in [rad].
-    """
-
-    place: float
-    pass_index: int
-    joints: tuple[int, ...]
-    bound_without: float
 
 
 def holders(

@@ -12,10 +12,10 @@ import numpy as np
 
 from opl.cell.collision import CollisionScene
 from opl.geometry.frames import Array
-from opl.planning.columns import ColumnWalls
-from opl.planning.cut_cells import halved
-from opl.planning.shut_leads import ShutLeads
 from opl.search.walls import Piece
+from opl.walls.columns import ColumnWalls
+from opl.walls.cut_cells import halved
+from opl.walls.shut_leads import ShutLeads
 
 # halvings of a cell all in collision, but not deep enough to be sure, at each look
 WITHIN = (2, 6, 10)

@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opl.geometry.frames import Array
+from opl.least.borders import TOUCH_UP, Nameable
 from opl.motion.motion import Motion, Phase
 from opl.motion.path import GrindingPath
 from opl.motion.timing import air_seconds
-from opl.planning.borders import TOUCH_UP, Nameable
-from opl.planning.images import wrist_flips
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.symmetry import SAME_SUM
 from opl.planning.track_check import Free, check_path
+from opl.walls.images import wrist_flips
 
 CLEAR_OF_LIMITS = np.deg2rad(5.0)  # of every joint; motions that keep it come before all others
 SAME_TIME = 1e-6  # [s] choices that differ by less are equally long

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from opl.planning.images import Seams
-from opl.planning.optimal import OptimalSearch
+from opl.least.optimal import OptimalSearch
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.settings import OptimalSettings
+from opl.walls.images import Seams
 
 OTHERWISE_SHARE = 0.3  # of the work: a motion sought in another way, where the proof found none
 
