@@ -1,7 +1,8 @@
 """A job that is read and cut in a copy of this process, while this one loads what plans.
 
-What reads and checks files, and SciPy, which cuts, are loaded in the copy alone: this process needs
-neither for a job that can be used. A refusal is a value, so that nothing is read once more for it.
+What both need is loaded before the copy is made. What reads and checks files, and SciPy, which
+cuts, are loaded in the copy alone: this process needs neither for a job that can be used. A refusal
+is a value, so that nothing is read once more for it.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from opl.job.values import Job
     from opl.run.values import Surfaced
 
-_BOTH_NEED = ("job.values",)
+_BOTH_NEED = ("job.values", "program.export", "run.surfacing")
 _WHILE_CHECKED = ("run.searches", "run.exporting")  # takes about as long as the check in the copy
 _THEN = ("run.stages", "run.reporting", "run.delivery")
 
@@ -43,7 +44,8 @@ def job_ahead(
         refusal = Later(_refusal, source)
         job = Later(_read, source, method)
         surfaced = Later(_cut, job)
-        _load(_BOTH_NEED)
+        if workers > 1:
+            _load(_BOTH_NEED)
         if beside.start():
             for later in (refusal, job, surfaced):
                 beside.begin(later)
