@@ -28,7 +28,7 @@ from opl.search.box import JointBox
 from opl.search.forbidden import Forbidden, crossed_by_any
 from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
-from opl.walls.families import few_columns, grown
+from opl.walls.families import few_columns
 from opl.walls.images import Seams
 from opl.walls.obstructed import Obstructions
 from opl.walls.placement import Placement
@@ -65,7 +65,7 @@ class OptimalSearch:
         if fallback is not None:
             largest = fallback.path.joint_range_sum
             most = Travel(fallback.path.joint_travel, fallback.path.contact_travel)
-        space = SearchSpace.of(problem, seams or seams_in(problem), largest)
+        self._space = space = SearchSpace.of(problem, seams or seams_in(problem), largest)
         self._walls, self._families = space.walls, space.families
         self._sampler, self._rectangles = space.sampler, space.rectangles
         costs, most_change = settings.costs, settings.max_contact_change
@@ -168,10 +168,12 @@ class OptimalSearch:
 
         Otherwise nothing was learnt of the box: there is a motion, or nothing more to be found.
         """
-        if not placements:
+        most = box.size + self._settings.room(box.size)  # hardly larger it may hold all
+        larger = self._grown(box, placements) if placements and missed else box
+        if not placements or larger is None or larger.size >= most:
             self._add(missed)
             return bool(missed)
-        columns, passages, inner = self._look(box, placements)
+        columns, passages, inner = self._space.look(box, placements, self._settings)
         self._hope(inner)
         known, new = columns.missed(box, self._places, self._settings.missed(self.proof.threshold))
         if not missed and (self.proof.clear(known) or self.proof.split_keys(known)):
@@ -181,8 +183,6 @@ class OptimalSearch:
             # the box meets the walls that it cannot pass, but perhaps not with these images
             split = not passages.open and self.proof.split_keys()
             return split or self._try(columns, passages, inner)
-        # hardly larger it may hold all
-        most = box.size + self._settings.room(box.size)
         fits = not missed or (inner is not None and inner.size < most)
         if passages.open and fits and self._work.left_for_early:
             best = self.plan
@@ -195,15 +195,12 @@ class OptimalSearch:
         self._add(missed)
         return True
 
-    def _look(
-        self, box: JointBox, placements: Sequence[Placement]
-    ) -> tuple[Columns, Passages, JointBox | None]:
-        """Return places near a box, the ways between them, and the box grown for both."""
-        allowed, room = self._settings.missed(box.size), self._settings.room(box.size)
-        columns = self._sampler.columns(box, placements, self._rectangles.places)
-        inner = grown(columns.q, columns.free, box)
-        passages = self._rectangles.held(inner or box, placements, allowed, room)
-        return columns, passages, None if inner is None else passages.grown(inner)
+    def _grown(self, box: JointBox, placements: Sequence[Placement]) -> JointBox | None:
+        """Return a box grown to hold all cutter points, so good a motion is hoped for."""
+        larger = self._families.grown(box, placements)
+        if not self._sampler.collisions:
+            self._hope(larger)
+        return larger
 
     def _shut(self, box: JointBox, placements: Sequence[Placement]) -> bool:
         """Look at walls that seem shut all over a box; return whether any part of one surely is."""
@@ -217,14 +214,12 @@ class OptimalSearch:
 
     def _look_for_more(self, box: JointBox, placements: Sequence[Placement]) -> None:
         """Grow a box that is not settled until it holds all; look for a motion in it, if small."""
-        larger, threshold = self._families.grown(box, placements), self.proof.threshold
-        if not self._sampler.collisions:
-            self._hope(larger)
+        threshold, larger = self.proof.threshold, self._grown(box, placements)
         if larger is None or larger.size > self._value * (1.0 - CLEARLY_LESS):
             return
-        if self._work.left_for_early:
+        if self._work.left_for_unsettled(self.plan is not None):
             with self._work.early():
-                columns, _, inner = self._look(larger, placements)
+                columns, _, inner = self._space.look(larger, placements, self._settings)
                 if inner is not None:
                     self._hope(inner)
                     room, collided = self._settings.room(inner.size), self._search.collided

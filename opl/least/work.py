@@ -59,7 +59,14 @@ class Work:
     @property
     def left_for_early(self) -> bool:
         """Whether motions may be sought in boxes that are not proven to be the least."""
-        return self._early < FIRST_WORK + EARLY_SHARE * self.done
+        return self._early < FIRST_WORK + self._share
+
+    def left_for_unsettled(self, known: bool) -> bool:
+        """Return whether so in boxes that are not even settled.
+
+        Where a motion is known, not at once: many a proof comes to its end before.
+        """
+        return self.left_for_early and (not known or self._early + FIRST_WORK < self._share)
 
     @contextmanager
     def early(self) -> Iterator[None]:
@@ -72,6 +79,10 @@ class Work:
         """Go on with another proof."""
         self._before += 0.0 if self.proof is None else work_of_proof(self.proof)
         self.proof = proof
+
+    @property
+    def _share(self) -> float:
+        return EARLY_SHARE * self.done
 
     def _counted(self) -> float:
         asked = self._scene.work + self._tracks.push_away.queries / QUERIES
