@@ -7,10 +7,12 @@ below: no change at that place alone can gain more than the difference.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 
+from opl.files.beside import Beside
 from opl.geometry.frames import Array
 from opl.planning.plan import Holder
 from opl.search.box import JointBox
@@ -34,6 +36,7 @@ def holders(
     value: float,
     forbidden: Forbidden | None = None,
     limits: Sequence[JointBox] = UNLIMITED,
+    beside: Beside | None = None,
 ) -> tuple[Holder, ...]:
     """Return what holds the least box over some walls up, what could gain most first.
 
@@ -44,19 +47,42 @@ def holders(
         value: Size of a box that is large enough, in [rad].
         forbidden: Tells which parts of cells are forbidden.
         limits: What a box is within, as of `BoxProof`.
+        beside: What may work beside this process, if anything.
     """
-    _, prices = _least(walls, images, cut, value, forbidden, limits)
+    given = images, cut, value, forbidden, limits
+    _, prices = _least(walls, *given)
     pressing = np.argsort(-prices.sum(axis=1), kind="stable")[:MOST_HOLDERS].tolist()
-    found = []
+    held = {}
     for k in pressing:
-        joints = np.argsort(-prices[k], kind="stable")
-        held = tuple(joint for joint in joints.tolist() if prices[k, joint] >= PRESSES)
-        if not held:
-            continue
-        others = [wall for index, wall in enumerate(walls) if index != k]
-        without, _ = _least(others, images, cut, value, forbidden, limits)
-        found.append(Holder(walls[k].place, walls[k].pass_index, held, without))
+        joints = np.argsort(-prices[k], kind="stable").tolist()
+        held[k] = tuple(joint for joint in joints if prices[k, joint] >= PRESSES)
+    pressing = [k for k in pressing if held[k]]
+    # what tells what is forbidden asks solids, which are not passed on
+    shared = beside if beside is not None and forbidden is None else Beside()
+    bounds = shared.share(_bounding, (walls, *given), pressing)
+    found = [
+        Holder(walls[k].place, walls[k].pass_index, held[k], without)
+        for k, without in zip(pressing, bounds, strict=True)
+    ]
     return tuple(sorted(found, key=lambda one: one.bound_without))
+
+
+@contextmanager
+def _bounding(
+    walls: Sequence[Wall],
+    images: Callable[[int], Sequence[Image]],
+    cut: Callable[[Piece, int], Sequence[Piece]],
+    value: float,
+    forbidden: Forbidden | None,
+    limits: Sequence[JointBox],
+) -> Iterator[Callable[[int], float]]:
+    """Open what tells what no box over all walls but one is smaller than, given its number."""
+
+    def without(k: int) -> float:
+        others = [wall for index, wall in enumerate(walls) if index != k]
+        return _least(others, images, cut, value, forbidden, limits)[0]
+
+    yield without
 
 
 def _least(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from opl.files.beside import Beside
 from opl.least.optimal import OptimalSearch
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
@@ -34,6 +35,7 @@ def plan_optimal(
     report: Callable[[float], None] = lambda _: None,
     otherwise: Callable[[float], Plan | None] | None = None,
     seams: Seams | None = None,
+    beside: Beside | None = None,
 ) -> Plan:
     """Find the collision-free motion with the least joint range sum, the smoothest of these.
 
@@ -45,6 +47,7 @@ def plan_optimal(
         otherwise: Looks for a motion in another way, where the proof finds none, given how many
             units of work are left for that.
         seams: Where full turns are counted from, where that is known.
+        beside: What may work beside this process, if anything.
 
     Returns:
         The plan with its lower bound.
@@ -67,7 +70,7 @@ def plan_optimal(
     if search.plan is None:
         robot, least = problem.cell.robot, search.lower_bound
         raise NoMotionError(least, least > float((robot.upper - robot.lower).sum()))
-    found = replace(search.plan, lower_bound=search.lower_bound, holders=search.holders())
+    found = replace(search.plan, lower_bound=search.lower_bound, holders=search.holders(beside))
     return replace(found, open_because=_open_because(found, settings, search.work_share))
 
 

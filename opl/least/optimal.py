@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from opl.files.beside import Beside
 from opl.least.box_nodes import TrackSearch
 from opl.least.box_track import BoxTracks
 from opl.least.holders import holders
@@ -110,10 +111,11 @@ class OptimalSearch:
         """No motion has a smaller joint range sum, in [rad]."""
         return min(max(self._proven, self.proof.lower_bound), self._value)
 
-    def holders(self) -> tuple[Holder, ...]:
+    def holders(self, beside: Beside | None = None) -> tuple[Holder, ...]:
         """Return what holds the least box over the walls up."""
         walls, images, cut = self.proof.walls, self._walls.images, self._walls.finer
-        return holders(walls, images.of, cut, self._value, self.forbidden, images.limits)
+        given = walls, images.of, cut, self._value, self.forbidden, images.limits
+        return holders(*given, beside)
 
     def step(self) -> None:
         """Work on one subproblem."""

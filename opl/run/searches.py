@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from opl.errors import NoPathError
-from opl.files.beside import Later
+from opl.files.beside import Beside, Later
 from opl.job.methods import Method, Objective, Search
 from opl.least.borders import Nameable, clear_of_borders
 from opl.least.equals import quickest_of_equals
@@ -52,6 +52,7 @@ def search_path(
     nameable: Nameable | None = None,
     report: Callable[[float], None] = lambda _: None,
     seams: Later[Seams] | None = None,
+    beside: Beside | None = None,
 ) -> FoundPaths:
     """Search the path by the method and for the objective of a job.
 
@@ -61,12 +62,13 @@ def search_path(
         nameable: Which configurations the program names without doubt; None for all.
         report: Given how much of the work allowed is done, often; may raise.
         seams: Where full turns are counted from, where that is worked out beside.
+        beside: What may work beside this process, if anything.
 
     Raises:
         NoPathError: If there is none.
     """
     if proves_range(search):
-        plan, recursive = _search_range(search, problem, report, seams)
+        plan, recursive = _search_range(search, problem, report, seams, beside)
     else:
         plan = recursive = plan_recursive(problem, search.start)
         if search.method is Method.OPTIMAL:
@@ -84,6 +86,7 @@ def _search_range(
     problem: GrindingProblem,
     report: Callable[[float], None],
     seams: Later[Seams] | None,
+    beside: Beside | None,
 ) -> tuple[Plan, Plan | None]:
     """Return the plan of least joint range sum, and the recursive one where there is one."""
     in_turns = RecursiveSearch(problem, search.start)
@@ -102,7 +105,7 @@ def _search_range(
     others = None if isinstance(last, Exhausted) else otherwise
     try:
         counted = None if seams is None else seams.value()
-        best = plan_optimal(problem, search.optimal, known, report, others, counted)
+        best = plan_optimal(problem, search.optimal, known, report, others, counted, beside)
     except NoMotionError as error:
         least, proven = error.lower_bound, error.proven
     else:

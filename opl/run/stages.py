@@ -120,7 +120,7 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
         beside.begin(later)
     try:
         with watch.stage(Stage.SEARCH) as report:
-            found = search_path(job.search, problem, _nameable(job), report, seams)
+            found = search_path(job.search, problem, _nameable(job), report, seams, beside)
     except NoPathError as error:
         return _without_path(prepared, error, watch)
     charted = Later(_charted, prepared, found.plan)
