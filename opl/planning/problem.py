@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -145,12 +145,20 @@ def build_problem(
 def wheel_distances(scene: PlanningScene, points: CutterPoints, contact_positions: Array) -> Array:
     """Return the signed distance of the part to the wheel at all nodes in [m], shape (N, M).
 
-    As in `signed_wheel_distance`: exact where it is less than the belt penetration permits.
-    Contact positions are for all cutter points, shape (M,).
+    As in `signed_wheel_distance`: exact where it is less than the belt penetration permits, else
+    anything that is not, or infinite. Contact positions are for all cutter points, shape (M,).
     """
-    shape = len(points), len(contact_positions)
-    allowed = np.full((len(points), 1), -scene.cell.planned_penetration)
-    return _measured(scene, points, contact_positions, np.ones(shape, dtype=bool), allowed, -np.inf)
+    wheel, depth = scene.cell.wheel, -scene.cell.planned_penetration
+    # on the flat the part slides along the axle, by half of the wheel's width at the most: where it
+    # keeps off a wheel that is wider by so much, it does at every contact position there
+    wide = replace(wheel, width=2.0 * wheel.width)
+    Ts = wheel.T_contact0_contact(0.0) @ inverse(points.Ts_workpiece_cutter)
+    keeps_off = signed_wheel_distance(scene.part, wide, Ts, depth, depth) >= depth
+    asked = ~(keeps_off[:, None] & (np.abs(contact_positions) <= wheel.flat_end))
+    allowed = np.full((len(points), 1), depth)
+    layer = _measured(scene, points, contact_positions, asked, allowed, -np.inf)
+    layer[~asked] = np.inf
+    return layer
 
 
 def nearer_nodes(

@@ -1,5 +1,7 @@
 """Part against wheel: distances of triangles against dense samples of them, and of ways out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -10,9 +12,10 @@ from scipy.spatial.transform import Rotation
 from opl.cell.part_tree import part_tree
 from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.wheel_triangle import TOLERANCE
-from opl.geometry.frames import pose
+from opl.geometry.frames import inverse, pose
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.wheel import ContactWheel
+from opl.planning.problem import wheel_distances
 from tests.support.planned import small_problem
 
 EXACT = np.inf  # whatever is needed is not kept: everything is measured to the end
@@ -276,3 +279,19 @@ def test_the_wheels_own_pose_does_not_matter():
         signed_wheel_distance(part, elsewhere, Ts, EXACT),
         signed_wheel_distance(part, wheel_of(0.05, 0.15), Ts, EXACT),
     )
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(0.0, 6e-4))
+def test_what_is_told_of_a_whole_field_is_what_each_node_tells_alone(seed, bumps):
+    problem = small_problem()
+    part, wheel = problem.cell.part, problem.cell.wheel
+    moved = np.random.default_rng(seed).normal(scale=bumps, size=part.vertices.shape)
+    scene = replace(problem.scene, part=part_tree(TriangleMesh(part.vertices + moved, part.faces)))
+    points, positions = problem.points, problem.field.contact_positions
+    found = wheel_distances(scene, points, positions)
+    Ts = wheel.T_contact0_contact(positions) @ inverse(points.Ts_workpiece_cutter)[:, None]
+    depth = -problem.cell.planned_penetration
+    alone = signed_wheel_distance(scene.part, wheel, Ts, depth)
+    np.testing.assert_array_equal(found < depth, alone < depth)
+    np.testing.assert_array_equal(found[found < depth], alone[alone < depth])
