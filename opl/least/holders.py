@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 
@@ -49,8 +50,8 @@ def holders(
         limits: What a box is within, as of `BoxProof`.
         beside: What may work beside this process, if anything.
     """
-    given = images, cut, value, forbidden, limits
-    _, prices = _least(walls, *given)
+    least = partial(_least, images=images, cut=cut, value=value, forbidden=forbidden, limits=limits)
+    _, prices = least(walls)
     pressing = np.argsort(-prices.sum(axis=1), kind="stable")[:MOST_HOLDERS].tolist()
     held = {}
     for k in pressing:
@@ -59,7 +60,7 @@ def holders(
     pressing = [k for k in pressing if held[k]]
     # what tells what is forbidden asks solids, which are not passed on
     shared = beside if beside is not None and forbidden is None else Beside()
-    bounds = shared.share(_bounding, (walls, *given), pressing)
+    bounds = shared.share(_bounding, (walls, least), pressing)
     found = [
         Holder(walls[k].place, walls[k].pass_index, held[k], without)
         for k, without in zip(pressing, bounds, strict=True)
@@ -69,20 +70,10 @@ def holders(
 
 @contextmanager
 def _bounding(
-    walls: Sequence[Wall],
-    images: Callable[[int], Sequence[Image]],
-    cut: Callable[[Piece, int], Sequence[Piece]],
-    value: float,
-    forbidden: Forbidden | None,
-    limits: Sequence[JointBox],
+    walls: Sequence[Wall], least: Callable[[Sequence[Wall]], tuple[float, Array]]
 ) -> Iterator[Callable[[int], float]]:
     """Open what tells what no box over all walls but one is smaller than, given its number."""
-
-    def without(k: int) -> float:
-        others = [wall for index, wall in enumerate(walls) if index != k]
-        return _least(others, images, cut, value, forbidden, limits)[0]
-
-    yield without
+    yield lambda k: least([wall for index, wall in enumerate(walls) if index != k])[0]
 
 
 def _least(
@@ -90,8 +81,8 @@ def _least(
     images: Callable[[int], Sequence[Image]],
     cut: Callable[[Piece, int], Sequence[Piece]],
     value: float,
-    forbidden: Forbidden | None = None,
-    limits: Sequence[JointBox] = UNLIMITED,
+    forbidden: Forbidden | None,
+    limits: Sequence[JointBox],
 ) -> tuple[float, Array]:
     """Return what no box over walls is smaller than, and how hard each presses on the least one.
 

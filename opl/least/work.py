@@ -59,14 +59,16 @@ class Work:
     @property
     def left_for_early(self) -> bool:
         """Whether motions may be sought in boxes that are not proven to be the least."""
-        return self._early < FIRST_WORK + self._share
+        return self._early < FIRST_WORK + self._early_share
 
-    def left_for_unsettled(self, known: bool) -> bool:
+    def left_for_unsettled(self, has_motion: bool) -> bool:
         """Return whether so in boxes that are not even settled.
 
         Where a motion is known, not at once: many a proof comes to its end before.
         """
-        return self.left_for_early and (not known or self._early + FIRST_WORK < self._share)
+        return self.left_for_early and (
+            not has_motion or self._early + FIRST_WORK < self._early_share
+        )
 
     @contextmanager
     def early(self) -> Iterator[None]:
@@ -81,7 +83,7 @@ class Work:
         self.proof = proof
 
     @property
-    def _share(self) -> float:
+    def _early_share(self) -> float:
         return EARLY_SHARE * self.done
 
     def _counted(self) -> float:

@@ -85,6 +85,10 @@ class Margins:
 def blank_figure(title: str) -> Figure:
     """Return an empty figure with its title; what is drawn in it is fitted together."""
     layout = ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, wspace=0.03, hspace=0.04)
+    return _titled(title, layout)
+
+
+def _titled(title: str, layout: ConstrainedLayoutEngine | None) -> Figure:
     figure = Figure(figsize=SIZE, layout=layout, facecolor="white")
     figure.suptitle(title, x=0.012, ha="left", fontsize=16, fontweight="bold")
     return figure
@@ -95,10 +99,9 @@ def charts(
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with empty charts, row by row, and a legend; the charts share their x.
 
-    Where they are is known, so nothing has to be drawn to fit it together: half of the time.
+    Where they are is known, so nothing has to be drawn to fit it together: a third of the time.
     """
-    figure = Figure(figsize=SIZE, facecolor="white")
-    figure.suptitle(title, x=0.012, y=0.985, ha="left", fontsize=16, fontweight="bold")
+    figure = _titled(title, None)
     legend_below(figure, handles)
     wide, high = (_POINTS * side for side in SIZE)
     bottom = margins.bottom + LEGEND_ROW * -(-len(handles) // _legend_columns(len(handles)))

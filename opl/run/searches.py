@@ -104,8 +104,8 @@ def _search_range(
     # cannot be ground on one IK branch, it gives each its own
     others = None if isinstance(last, Exhausted) else otherwise
     try:
-        counted = None if seams is None else seams.value()
-        best = plan_optimal(problem, search.optimal, known, report, others, counted, beside)
+        counted_from = None if seams is None else seams.value()
+        best = plan_optimal(problem, search.optimal, known, report, others, counted_from, beside)
     except NoMotionError as error:
         least, proven = error.lower_bound, error.proven
     else:

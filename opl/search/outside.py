@@ -6,6 +6,7 @@ import numpy as np
 
 from opl.files.kernels import kernel
 
+LEAST_GAIN = 1e-12  # [rad] by which a chord must be nearer than what was nearest
 BISECTIONS = 24  # of a chord; its nearest point is then known to a ten millionth of its length
 
 
@@ -19,7 +20,7 @@ def nearest_on_chord(a, b, low, high, best):  # type: ignore[no-untyped-def]
     for joint in range(len(a)):
         start, end = min(a[joint], b[joint]), max(a[joint], b[joint])
         least += max(start - high[joint], 0.0) + max(low[joint] - end, 0.0)
-    if not least < best - 1e-12:
+    if not least < best - LEAST_GAIN:
         return best, place
     # the distance is convex along the chord: follow its slope
     left, right = 0.0, 1.0
@@ -87,7 +88,9 @@ def outside(q, free, low, high, longest, missing, at):  # type: ignore[no-untype
             if free[column, row] and away[row] < best:
                 best, place = away[row], float(row)
         for row in range(n_rows - 1):
-            if not (free[column, row] and free[column, row + 1] and beside[row] < best - 1e-12):
+            if not (
+                free[column, row] and free[column, row + 1] and beside[row] < best - LEAST_GAIN
+            ):
                 continue
             start, end = q[column, :, row], q[column, :, row + 1]
             jump = False
