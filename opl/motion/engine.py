@@ -14,6 +14,8 @@ import numpy as np
 
 from opl.geometry.frames import Array
 
+NEGLIGIBLE = 1e-6  # part of the largest acceleration that a change of path speed may add unseen
+APART = 1e-5  # parts of their largest accelerations that joints are told apart by
 _LIBRARIES = ("matplotlib", "matplotlib.pyplot", "scipy.interpolate", "scipy.sparse")
 
 
@@ -61,11 +63,16 @@ def path_speeds(
         enters: Whether it comes at full path speed; else from rest.
         leaves: Whether it goes at full path speed; else it comes to rest.
     """
-    constraint = _Limits(place, slope, bend, speed, acceleration)
-    search = TOPPRA([constraint], _Place(place), gridpoints=place, solver_wrapper="seidel")
-    search.compute_parameterization(float(enters), float(leaves))
-    found: Array | None = search.problem_data.sd_vec
-    return found
+    # over joints that turn alike to a hundred-millionth the search fails, so then none do
+    for apart in (0.0, APART):
+        lower = acceleration * (1.0 - apart * np.arange(len(acceleration)))
+        constraint = _Limits(place, slope, bend, speed, lower)
+        search = TOPPRA([constraint], _Place(place), gridpoints=place, solver_wrapper="seidel")
+        search.compute_parameterization(float(enters), float(leaves))
+        found: Array | None = search.problem_data.sd_vec
+        if found is not None and np.isfinite(found).all():
+            return found
+    return None
 
 
 class _Place(AbstractGeometricPath):  # type: ignore[misc]
@@ -99,8 +106,13 @@ class _Limits(LinearConstraint):  # type: ignore[misc]
         # u: half the change of the squared path speed with the place, x: its square at the start
         at_start, at_end = slope[:-1], slope[1:] + 2.0 * length * bend
         scale = np.tile(acceleration, 2)
-        self._of_u = np.hstack([at_start, at_end]) / scale
-        self._of_x = np.hstack([bend, bend]) / scale
+        of_u = np.hstack([at_start, at_end]) / scale
+        of_x = np.hstack([bend, bend]) / scale
+        # x lies in [0, 1] at both ends of a piece, so |u| <= 1 / (2 length). What such u and x are
+        # too small for is left out: where the joints all but stand still, the search fails over it.
+        of_u = np.where(np.abs(of_u) > NEGLIGIBLE * 2.0 * length, of_u, 0.0)
+        reached = np.abs(of_u) / (2.0 * length) + np.abs(of_x) > 1.0
+        self._of_u, self._of_x = np.where(reached, of_u, 0.0), np.where(reached, of_x, 0.0)
         steepest = np.maximum(np.abs(slope[:-1]), np.abs(slope[1:])) / speed
         # Corners are passed no faster than they can be passed evenly. Without this the search
         # takes some so fast that it has to all but stop within them, where a joint turns back.

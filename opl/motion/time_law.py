@@ -187,7 +187,7 @@ def _fastest_path_speed(
     from opl.motion.engine import path_speeds  # with all that toppra loads
 
     found = path_speeds(place, slope, bend, limits.speed, limits.acceleration, enters, leaves)
-    if found is None or np.isnan(found).any() or (np.maximum(found[:-1], found[1:]) <= 0.0).any():
+    if found is None or (np.maximum(found[:-1], found[1:]) <= 0.0).any():
         return None
     return np.asarray(found)
 

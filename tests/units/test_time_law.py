@@ -185,6 +185,19 @@ def test_the_same_line_has_the_same_law_to_the_bit():
     assert first.time.tobytes() == second.time.tobytes()
 
 
+@pytest.mark.parametrize("seed", [2, 8, 22, 33])
+@pytest.mark.parametrize("creep", [1e-6, 1e-7, 1e-9])
+def test_where_the_joints_all_but_stand_still_a_law_is_found_as_well(seed, creep):
+    """A cylinder of the strangers: its joints rested while the contact slid along it."""
+    speed = creep * np.random.default_rng(seed).normal(size=(40, 6))
+    speed[20:] += np.array([0.02, 0.0, -0.01, 0.0, -0.05, -0.05])
+    times = np.full(40, 0.00428)
+    q = np.vstack([np.zeros(6), np.cumsum(speed * times[:, None], axis=0)])
+    law = fastest_law(rounded_line(q, times), LIMITS, at_rest=False)
+    assert max(sampled_loads(law, LIMITS)) <= 1.001
+    assert law.time[-1] < 1.1 * times.sum()
+
+
 def test_a_law_beyond_a_limit_is_refused_with_the_joint():
     law = fastest_law(rounded_line(*random_line(5)), LIMITS, at_rest=True)
     hurried = TimeLaw(
