@@ -22,7 +22,8 @@ from opl.verification.contact import LEVER, contact_positions, near_wheel
 STEP = 1e-3  # [m] that no corner of the part's box moves farther from one sample to the next
 TURN = np.deg2rad(0.5)  # that no joint turns farther
 APART = 0.01  # of a sample: what is nearer to its ends is taken for them
-AT_EDGE = 1.5  # belt units from where the flat ends: by as much t may change in a sample
+AT_EDGE = 1.5  # belt units from where the flat or the wheel ends: t may change so in a sample
+SLIDES, ROLLS, STAYS = 0, 4, -1  # what the contact may do: along x, about y, or neither
 NEAR = 2.0  # times what is allowed: what a configuration that is put in is hoped to be off at most
 
 
@@ -134,14 +135,22 @@ def _passed(
     k, Ts = passed[number], points.Ts_workpiece_cutter[point]
     start, end = Ts_contact0_workpiece[k] @ Ts, Ts_contact0_workpiece[k + 1] @ Ts
     t = contact_positions(wheel, (start + end) / 2.0)
-    share, good = _nearest(wheel, start, end, t, np.abs(t) > wheel.flat_end, allowed)
+    on_flat = np.abs(t) <= wheel.flat_end
+    freedom = np.where(on_flat, SLIDES, ROLLS)
+    share, good = _nearest(wheel, start, end, t, freedom, allowed)
     # beside the end of the flat it may slide at one end of the way and roll at the other
     beside = np.flatnonzero((np.abs(np.abs(t) - wheel.flat_end) <= AT_EDGE) & ~good)
-    at_edge, slides = np.copysign(wheel.flat_end, t[beside]), np.abs(t[beside]) <= wheel.flat_end
+    at_edge, other = np.copysign(wheel.flat_end, t[beside]), SLIDES + ROLLS - freedom[beside]
     share[beside], good[beside] = _nearest(
-        wheel, start[beside], end[beside], at_edge, slides, allowed
+        wheel, start[beside], end[beside], at_edge, other, allowed
     )
-    return np.asarray(at[k[good]] + share[good] * (at[k[good] + 1] - at[k[good]]))
+    # next to the last contact position it may slide or roll no farther
+    ending = np.flatnonzero(np.abs(t) >= wheel.last_position - AT_EDGE)
+    at_last = np.copysign(wheel.last_position, t[ending])
+    stays = np.full(len(ending), STAYS)
+    ended, ends = _nearest(wheel, start[ending], end[ending], at_last, stays, allowed)
+    k, share = np.append(k[good], k[ending[ends]]), np.append(share[good], ended[ends])
+    return np.asarray(at[k] + share * (at[k + 1] - at[k]))
 
 
 def _nearest(
@@ -149,7 +158,7 @@ def _nearest(
     start: Array,
     end: Array,
     t: Array,
-    rolls: NDArray[np.bool_],
+    freedom: NDArray[np.int64],
     allowed: float,
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Return where on their way frames come nearest to the contact model.
@@ -159,7 +168,7 @@ def _nearest(
         start: Frames in contact frame 0, shape (n, 4, 4).
         end: Where they come to.
         t: Contact positions near by, shape (n,).
-        rolls: Whether the contact rolls about an edge there, else it slides, shape (n,).
+        freedom: What the contact may do there: `SLIDES`, `ROLLS` or `STAYS`, shape (n,).
         allowed: Farthest in [m] that one may be from the contact model.
 
     Returns:
@@ -168,8 +177,9 @@ def _nearest(
     """
     Ts_contact0_contact = wheel.T_contact0_contact(t)
     first, last = (_off(Ts_contact0_contact, one) for one in (start, end))
+    moves = np.flatnonzero(freedom != STAYS)
     for one in (first, last):
-        one[np.arange(len(t)), np.where(rolls, 4, 0)] = 0.0
+        one[moves, freedom[moves]] = 0.0
     way = last - first
     length = np.square(way).sum(axis=1)
     share = -(first * way).sum(axis=1) / np.where(length > 0.0, length, 1.0)

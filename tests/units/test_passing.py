@@ -47,3 +47,16 @@ def test_a_point_is_looked_at_where_it_comes_nearest(side, start, end):
     best = float(share[whole.argmin()])
     assert len(at) == 1
     assert at[0] == pytest.approx(best, abs=0.02)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_next_to_the_largest_roll_a_point_is_looked_at_where_it_is_nearest_without_rolling(side):
+    """A filleted box of the strangers: it was looked at beyond the largest roll alone."""
+    (first, x0), (last, x1) = (0.7840, -0.02488), (0.7900, -0.02504)
+    Ts = np.stack([rolled(side * first, side * x0), rolled(side * last, side * x1)])
+    at = _passed(WHEEL, POINTS, Ts, np.array([0.0, 1.0]), np.array([0]), ALLOWED)
+    share = np.linspace(0.0, 1.0, 401)
+    angles, xs = first + share * (last - first), x0 + share * (x1 - x0)
+    whole = np.array([off(rolled(side * a, side * x)) for a, x in zip(angles, xs, strict=True)])
+    assert whole.min() < ALLOWED
+    assert np.abs(at - share[whole.argmin()]).min() < 0.02
