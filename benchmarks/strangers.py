@@ -54,7 +54,7 @@ class Clock:
         """Take note of the beginning or the end of a stage."""
         if fraction == 0.0:
             self._start[stage.value] = _now()
-        elif fraction == 1.0:
+        elif fraction == 1.0 and stage.value in self._start:  # one may report its end itself
             self._seconds[stage.value] += _now() - self._start.pop(stage.value)
 
     def of(self, stage: str) -> Array:

@@ -38,7 +38,10 @@ def keys_named(source: Source) -> Iterator[None]:
         key = keys.OF_PROGRAM.get(error.where, error.where)  # a post of a site names its own
         raise InputError(source.at(key), error.message) from error
     except PassTimeError as error:
-        advice = f"raise {keys.PROCESS_FEED}, or write {keys.PROGRAM_MOTION}: straight"
+        advice = (
+            f"raise {keys.PROCESS_FEED}, or write {keys.PROGRAM_MOTION}: straight; where the part "
+            f"hardly moves while the contact slides over it, lower {keys.SEARCH_CONTACT_CHANGE}"
+        )
         raise OplError(f"{error}; {advice}") from error
     except TimeLawError as error:
         advice = f"raise {keys.PROCESS_MAX_ACCELERATION} if the robot can do more"

@@ -3,7 +3,9 @@
 The numbers are exact: no linear stand-in for the kinematics. A place of a run is a frame of the
 part and where that frame should be; the line passes it where it comes nearest to that. The contact
 may slide along the axle or roll about an edge there: what is left counts, a distance and an angle
-along `LEVER`, as the proof of a program counts them.
+along `LEVER`, as the proof of a program counts them. A line that all but stands still, such sliding
+left aside, passes a place when its time has come: a straight part on the flat of the wheel touches
+in many places at once.
 """
 
 from __future__ import annotations
@@ -26,6 +28,8 @@ _AHEAD = 1e-3  # of a line, for the derivative along it
 _PACE = 0.04
 _SLOWER = 0.3
 _ROUND_OFF = 5e-4  # [s] that the digits of a position leave of the time of a short way
+# [m] that a line which all but stands still moves a place at the most, sliding left aside
+_STILL = 2e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,11 +183,13 @@ def _pass_by(axes, T0, q, places, targets, freedom, room, pace, i, j, k, least, 
             off_target(T, places[k], targets[k], ahead)
             for c in range(6):
                 ahead[c] = (ahead[c] - off[c]) / _AHEAD
-        along = squared = 0.0
+        along = squared = slid = 0.0
         for c in range(6):
             along += off[c] * ahead[c]
             squared += ahead[c] * ahead[c]
-        if squared > 0.0:
+            if c == freedom[k]:
+                slid = ahead[c] * ahead[c]
+        if squared - slid > _STILL * _STILL:
             s -= along / squared
         s = min(max(s, least), 1.0)
     return s, _left(off, freedom[k], room[k])

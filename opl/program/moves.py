@@ -16,10 +16,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from opl.cell.robot import SAME_CONFIGURATION
 from opl.errors import UnsafeError
 from opl.geometry.frames import Array
 from opl.motion.motion import Motion, MoveKind, Phase, TimedMotion, VerifiedMotion
+from opl.motion.repeats import named_of, repeats
 from opl.program.actions import NO_ACTIONS, Action, Actions
 from opl.program.stops import actions_at, stops_at
 
@@ -211,9 +211,10 @@ def plan_moves(
     """Turn a verified motion into moves.
 
     Configurations that are not written lie on the moves between those that are. One that repeats
-    the one before needs no move; its time goes to the move that follows, which so gets slower,
-    never faster. The robot stops at home, where it enters and leaves the wheel, where a phase ends,
-    and at sharp corners off the wheel; it never stops within a pass.
+    the one before needs no move; its time goes to the move that follows, or at the end of a pass to
+    the one before, which so gets slower, never faster. The robot stops at home, where it enters and
+    leaves the wheel, where a phase ends, and at sharp corners off the wheel; it never stops within
+    a pass.
 
     Args:
         verified: What the program shall do.
@@ -231,8 +232,9 @@ def plan_moves(
         raise TypeError(f"a program is made of a VerifiedMotion, got {type(verified).__name__}")
     positions = verified.motion.positions
     timed = verified.timed.take(positions)
-    kept = _distinct_configurations(timed.motion.q)
-    motion = _without_repeats(timed.motion, kept)
+    groups = repeats(timed.motion)
+    kept = np.array([named_of(timed.motion, group) for group in groups])
+    motion = _without_repeats(timed.motion, groups)
     speeds = _speeds(timed, kept, np.asarray(max_speed), joint_names)
     times = timed.take(kept).duration.tolist()
     stops, on_wheel = stops_at(motion), motion.on_wheel
@@ -261,21 +263,11 @@ def plan_moves(
     return Program(name=name, comments=tuple(comments), moves=tuple(moves))
 
 
-def _distinct_configurations(q: Array) -> NDArray[np.intp]:
-    """Return the indices of the configurations that differ from the last one kept."""
-    kept = [0]
-    for i in range(1, len(q)):
-        if np.abs(q[i] - q[kept[-1]]).max() > SAME_CONFIGURATION:
-            kept.append(i)
-    return np.array(kept)
-
-
-def _without_repeats(motion: Motion, kept: NDArray[np.intp]) -> Motion:
-    """Return the kept configurations; what one is for, those that repeat it on the wheel say."""
-    repeats = np.split(np.arange(len(motion)), kept[1:])
+def _without_repeats(motion: Motion, groups: Sequence[NDArray[np.intp]]) -> Motion:
+    """Return the first of each group; what it is for, those that repeat it on the wheel say."""
     on_wheel = motion.on_wheel
-    rows = [int(group[on_wheel[group].argmax()]) for group in repeats]
-    return replace(motion.take(rows), q=motion.q[kept])
+    rows = [int(group[on_wheel[group].argmax()]) for group in groups]
+    return replace(motion.take(rows), q=motion.q[[group[0] for group in groups]])
 
 
 def _speeds(

@@ -195,7 +195,7 @@ def reader_for(path: Path) -> Reader:
 def pass_times(
     program: Program, times: Mapping[int, float], controller: str
 ) -> tuple[PassTime, ...]:
-    """Return wanted and written time of each pass.
+    """Return wanted and written time of each pass; its leads may be no faster than wanted either.
 
     Args:
         program: The moves.
@@ -204,22 +204,31 @@ def pass_times(
         controller: For messages.
 
     Raises:
-        PassTimeError: If a pass does not keep its time.
+        PassTimeError: If a pass does not keep its time, or a lead is too fast.
     """
     moves: dict[int, list[tuple[float, float]]] = {}
+    leads: dict[int, list[tuple[float, float]]] = {}
     for move in program.moves:
-        if move.ground_pass is not None and move.duration is not None:
+        of_pass = moves if move.ground_pass is not None else leads
+        if move.duration is not None and move.kind is not Purpose.AIR:
             pair = move.duration, times[move.motion_index]
-            moves.setdefault(move.ground_pass, []).append(pair)
+            of_pass.setdefault(move.part[1], []).append(pair)
     found = {}
     for index, pairs in sorted(moves.items()):
         wanted, written = np.array(pairs).T
         single = float(np.abs(written / wanted - 1.0).max())
         found[index] = PassTime(float(wanted.sum()), float(written.sum()), single)
+    too_low = f"{controller} takes no speeds so low"
     for index, one in found.items():
         if abs(one.error) > PASS_TIME_TOLERANCE:
             raise PassTimeError(
                 f"pass {index + 1} would take {one.written:.2f} s instead of {one.wanted:.2f} s: "
-                f"{controller} takes no speeds so low"
+                f"{too_low}"
             )
+        for wanted, written in leads.get(index, ()):
+            if wanted - written > PASS_TIME_TOLERANCE * one.wanted:
+                raise PassTimeError(
+                    f"a move to or from the wheel of pass {index + 1} would take {written:.2f} s "
+                    f"instead of {wanted:.2f} s: {too_low}"
+                )
     return tuple(found.values())

@@ -10,6 +10,7 @@ from opl.least.borders import Nameable
 from opl.least.search_space import seams_in
 from opl.motion.feed import slow_stretches
 from opl.motion.motion import Motion, TimedMotion
+from opl.motion.repeats import named_once
 from opl.motion.timing import Timing
 from opl.planning.plan import Plan
 from opl.planning.positions import HALVINGS, with_fewest_positions, with_shorter_moves
@@ -132,6 +133,7 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
     with watch.stage(Stage.MOTION):
         exact = with_speed_steps(found.plan.motion, points, job.process, job.cell.robot)
         exact, motion = _positions(prepared, exact, beside)
+        motion = named_once(motion)
         timing, seen = recognised_times(job, points, motion)
         slow = slow_stretches(timing, job.process)
     timed = TimedMotion.passing(motion, timing.timed.duration)

@@ -160,8 +160,10 @@ class _Labels:
             contact_position=np.insert(self._t, at + 1, also[:, 2]),
             cutter_point=np.insert(self._place, at + 1, also[:, 1]),
             pass_index=self._pass[row],
-            # of one that is repeated the first is written
-            written=written[row] & (np.diff(row, prepend=-1) != 0),
+            written=written[row]
+            & np.where(
+                self._pass_ends()[row], np.diff(row, append=-1) != 0, np.diff(row, prepend=-1) != 0
+            ),
         )
         findings = tuple(
             Finding(
@@ -176,6 +178,16 @@ class _Labels:
         timed = TimedMotion(motion, np.insert(self._segments.duration, at + 1, 0.0))
         kept = np.flatnonzero(np.isin(row, samples.given) | is_ground[row])
         return Recognition(timed.take(kept), samples.source[row[kept]], findings)
+
+    def _pass_ends(self) -> NDArray[np.bool_]:
+        """Return at which configurations a pass ends that was not begun there, shape (n,).
+
+        Where one is repeated, the last of them is written there, else the first: as the time of a
+        program has it (`opl.program.moves.plan_moves`).
+        """
+        on_pass = np.where([kind.on_wheel for kind in self._kind], self._pass, -1)
+        begins, ends = np.diff(on_pass, prepend=-1) != 0, np.diff(on_pass, append=-1) != 0
+        return np.asarray(ends & ~begins & (on_pass >= 0))
 
     def _mark(self, k: int, kind: MoveKind, pass_index: int, t: float, place: float) -> None:
         self._kind[k], self._pass[k] = kind, pass_index

@@ -60,3 +60,19 @@ def test_passes_end_where_leads_leave_the_clearance_and_hardly_more(tmp_path):
     job = opl.load_job(tmp_path / "job.yaml")
     plan = search_path(job.search, problem_of(job)).plan
     assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("seed", "index", "attempt"),
+    [
+        (20261315, 7, 0),  # a cylinder: its joints rest within a pass, and where one ends
+        (20261315, 8, 1),  # a filleted box: some moves are as small as the digits of a position
+        (20261316, 22, 0),  # a cutter point is passed where the contact can roll no farther
+    ],
+)
+def test_programs_that_were_refused_after_they_were_planned_are_written(
+    seed, index, attempt, tmp_path
+):
+    draw_job(seed, index, attempt, tmp_path)
+    run = opl.run_job(opl.load_job(tmp_path / "job.yaml"))
+    assert run.status == "ok"

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -5,6 +6,7 @@ import pytest
 
 from opl.errors import OplError, UnsafeError
 from opl.motion.motion import MoveKind, TimedMotion, VerifiedMotion
+from opl.motion.repeats import named_once
 from opl.program.actions import Actions, Remark
 from opl.program.moves import START_SPEED, Move, Program, plan_moves
 from opl.program.split import split
@@ -224,3 +226,26 @@ def test_what_is_done_at_both_ends_is_in_no_pass_that_could_be_left_out():
 def test_a_pass_too_long_for_a_job_of_its_own_is_refused():
     with pytest.raises(OplError, match=r"pass 1 takes \d+ moves, a job holds 5"):
         split(plan(verified_motion(2, home_between=True)), 5, by_pass=True)
+
+
+def test_time_of_standing_still_where_a_pass_ends_goes_to_the_move_before():
+    verified = verified_motion(n_passes=1)
+    motion, q, duration = verified.motion, verified.motion.q.copy(), verified.timed.duration.copy()
+    last = int(np.flatnonzero(motion.grinding)[-1])
+    q[last], duration[last] = q[last - 1], 0.7
+    standing = with_times(verified, duration, q)
+    moves = {move.motion_index: move for move in plan(standing).moves}
+    assert last - 1 not in moves
+    assert moves[last].duration == pytest.approx(duration[last - 1] + 0.7)
+    assert moves[last].ground_pass == 0
+    assert moves[last + 1].duration == pytest.approx(duration[last + 1])
+
+
+def test_configurations_that_repeat_one_on_the_wheel_are_named_once():
+    motion = verified_motion(n_passes=1).motion
+    ground = np.flatnonzero(motion.grinding)
+    q = motion.q.copy()
+    q[ground[1]] = q[ground[0]]  # within the pass: the first is named
+    q[ground[-1]] = q[ground[-2]]  # where it ends: the last
+    named = named_once(replace(motion, q=q))
+    assert set(motion.positions) - set(named.positions) == {ground[1], ground[-2]}

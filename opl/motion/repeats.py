@@ -1,0 +1,47 @@
+"""Configurations that repeat the one before: the part stands still, and a program names it once.
+
+On the wheel that happens where a straight part lies along the flat: the contact slides over both
+while the robot rests. The time that this takes goes to the move that follows, or where a pass ends
+there to the move before: each so gets slower, never faster.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opl.cell.robot import SAME_CONFIGURATION
+from opl.motion.motion import Motion
+
+
+def repeats(motion: Motion) -> list[NDArray[np.intp]]:
+    """Return the indices of all configurations, those together that repeat the first of them."""
+    q, firsts = motion.q, [0]
+    for i in range(1, len(q)):
+        if np.abs(q[i] - q[firsts[-1]]).max() > SAME_CONFIGURATION:
+            firsts.append(i)
+    return np.split(np.arange(len(q)), firsts[1:])
+
+
+def named_of(motion: Motion, group: NDArray[np.intp]) -> int:
+    """Return which of a group as of `repeats` a program names: the time until there is its move's.
+
+    The first; the last where a pass ends there that was not begun there.
+    """
+    grinding = motion.grinding
+    ends_pass = grinding[group].all() and not grinding[group[-1] + 1]
+    return int(group[-1] if ends_pass else group[0])
+
+
+def named_once(motion: Motion) -> Motion:
+    """Return a motion whose written configurations on the wheel do not repeat one another."""
+    positions = motion.positions
+    named = motion.take(positions)
+    written = motion.written.copy()
+    for group in repeats(named):
+        on_wheel = group[named.grinding[group]]
+        written[positions[on_wheel]] = False
+        written[positions[named_of(named, group)]] = True
+    return replace(motion, written=written)
