@@ -6,6 +6,8 @@ it is proven that nothing is as good, a little more is hoped for, soon much more
 
 from __future__ import annotations
 
+from opl.planning.plan import AT_REST
+
 RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for next
 GUESSED = 1.5  # times what is proven: what is hoped for where no box tells
 FIRST_GUESS = 0.5  # [rad] what is hoped for where nothing is proven either
@@ -26,10 +28,13 @@ class Hope:
     def told(self, size: float, hoped: float) -> float:
         """Return what is hoped for in [rad] where a box of a size tells; so much was before."""
         self._told = True
-        if max(size, self._least) >= hoped:
+        least = max(
+            size, self._least, AT_REST
+        )  # a box of no size tells as much of all those at rest
+        if least >= hoped:
             return hoped
         self._raised = RAISED
-        return max(size, self._least)
+        return least
 
     def guess(self, proven: float, best: float) -> float:
         """Return what to hope for at first, in [rad]: all images of all walls are many."""

@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from opl.least.hope import FIRST_GUESS, Hope
+from opl.planning.plan import AT_REST
 
 
 def test_nothing_is_guessed_where_a_motion_tells():
@@ -23,6 +24,16 @@ def test_hopes_rise_above_all_that_is_proven_not_to_exist(sizes, first, found):
     for _ in range(3000):
         hoped = hope.more(hoped, best, found)
     assert hoped == best
+
+
+def test_a_box_of_no_size_does_not_end_all_hope():
+    """A cone of the strangers may rest on the wheel all over its pass: hoping went on for ever."""
+    hope = Hope(True)
+    hoped = hope.told(0.0, 0.0015)
+    assert 0.0 < hoped <= AT_REST
+    for _ in range(40):
+        hoped = hope.more(hoped, 0.0015, True)
+    assert hoped > AT_REST
 
 
 def test_hopes_rise_faster_as_long_as_nothing_new_tells():
