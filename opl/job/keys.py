@@ -53,6 +53,7 @@ OF_PASSES = {
 
 SEARCH_CONTACT_POSITIONS = "search.contact_positions"
 SEARCH_CONTACT_CHANGE = "search.max_contact_change"
+SEARCH_OBJECTIVE = "search.objective"
 SEARCH_CONTACT_WEIGHT = "search.weights.contact"
 
 PROCESS_HOME = "process.home_deg"

@@ -14,10 +14,13 @@ from opl.errors import (
     TimeLawError,
     UnsafeError,
 )
+from opl.geometry.toolpath import CutterPoints
 from opl.job import keys
 from opl.job.source import Source
 from opl.motion.feed import SlowStretch
+from opl.motion.motion import TimedMotion
 from opl.motion.process_settings import ProcessSettings
+from opl.motion.repeats import short_passes
 
 
 @contextmanager
@@ -46,6 +49,31 @@ def keys_named(source: Source) -> Iterator[None]:
     except TimeLawError as error:
         advice = f"raise {keys.PROCESS_MAX_ACCELERATION} if the robot can do more"
         raise UnsafeError(f"{error}; {advice}") from error
+
+
+def rest_refusal(
+    timed: TimedMotion, points: CutterPoints, process: ProcessSettings
+) -> NoPathError | None:
+    """Return why a path is refused whose passes are no moves to be timed, None if it is not.
+
+    Args:
+        timed: The motion with its times.
+        points: Its cutter points.
+        process: For the feed.
+    """
+    short = list(short_passes(timed, points, process.feed))
+    if not short:
+        return None
+    return NoPathError(
+        "the part would rest on the wheel where a pass begins or ends, while the contact slides "
+        "over the wheel, and no program says for how long; let the contact move less from point to "
+        f"point ({keys.SEARCH_CONTACT_CHANGE}), or ask for another {keys.SEARCH_OBJECTIVE}",
+        [
+            f"pass {one.pass_index + 1}: {one.takes:.2f} s of moves on the wheel, "
+            f"{one.at_feed:.2f} s at the feed"
+            for one in short
+        ],
+    )
 
 
 def dwell_refusal(

@@ -131,7 +131,8 @@ class SearchSection(Document):
     )
     max_contact_change: _BeltUnits = Field(
         default=100.0,
-        description="Largest change of the contact position between neighbouring cutter points.",
+        description="Largest change of the contact position between neighbouring cutter points; "
+        "small enough, no part rests on the wheel while the contact slides along it.",
     )
     range_tolerance_percent: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
         default=0.1,

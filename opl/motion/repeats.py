@@ -7,13 +7,32 @@ there to the move before: each so gets slower, never faster.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from opl.cell.robot import SAME_CONFIGURATION
-from opl.motion.motion import Motion
+from opl.geometry.toolpath import CutterPoints
+from opl.motion.motion import Motion, TimedMotion
+
+SHORTER = 0.02  # than at the feed, as a fraction, that the moves of a pass on the wheel may be
+
+
+@dataclass(frozen=True)
+class ShortPass:
+    """A pass whose moves on the wheel take less time than its way at the feed.
+
+    Attributes:
+        pass_index: Which, counted from 0.
+        takes: Time of its moves on the wheel in [s].
+        at_feed: That of its way along the surface at the feed in [s].
+    """
+
+    pass_index: int
+    takes: float
+    at_feed: float
 
 
 def repeats(motion: Motion) -> list[NDArray[np.intp]]:
@@ -45,3 +64,20 @@ def named_once(motion: Motion) -> Motion:
         written[positions[on_wheel]] = False
         written[positions[named_of(named, group)]] = True
     return replace(motion, written=written)
+
+
+def short_passes(timed: TimedMotion, points: CutterPoints, feed: float) -> Iterator[ShortPass]:
+    """Yield passes that move too little: the part rests where they begin or end, for no time.
+
+    Args:
+        timed: A motion over all of the points.
+        points: The cutter points.
+        feed: Of the ground point in [m/s].
+    """
+    for index in range(points.n_passes):
+        takes = float(
+            timed.duration[timed.motion.grinding & (timed.motion.pass_index == index)].sum()
+        )
+        at_feed = float(points.arc_length[points.pass_index == index].max()) / feed
+        if takes < at_feed * (1.0 - SHORTER):
+            yield ShortPass(index, takes, at_feed)

@@ -17,7 +17,9 @@ import numpy as np
 
 from opl.cell.robot import SAME_CONFIGURATION
 from opl.findings import Finding, Level
+from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion, MoveKind, Phase, TimedMotion
+from opl.motion.repeats import short_passes
 from opl.motion.timing import Timing
 from opl.program.played import Playback, ReadMove, SpeedUnit
 from opl.program.posts import PASS_TIME_TOLERANCE
@@ -58,6 +60,19 @@ def speed_findings(
                     continue
                 if not wanted / FASTER - digit <= takes <= slowest:
                     yield _finding(written, playback, k, wanted, "the speed")
+
+
+def pass_findings(written: TimedMotion, points: CutterPoints, feed: float) -> Iterator[Finding]:
+    """Give the passes whose moves on the wheel take less than their way along the surface.
+
+    Args:
+        written: The written configurations and times, one for each move.
+        points: The cutter points.
+        feed: Of the ground point in [m/s].
+    """
+    for one in short_passes(written, points, feed):
+        message = f"{one.takes:.2f} s of moves on the wheel, {one.at_feed:.2f} s at the feed"
+        yield Finding(Level.ERROR, "speed", f"pass {one.pass_index + 1}", message)
 
 
 def _stays(motion: Motion, k: int) -> bool:

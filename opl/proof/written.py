@@ -18,7 +18,7 @@ from opl.program.played import Playback
 from opl.program.posts import Reader
 from opl.program.settings import PositionForm
 from opl.proof.events import event_findings
-from opl.proof.speeds import speed_findings
+from opl.proof.speeds import pass_findings, speed_findings
 
 HOME_SLACK = 1e-4  # [rad] that the ends may be from home: a pulse or two
 CARRIED_HOME = np.deg2rad(5.0)  # the same where a user frame that is touched up takes home along
@@ -44,6 +44,7 @@ def written_findings(
     return [
         *_first_moves(job, playback, reader),
         *speed_findings(written, requested, playback, job.process.feed),
+        *pass_findings(written, points, job.process.feed),
         *_rounded_ends(job, motion, playback, reader),
         *_ramps(job, motion, playback, reader),
         *event_findings(job, motion, playback),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from opl.errors import NoFreeMoveError, NoPathError
 from opl.files.beside import Beside, Later
-from opl.job.refusals import dwell_refusal, keys_named
+from opl.job.refusals import dwell_refusal, keys_named, rest_refusal
 from opl.job.values import Job
 from opl.least.borders import Nameable
 from opl.least.search_space import seams_in
@@ -141,7 +141,7 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
     planned = Planned(
         prepared, found.plan, compared, exact, timed, timing, seen, slow, charted, drawn
     )
-    refusal = dwell_refusal(slow, job.process)
+    refusal = rest_refusal(timed, points, job.process) or dwell_refusal(slow, job.process)
     return planned if refusal is None else Refused(planned, refusal, (), watch.seconds)
 
 

@@ -13,7 +13,8 @@ from opl.geometry.wheel import MM_PER_M
 from opl.verification.contact import Touches
 
 MISSED = 100.0  # what a cutter point that is left out costs; all else costs a few units in a pass
-TWICE = 2.0  # what a configuration that grinds the next cutter point too costs
+TWICE = 2.0  # what a configuration that grinds more than one cutter point costs, within a pass
+AT_END = 4.0  # times the distance, where a pass begins or ends: a written position is exact there
 ELSEWHERE = 10.0  # what a pass that begins or ends at no written position costs at either end
 PASSED = 0.3  # what a cutter point costs that is ground on the way and not where one is written
 TOO_SOON = 2.0  # what a second costs by which a cutter point is reached sooner than at the feed
@@ -79,10 +80,12 @@ def align(
     configuration, point, t = touches.configuration, touches.point, touches.contact_position
     pass_index, at_feed = course.pass_index, course.seconds
     at_end = (np.diff(pass_index, prepend=-1) != 0) | (np.diff(pass_index, append=-1) != 0)
-    own = touches.distance / tolerance + np.where(written, 0.0, PASSED)
+    own = touches.distance / tolerance * np.where(at_end[point], AT_END, 1.0)
+    own = own + np.where(written, 0.0, PASSED)
     own = own + np.where(at_end[point] & ~written, ELSEWHERE, 0.0)
     best = own + MISSED * point  # as the first one that is ground
     came_from = np.full(n, -1)
+    rests = np.zeros(n, dtype=bool)  # whether it came from the same configuration
     for m in range(1, n):
         before = slice(max(0, m - HORIZON), m)
         apart = configuration[m] - configuration[before]
@@ -90,7 +93,8 @@ def align(
         same_pass = pass_index[point[m]] == pass_index[point[before]]
         change = np.where(same_pass, np.abs(t[m] - t[before]), 0.0)
         cost = best[before] + own[m] + MISSED * skipped + PER_POSITION * change
-        cost = cost + np.where(apart == 0, TWICE, 0.0)
+        if not at_end[point[m]]:
+            cost = cost + np.where((apart == 0) & ~rests[before], TWICE, 0.0)
         sooner = at_feed[point[m]] - at_feed[point[before]] - (time[m] - time[before])
         cost = cost + TOO_SOON * np.where(same_pass, np.maximum(sooner, 0.0), 0.0)
         # on the flat one configuration may grind two cutter points at different t
@@ -100,6 +104,7 @@ def align(
         cheapest = int(cost.argmin())
         if cost[cheapest] < best[m]:
             best[m], came_from[m] = cost[cheapest], before.start + cheapest
+            rests[m] = apart[cheapest] == 0
     last = int((best + MISSED * (len(pass_index) - 1 - point)).argmin())
     chosen = [last]
     while came_from[chosen[-1]] >= 0:

@@ -285,6 +285,16 @@ def test_one_configuration_may_grind_two_points():
     assert len(aligned(found, 3)) == 3
 
 
+def test_where_the_part_rests_a_pass_ends_and_not_on_the_retract():
+    # five points lie along the flat while it rests; the retract leaves them by 0.024 mm and more
+    rest = [(1, i, 4.0 - i, 0.3) for i in range(1, 6)]
+    leaving = [(k, i, 4.0 - i, 2.4 * (k - 1)) for k in (2, 3) for i in range(1, 6)]
+    found = touches((0, 0, 4.0, 0.0), *rest, *leaving)
+    chosen = aligned(found, 6)
+    assert found.configuration[chosen].tolist() == [0, 1, 1, 1, 1, 1]
+    assert found.point[chosen].tolist() == list(range(6))
+
+
 def test_order_is_kept_and_jumps_over_the_wheel_are_not_made():
     turned = touches((0, 0, 0.0, 0.0), (1, 2, 0.0, 0.0), (2, 1, 0.0, 0.0), (3, 3, 0.0, 0.0))
     assert len(aligned(turned, 4)) == 3

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from opl.geometry.toolpath import CutterPoints
 from opl.motion.motion import Motion, MoveKind, TimedMotion
 from opl.motion.timing import Cause, Timing
 from opl.program.played import Corner, Playback, ReadMove, SpeedUnit, WrittenSpeed
-from opl.proof.speeds import speed_findings
+from opl.proof.speeds import pass_findings, speed_findings
 
 FEED = 0.02  # [m/s]
 NOWHERE = np.full(6, np.nan)
@@ -44,3 +45,15 @@ def test_many_such_moves_are_as_fast_as_one_long_move():
 def test_a_slow_neighbour_excuses_no_more_than_any_other_limit():
     for cause in (Cause.NEIGHBOUR, Cause.PIVOTING, Cause.SPEED):
         assert found([1.0], [0.72], [1e-2], cause)
+
+
+def test_a_pass_of_less_time_on_the_wheel_than_its_way_takes_is_told():
+    points = CutterPoints(np.tile(np.eye(4), (2, 1, 1)), np.zeros(2, int), np.array([0.0, 0.1]))
+    kinds = (MoveKind.HOME, MoveKind.GRIND, MoveKind.GRIND, MoveKind.RETRACT)
+    place, zeros = np.array([np.nan, 0.0, 1.0, np.nan]), np.zeros(4, dtype=np.int64)
+    motion = Motion(np.arange(4.0)[:, None] * np.ones(6), kinds, place, place, zeros)
+    at_feed = TimedMotion(motion, np.array([0.0, 1.0, 5.0, 1.0]))
+    assert list(pass_findings(at_feed, points, FEED)) == []
+    late = TimedMotion(motion, np.array([0.0, 1.0, 0.5, 5.5]))  # rests before it leaves the wheel
+    (found,) = pass_findings(late, points, FEED)
+    assert found.message == "0.50 s of moves on the wheel, 5.00 s at the feed"
