@@ -21,7 +21,7 @@ from opl.proof.speeds import BETWEEN
 from opl.verification.recognise import recognise
 from opl.verification.seen import Seen, see
 
-MOST_ROUNDS = 4  # of recognising by the times of the round before
+MOST_ROUNDS = 12  # of recognising by the times of the round before
 
 
 def recognised_times(job: Job, points: CutterPoints, motion: Motion) -> tuple[Timing, Seen]:
