@@ -1,11 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from opl.errors import OplError
+from opl.errors import OplError, PassTimeError
 from opl.program.inform import parse, write_jobs
-from opl.program.moves import plan_moves
+from opl.program.moves import Purpose, plan_moves
+from opl.program.posts import pass_times
 from opl.program.profiles import DX200, NX100
 from opl.program.pulses import PulseScale
 from opl.program.settings import ProgramSettings
@@ -70,3 +73,14 @@ def test_pass_that_cannot_be_slow_enough_is_refused_with_both_times():
     program = plan_moves(slowed(verified_motion(), 300.0), "SAMPLE", MAX_SPEED)
     with pytest.raises(OplError, match=r"pass 1 would take .* s instead of .* s: DX200"):
         write_jobs(program, ROBOT, ProgramSettings(), DX200, DATE)
+
+
+def test_a_lead_that_no_speed_is_low_enough_for_is_refused():
+    program = plan_moves(verified_motion(n_passes=1), "SAMPLE", MAX_SPEED)
+    times = {move.motion_index: move.duration or 0.0 for move in program.moves}
+    assert len(pass_times(program, times, "DX200")) == 1
+    last = next(move for move in reversed(program.moves) if move.kind is Purpose.LEAD)
+    moves = [replace(one, duration=2.0) if one is last else one for one in program.moves]
+    times[last.motion_index] = 1.5  # as slow as can be written
+    with pytest.raises(PassTimeError, match=r"pass 1 would take 1\.50 s instead of 2\.00 s"):
+        pass_times(replace(program, moves=tuple(moves)), times, "DX200")
