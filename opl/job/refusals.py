@@ -43,7 +43,8 @@ def keys_named(source: Source) -> Iterator[None]:
     except PassTimeError as error:
         advice = (
             f"raise {keys.PROCESS_FEED}, or write {keys.PROGRAM_MOTION}: straight; where the part "
-            f"hardly moves while the contact slides over it, lower {keys.SEARCH_CONTACT_CHANGE}"
+            f"hardly moves while the contact slides over it, a smaller "
+            f"{keys.SEARCH_CONTACT_CHANGE} may help"
         )
         raise OplError(f"{error}; {advice}") from error
     except TimeLawError as error:
@@ -54,7 +55,7 @@ def keys_named(source: Source) -> Iterator[None]:
 def rest_refusal(
     timed: TimedMotion, points: CutterPoints, process: ProcessSettings
 ) -> NoPathError | None:
-    """Return why a path is refused whose passes are no moves to be timed, None if it is not.
+    """Return why a path is refused that rests where a pass begins or ends, None if it is not.
 
     Args:
         timed: The motion with its times.
@@ -66,8 +67,8 @@ def rest_refusal(
         return None
     return NoPathError(
         "the part would rest on the wheel where a pass begins or ends, while the contact slides "
-        "over the wheel, and no program says for how long; let the contact move less from point to "
-        f"point ({keys.SEARCH_CONTACT_CHANGE}), or ask for another {keys.SEARCH_OBJECTIVE}",
+        f"over the wheel, and no program says for how long; a smaller {keys.SEARCH_CONTACT_CHANGE} "
+        f"or another {keys.SEARCH_OBJECTIVE} may give a path that moves",
         [
             f"pass {one.pass_index + 1}: {one.takes:.2f} s of moves on the wheel, "
             f"{one.at_feed:.2f} s at the feed"

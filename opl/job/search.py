@@ -131,8 +131,9 @@ class SearchSection(Document):
     )
     max_contact_change: _BeltUnits = Field(
         default=100.0,
-        description="Largest change of the contact position between neighbouring cutter points; "
-        "small enough, no part rests on the wheel while the contact slides along it.",
+        description="Largest change of the contact position between neighbouring cutter points. "
+        "The recursive search does not look at it, and its path stays the answer where none is "
+        "better.",
     )
     range_tolerance_percent: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
         default=0.1,

@@ -28,9 +28,8 @@ class Hope:
     def told(self, size: float, hoped: float) -> float:
         """Return what is hoped for in [rad] where a box of a size tells; so much was before."""
         self._told = True
-        least = max(
-            size, self._least, AT_REST
-        )  # a box of no size tells as much of all those at rest
+        # a size of 0 could not be raised; below this a motion counts as at rest anyhow
+        least = max(size, self._least, AT_REST)
         if least >= hoped:
             return hoped
         self._raised = RAISED

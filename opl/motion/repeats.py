@@ -44,12 +44,12 @@ def repeats(motion: Motion) -> list[NDArray[np.intp]]:
     return np.split(np.arange(len(q)), firsts[1:])
 
 
-def named_of(motion: Motion, group: NDArray[np.intp]) -> int:
+def named_of(grinding: NDArray[np.bool_], group: NDArray[np.intp]) -> int:
     """Return which of a group as of `repeats` a program names: the time until there is its move's.
 
-    The first; the last where a pass ends there that was not begun there.
+    The first; the last where a pass ends there that was not begun there. `grinding` is that of the
+    motion.
     """
-    grinding = motion.grinding
     ends_pass = grinding[group].all() and not grinding[group[-1] + 1]
     return int(group[-1] if ends_pass else group[0])
 
@@ -59,10 +59,10 @@ def named_once(motion: Motion) -> Motion:
     positions = motion.positions
     named = motion.take(positions)
     written = motion.written.copy()
+    grinding = named.grinding
     for group in repeats(named):
-        on_wheel = group[named.grinding[group]]
-        written[positions[on_wheel]] = False
-        written[positions[named_of(named, group)]] = True
+        written[positions[group[grinding[group]]]] = False
+        written[positions[named_of(grinding, group)]] = True
     return replace(motion, written=written)
 
 

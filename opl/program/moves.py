@@ -232,8 +232,8 @@ def plan_moves(
         raise TypeError(f"a program is made of a VerifiedMotion, got {type(verified).__name__}")
     positions = verified.motion.positions
     timed = verified.timed.take(positions)
-    groups = repeats(timed.motion)
-    kept = np.array([named_of(timed.motion, group) for group in groups])
+    groups, grinding = repeats(timed.motion), timed.motion.grinding
+    kept = np.array([named_of(grinding, group) for group in groups])
     motion = _without_repeats(timed.motion, groups)
     speeds = _speeds(timed, kept, np.asarray(max_speed), joint_names)
     times = timed.take(kept).duration.tolist()

@@ -140,7 +140,8 @@ def _passed(
     share, good = _nearest(wheel, start, end, t, freedom, allowed)
     # beside the end of the flat it may slide at one end of the way and roll at the other
     beside = np.flatnonzero((np.abs(np.abs(t) - wheel.flat_end) <= AT_EDGE) & ~good)
-    at_edge, other = np.copysign(wheel.flat_end, t[beside]), SLIDES + ROLLS - freedom[beside]
+    at_edge = np.copysign(wheel.flat_end, t[beside])
+    other = np.where(on_flat[beside], ROLLS, SLIDES)
     share[beside], good[beside] = _nearest(
         wheel, start[beside], end[beside], at_edge, other, allowed
     )

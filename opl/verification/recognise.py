@@ -183,7 +183,7 @@ class _Labels:
         """Return at which configurations a pass ends that was not begun there, shape (n,).
 
         Where one is repeated, the last of them is written there, else the first: as the time of a
-        program has it (`opl.program.moves.plan_moves`).
+        program has it (`opl.motion.repeats.named_of`).
         """
         on_pass = np.where([kind.on_wheel for kind in self._kind], self._pass, -1)
         begins, ends = np.diff(on_pass, prepend=-1) != 0, np.diff(on_pass, append=-1) != 0

@@ -78,13 +78,10 @@ def test_programs_that_were_refused_after_they_were_planned_are_written(
     assert run.status == "ok"
 
 
-def test_a_pass_that_rests_on_the_wheel_is_refused_with_what_helps(tmp_path):
+def test_a_pass_that_rests_on_the_wheel_is_refused_with_its_time(tmp_path):
     draw_job(20261317, 3, 0, tmp_path)
-    path = tmp_path / "job.yaml"
-    run = opl.run_job(opl.load_job(path))
+    run = opl.run_job(opl.load_job(tmp_path / "job.yaml"))
     assert run.status == "no_path"
     assert "rest on the wheel" in run.reasons[0]
     assert "search.max_contact_change" in run.reasons[0]
     assert run.reasons[1].startswith("pass 1: 0.00 s of moves on the wheel, 5.06 s at the feed")
-    path.write_text(path.read_text().replace("search: {", "search: {max_contact_change: 0.25, "))
-    assert opl.run_job(opl.load_job(path)).status == "ok"
