@@ -131,9 +131,9 @@ class SearchSection(Document):
     )
     max_contact_change: _BeltUnits = Field(
         default=100.0,
-        description="Largest change of the contact position between neighbouring cutter points. "
-        "The recursive search does not look at it, and its path stays the answer where none is "
-        "better.",
+        description="Largest change of the contact position between neighbouring cutter points; "
+        "between places of a path that are nearer to each other, in proportion. The lower bound is "
+        "that of paths without this limit.",
     )
     range_tolerance_percent: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
         default=0.1,
@@ -176,12 +176,12 @@ class SearchSection(Document):
             max_contact_error=self.max_contact_error_mm * MM,
             interpolation=Interpolation(
                 self.max_contact_step,
+                self.max_contact_change,
                 (self.max_contact_error_mm - chord_error_mm) * MM,
                 float(MAX_JOINT_STEP),
             ),
             optimal=OptimalSettings(
                 widen=self.range_tolerance_percent / 100.0,
-                max_contact_change=self.max_contact_change,
                 costs=costs,
                 max_subproblems=self.max_subproblems,
             ),

@@ -43,10 +43,18 @@ def clear_of_borders(problem: GrindingProblem, plan: Plan, nameable: Nameable) -
         nameable: Which configurations the program names without doubt.
     """
     path = _moved(problem, plan.path, nameable)
-    if path is plan.path:
+    allowed = max(_contact_change(plan.path), problem.interpolation.max_contact_change)
+    if path is plan.path or _contact_change(path) > allowed:
         return plan
     found = check_path(problem, path)
     return replace(plan, path=path, motion=found.motion) if isinstance(found, Free) else plan
+
+
+def _contact_change(path: GrindingPath) -> float:
+    """Return how far the contact moves between neighbouring cutter points at the most."""
+    at = np.flatnonzero(path.cutter_point == np.rint(path.cutter_point))
+    same = np.diff(path.pass_index[at]) == 0
+    return float(np.abs(np.diff(path.contact_position[at]))[same].max(initial=0.0))
 
 
 def _moved(problem: GrindingProblem, path: GrindingPath, nameable: Nameable) -> GrindingPath:

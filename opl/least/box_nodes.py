@@ -53,7 +53,6 @@ class TrackSearch:
         problem: What is to be planned.
         sampler: Samples its places.
         costs: What a track is charged for.
-        max_contact_change: Largest change of t between neighbouring places in belt units.
         most: How far joints and contact should move at the most.
         push_away: What nodes that are near to something are charged.
         checks: How many motions were checked.
@@ -64,7 +63,6 @@ class TrackSearch:
     problem: GrindingProblem
     sampler: ColumnSampler
     costs: CostWeights
-    max_contact_change: float
     most: Travel
     push_away: PushAway
     checks: int = 0
@@ -113,6 +111,7 @@ class BoxNodes:
             field=NodeField(columns.t[0], problem.field.reached[:0], {}, tuple(matrices)),
             wheel_distance=np.zeros(columns.t.shape),
             known_sides=problem.sides_at(columns.places, columns.t),
+            spacing=np.diff(columns.places),
         )
         self.matrices = open_matrices(self.problem)
         self._swept = False
@@ -137,12 +136,11 @@ class BoxNodes:
             cost = track_cost(
                 self.problem, matrix.nodes, replace(search.costs, push_weight=0.0), matrix.free
             )
-            ladder = matrix.ladder_within(search.max_contact_change)
             asked = np.zeros_like(matrix.free)
             columns = np.arange(len(matrix.free))
             for asking in range(MOST_ROUNDS + 1):
                 edges = matrix.blocked_edges
-                found = smoothest_within(ladder, edges, matrix.free, cost, search.most)
+                found = smoothest_within(matrix.ladder, edges, matrix.free, cost, search.most)
                 if found is None:
                     break
                 # only along the track, and all over columns where something is nearer than wanted

@@ -74,8 +74,11 @@ class BoxTracks:
         if track is None:
             # images differ in their limits only: those with the same nodes tell the same
             few = {(m.free.tobytes(), m.blocked_edges.tobytes()): m for m in coarse.matrices}
-            ladders = [one.ladder_within(self._search.max_contact_change) for one in few.values()]
-            if learn(bars(places, ladders, [one.blocked_edges for one in few.values()])):
+            ladders, blocked = (
+                [m.ladder for m in few.values()],
+                [m.blocked_edges for m in few.values()],
+            )
+            if learn(bars(places, ladders, blocked)):
                 return None
             return self.plan(columns, NO_PASSAGES, box, room, learn) if rows else None
         bulges = coarse.bulges(track, box.widened(BULGE * room))

@@ -69,9 +69,8 @@ class OptimalSearch:
         self._space = space = SearchSpace.of(problem, seams or seams_in(problem), largest)
         self._walls, self._families = space.walls, space.families
         self._sampler, self._rectangles = space.sampler, space.rectangles
-        costs, most_change = settings.costs, settings.max_contact_change
-        push_away = PushAway(problem.cell, costs)
-        self._search = TrackSearch(problem, self._sampler, costs, most_change, most, push_away)
+        push_away = PushAway(problem.cell, settings.costs)
+        self._search = TrackSearch(problem, self._sampler, settings.costs, most, push_away)
         self._tracks = BoxTracks(self._search)
         self.plan = fallback
         self._largest = largest

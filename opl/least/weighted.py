@@ -67,8 +67,7 @@ def plan_weighted(
     sweeps = {}
     for index, matrix in enumerate(matrices):
         cost = track_cost(problem, matrix.nodes, prices, np.zeros_like(matrix.free))
-        change = settings.max_contact_change
-        sweeps[index] = sweep = _Sweep(index, matrix, change, box, cost, weights)
+        sweeps[index] = sweep = _Sweep(index, matrix, box, cost, weights)
         queue += sweep.entries(range(len(WIDENINGS)))
     heapq.heapify(queue)
     best, value = fallback, _value(problem, fallback, weights)
@@ -97,21 +96,20 @@ class _Sweep:
 
     index: int
     matrix: OpenMatrix
-    max_contact_change: float
     box: JointBox
     cost: TrackCost
     weights: ObjectiveWeights
 
     def entries(self, widenings: Iterable[int]) -> Iterator[Entry]:
         """Yield the best track in each box."""
-        ladder = self.matrix.ladder_within(self.max_contact_change)
+        matrix = self.matrix
         for widening in widenings:
-            amount, inside = WIDENINGS[widening], self.matrix.free
+            amount, inside = WIDENINGS[widening], matrix.free
             if np.isfinite(amount):
-                inside = self.matrix.free_inside(self.box.widened(amount * self.box.size))
-            track = smoothest(ladder, self.matrix.blocked_edges, inside, self.cost)
+                inside = matrix.free_inside(self.box.widened(amount * self.box.size))
+            track = smoothest(matrix.ladder, matrix.blocked_edges, inside, self.cost)
             if track is not None:
-                range_sum = self.matrix.nodes.range_sum(track.rows)
+                range_sum = matrix.nodes.range_sum(track.rows)
                 total = self.weights.joint_range * range_sum + track.cost
                 yield total, self.index, widening, tuple(track.rows.tolist())
 

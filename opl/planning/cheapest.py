@@ -13,37 +13,27 @@ from opl.planning.symmetry import twins
 from opl.search.smooth import smoothest
 
 
-def plan_cheapest(
-    problem: GrindingProblem, weights: CostWeights, max_contact_change: float
-) -> Plan:
+def plan_cheapest(problem: GrindingProblem, weights: CostWeights) -> Plan:
     """Find the collision-free motion whose track costs least.
 
     Exact over the field and all its matrices: what a proposed motion collides with is taken out,
     and the least of what is left is proposed next.
 
-    `max_contact_change` is the largest change of t between neighbouring cutter points in belt
-    units.
-
     Raises:
         NoPathError: If there is none, as in `first_free`.
     """
     matrices = open_matrices(problem)
-    tracks = _cheapest_first(problem, matrices, weights, max_contact_change)
-    return first_free(problem, matrices, tracks)
+    return first_free(problem, matrices, _cheapest_first(problem, matrices, weights))
 
 
 def _cheapest_first(
-    problem: GrindingProblem,
-    matrices: list[OpenMatrix],
-    weights: CostWeights,
-    max_contact_change: float,
+    problem: GrindingProblem, matrices: list[OpenMatrix], weights: CostWeights
 ) -> Iterator[Track]:
     costs = [track_cost(problem, one.nodes, weights, one.free.copy()) for one in matrices]
     while True:
         found = []
         for index, matrix in enumerate(matrices):
-            ladder = matrix.ladder_within(max_contact_change)
-            track = smoothest(ladder, matrix.blocked_edges, matrix.free, costs[index])
+            track = smoothest(matrix.ladder, matrix.blocked_edges, matrix.free, costs[index])
             if track is not None:
                 matrix.reached = len(track.rows)
                 found.append((track.cost, index, track.rows))

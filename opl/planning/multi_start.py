@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -88,6 +89,21 @@ def only_apart(problem: GrindingProblem, matrices: list[OpenMatrix]) -> bool:
         dtype=bool,
     ).reshape(len(matrices), len(passes))
     return bool(ground.any(axis=0).all() and not ground.all(axis=1).any())
+
+
+def held_back(problem: GrindingProblem, matrices: list[OpenMatrix]) -> bool:
+    """Return whether all would lead through a matrix were the contact to move as far as it likes.
+
+    Then contact positions between those of the field may do as well.
+    """
+    if problem.interpolation.max_contact_change >= np.ptp(problem.field.contact_positions):
+        return False
+    last = len(problem.points) - 1
+    free = (replace(matrix.ladder, max_contact_change=np.inf) for matrix in matrices)
+    return any(
+        passable(ladder, matrix.blocked_edges, 0, last)
+        for ladder, matrix in zip(free, matrices, strict=True)
+    )
 
 
 def _tracks(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
@@ -83,12 +83,6 @@ class OpenMatrix:
     def ladder(self) -> Ladder:
         """What a search sees; shares ``free``."""
         return self.ladders.of(self.nodes, self.free)
-
-    def ladder_within(self, max_contact_change: float) -> Ladder:
-        """Return the ladder with a largest change of t over each edge on the wheel."""
-        ladder = self.ladder
-        changes = np.where(ladder.off_wheel, np.inf, max_contact_change)
-        return replace(ladder, max_contact_change=changes)
 
     def free_inside(self, box: JointBox) -> np.ndarray:
         """Return which nodes are free and lie in a box, shape (n_columns, n_rows)."""

@@ -34,6 +34,7 @@ class GrindingProblem:
         interpolation: How the path between nodes is filled in.
         process: Speeds, approach and home.
         known_sides: `sides`, where the distances do not tell.
+        spacing: How far the points are apart in cutter points, shape (N - 1,), or 1 for all.
     """
 
     scene: PlanningScene
@@ -43,6 +44,7 @@ class GrindingProblem:
     interpolation: Interpolation
     process: ProcessSettings
     known_sides: np.ndarray | None = None
+    spacing: Array | float = 1.0
 
     @property
     def cell(self) -> WorkCell:
@@ -112,14 +114,16 @@ class GrindingProblem:
 
     def ladder(self, nodes: NodeMatrix, free: np.ndarray) -> Ladder:
         """Return a node matrix as the search sees it."""
+        rule = self.interpolation
         return Ladder(
             nodes.q,
             free,
             nodes.contact_position,
             self.off_wheel,
-            self.interpolation.max_contact_step,
-            self.interpolation.max_joint_step,
-            sides=None if self.sides is None else self.sides[:, :, nodes.position_index].copy(),
+            rule.max_contact_step,
+            rule.max_joint_step,
+            np.where(self.off_wheel, np.inf, rule.max_contact_change * self.spacing),
+            None if self.sides is None else self.sides[:, :, nodes.position_index].copy(),
         )
 
 

@@ -163,8 +163,12 @@ def _where_it_ended(n_points: int, matrices: list[OpenMatrix]) -> list[str]:
             refused = ", ".join(f"{cause} ({count} times)" for cause, count in met[:4])
             lines.append(f"cutter point {column}: edges refused: {refused}")
     if len(lines) == n_before:
+        ladder = farthest.ladder
+        most = float(ladder.contact_changes.min(initial=np.inf))
+        slow = most < np.ptp(ladder.contact_position)
+        further = f", the contact move by more than {most:g} between cutter points" if slow else ""
         lines.append(
-            "no continuous edge leads on: the arm would have to change its IK branch or jump; "
-            "a wider range of contact positions or a turned fixture may help"
+            f"no continuous edge leads on: the arm would have to change its IK branch{further} or "
+            "jump; a wider range of contact positions or a turned fixture may help"
         )
     return lines

@@ -14,16 +14,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Interpolation:
-    """How the path between nodes is filled in.
+    """Which nodes are joined, and how the path between them is filled in.
 
     Attributes:
         max_contact_step: Largest difference of t between adjacent configurations, delta T.
+        max_contact_change: Largest difference of t between neighbouring cutter points in belt
+            units.
         max_contact_error: Largest distance of the ground point from where it should touch the
             wheel, in the middle between two configurations, in [m]. More are put in to keep it.
         max_joint_step: Largest change of a joint between adjacent configurations in [rad].
     """
 
     max_contact_step: float
+    max_contact_change: float
     max_contact_error: float
     max_joint_step: float
 
@@ -87,13 +90,11 @@ class OptimalSettings:
     Attributes:
         widen: Fraction by which the joint range sum may exceed the lower bound for the sake of a
             smoother track.
-        max_contact_change: Largest change of t between neighbouring columns in belt units.
         costs: What a track is charged for inside the box.
         max_subproblems: How much is tried, in units of work.
     """
 
     widen: float
-    max_contact_change: float
     costs: CostWeights
     max_subproblems: int
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from opl.cell.workcell import WorkCell
 from opl.geometry.frames import from_roll_pitch_yaw
 from opl.geometry.toolpath import CutterPoints
 from opl.job import keys
@@ -29,11 +29,12 @@ PROBED_COLUMNS = 8  # cutter points that must have a free node before a change i
 # smallest first: of each kind the first that opens the job is reported
 MORE_ROLL_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)
 OTHER_WIDTH_MM = (-5.0, 10.0, -10.0, -20.0, 25.0, -30.0)
+MORE_CONTACT_CHANGE = (2.0, 5.0, 20.0, 100.0)  # times
 MORE_PENETRATION_MM = (0.25, 0.5, 1.0, 2.0)
 ROUND_THE_RIM_DEG = (15.0, -15.0, 30.0, -30.0, 60.0, -60.0, 90.0, -90.0, 180.0)
 TURNED_FIXTURE_DEG = (10.0, -10.0, 20.0, -20.0, 45.0, -45.0, 90.0, -90.0, 180.0)
 
-Change = tuple[str, WorkCell]
+Change = tuple[str, Job]
 
 
 @dataclass(frozen=True)
@@ -71,17 +72,17 @@ def find_remedies(
     found, in_vain = list[str](), list[str]()
     left = MOST_IN_ALL
     for what, kind in KINDS.items():
-        changes = list(kind(job.cell))
-        for change, cell in changes:
+        changes = list(kind(job))
+        for change, other in changes:
             progress(1.0 - left / MOST_IN_ALL)
-            scene = planning_scene(cell)
-            if not _open_at(problem_in(scene, job, some)):
+            scene = planning_scene(other.cell)
+            if not _open_at(problem_in(scene, other, some)):
                 continue
             if left <= 0:
                 found.append(f"not all changes were tried: {MOST_IN_ALL} motions were checked")
                 return Remedies(tuple(found), tuple(in_vain))
             most_checks = min(MOST_CHECKS, left)
-            outcome = try_recursive(problem_in(scene, job, points), Start.BEST, most_checks)
+            outcome = try_recursive(problem_in(scene, other, points), Start.BEST, most_checks)
             if isinstance(outcome, Found):
                 left -= outcome.plan.checks
                 found.append(
@@ -91,70 +92,91 @@ def find_remedies(
                 break
             left -= most_checks
         else:
-            in_vain.append(f"{what}: {len(changes)} tried, none opens the job")
+            if changes:
+                in_vain.append(f"{what}: {len(changes)} tried, none opens the job")
     return Remedies(tuple(found), tuple(in_vain))
 
 
-def _more_roll(cell: WorkCell) -> Iterator[Change]:
-    now = float(np.rad2deg(cell.wheel.max_roll))
+def _with_cell(job: Job, **changed: Any) -> Job:
+    return replace(job, cell=replace(job.cell, **changed))
+
+
+def _with_wheel(job: Job, **changed: Any) -> Job:
+    return _with_cell(job, wheel=replace(job.cell.wheel, **changed))
+
+
+def _more_contact_change(job: Job) -> Iterator[Change]:
+    rule, most = job.search.interpolation, 2.0 * job.cell.wheel.last_position
+    now = rule.max_contact_change
+    before = now
+    for more in (now * times for times in MORE_CONTACT_CHANGE):
+        if before < most:  # else it limits nothing
+            interpolation = replace(rule, max_contact_change=more)
+            change = f"{keys.SEARCH_CONTACT_CHANGE} {more:g} instead of {now:g}"
+            yield change, replace(job, search=replace(job.search, interpolation=interpolation))
+        before = more
+
+
+def _more_roll(job: Job) -> Iterator[Change]:
+    now = float(np.rad2deg(job.cell.wheel.max_roll))
     for more in MORE_ROLL_DEG:
         if now + more <= 90.0:
-            wheel = replace(cell.wheel, max_roll=float(np.deg2rad(now + more)))
             change = f"{keys.WHEEL_MAX_ROLL} {now + more:g} instead of {now:g}"
-            yield change, replace(cell, wheel=wheel)
+            yield change, _with_wheel(job, max_roll=float(np.deg2rad(now + more)))
 
 
-def _other_width(cell: WorkCell) -> Iterator[Change]:
-    now = cell.wheel.width * MM
+def _other_width(job: Job) -> Iterator[Change]:
+    now = job.cell.wheel.width * MM
     for more in OTHER_WIDTH_MM:
         if now + more > 0.0:
-            wheel = replace(cell.wheel, width=(now + more) / MM)
             change = f"{keys.WHEEL_WIDTH} {now + more:g} instead of {now:g}"
-            yield change, replace(cell, wheel=wheel)
+            yield change, _with_wheel(job, width=(now + more) / MM)
 
 
-def _more_penetration(cell: WorkCell) -> Iterator[Change]:
-    now = cell.max_belt_penetration * MM
+def _more_penetration(job: Job) -> Iterator[Change]:
+    now = job.cell.max_belt_penetration * MM
     for more in MORE_PENETRATION_MM:
         change = f"{keys.WHEEL_MAX_BELT_PENETRATION} {now + more:g} instead of {now:g}"
-        yield change, replace(cell, max_belt_penetration=(now + more) / MM)
+        yield change, _with_cell(job, max_belt_penetration=(now + more) / MM)
 
 
-def _other_side(cell: WorkCell) -> Iterator[Change]:
+def _other_side(job: Job) -> Iterator[Change]:
     """Grind elsewhere on the rim: contact frame 0 turned about the axle of the wheel."""
-    axle = np.array([0.0, 0.0, cell.wheel.radius])  # a point of it in contact frame 0
+    axle = np.array([0.0, 0.0, job.cell.wheel.radius])  # a point of it in contact frame 0
     for turn in ROUND_THE_RIM_DEG:
         T_contact0_turned = from_roll_pitch_yaw(np.deg2rad([turn, 0.0, 0.0]), axle)
         T_contact0_turned[:3, 3] -= T_contact0_turned[:3, :3] @ axle
-        T_base_contact0 = cell.wheel.T_base_contact0 @ T_contact0_turned
+        T_base_contact0 = job.cell.wheel.T_base_contact0 @ T_contact0_turned
         change = (
             f"the contact on another side of the wheel, {turn:g} degrees round its rim "
             f"({keys.WHEEL_POSE} turned about the axle)"
         )
-        yield change, replace(cell, wheel=replace(cell.wheel, T_base_contact0=T_base_contact0))
+        yield change, _with_wheel(job, T_base_contact0=T_base_contact0)
 
 
-def _fed_in_reverse(cell: WorkCell) -> Iterator[Change]:
+def _fed_in_reverse(job: Job) -> Iterator[Change]:
     """Hold the part turned half round against the belt: the frame turned about its normal."""
     T_contact0_turned = from_roll_pitch_yaw(np.array([0.0, 0.0, np.pi]), np.zeros(3))
-    T_base_contact0 = cell.wheel.T_base_contact0 @ T_contact0_turned
+    T_base_contact0 = job.cell.wheel.T_base_contact0 @ T_contact0_turned
     change = (
         f"the part fed in the opposite direction across the wheel ({keys.WHEEL_POSE} turned 180 "
         "degrees about its z)"
     )
-    yield change, replace(cell, wheel=replace(cell.wheel, T_base_contact0=T_base_contact0))
+    yield change, _with_wheel(job, T_base_contact0=T_base_contact0)
 
 
-def _turned_fixture(cell: WorkCell) -> Iterator[Change]:
+def _turned_fixture(job: Job) -> Iterator[Change]:
     for turn in TURNED_FIXTURE_DEG:
         about_z = np.array([0.0, 0.0, np.deg2rad(turn)])
         T_flange_turned = from_roll_pitch_yaw(about_z, np.zeros(3))
         change = f"the fixture turned {turn:g} degrees about z of the flange"
-        yield change, replace(cell, T_flange_workpiece=T_flange_turned @ cell.T_flange_workpiece)
+        T_flange_workpiece = T_flange_turned @ job.cell.T_flange_workpiece
+        yield change, _with_cell(job, T_flange_workpiece=T_flange_workpiece)
 
 
 # tried in this order, each kind by itself
-KINDS: dict[str, Callable[[WorkCell], Iterator[Change]]] = {
+KINDS: dict[str, Callable[[Job], Iterator[Change]]] = {
+    f"a larger {keys.SEARCH_CONTACT_CHANGE}": _more_contact_change,
     f"a larger {keys.WHEEL_MAX_ROLL}": _more_roll,
     f"another {keys.WHEEL_WIDTH}": _other_width,
     f"a larger {keys.WHEEL_MAX_BELT_PENETRATION}": _more_penetration,

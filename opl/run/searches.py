@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from opl.errors import NoPathError
 from opl.files.beside import Beside, Later
+from opl.job import keys
 from opl.job.methods import Method, Objective, Search
 from opl.least.borders import Nameable, clear_of_borders
 from opl.least.equals import quickest_of_equals
@@ -16,8 +17,14 @@ from opl.least.weighted import plan_weighted
 from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.motion.short_ways import shortened
 from opl.planning.cheapest import plan_cheapest
-from opl.planning.multi_start import RecursiveSearch, only_apart, plan_recursive, try_recursive
-from opl.planning.plan import Exhausted, Found, ObjectiveValue, OutOfBudget, Plan
+from opl.planning.multi_start import (
+    RecursiveSearch,
+    held_back,
+    only_apart,
+    plan_recursive,
+    try_recursive,
+)
+from opl.planning.plan import Exhausted, Found, ObjectiveValue, Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import explain, no_path
 from opl.planning.settings import ObjectiveWeights, Start
@@ -92,7 +99,9 @@ def _search_range(
     in_turns = RecursiveSearch(problem, search.start)
     last = in_turns.go_on(MOST_FIRST_CHECKS, MOST_FIRST_WORK)
     known = last.plan if isinstance(last, Found) else None
-    if isinstance(last, Exhausted) and not only_apart(problem, last.matrices):
+    if isinstance(last, Exhausted) and not (
+        only_apart(problem, last.matrices) or held_back(problem, last.matrices)
+    ):
         raise no_path(problem, last.matrices)
 
     def otherwise(work: float) -> Plan | None:
@@ -101,7 +110,7 @@ def _search_range(
         return last.plan if isinstance(last, Found) else None
 
     # where all that is proposed collides, the proof knows better where not to look; where passes
-    # cannot be ground on one IK branch, it gives each its own
+    # cannot be ground on one IK branch, it gives each its own; and it knows more contact positions
     others = None if isinstance(last, Exhausted) else otherwise
     try:
         counted_from = None if seams is None else seams.value()
@@ -110,9 +119,10 @@ def _search_range(
         least, proven = error.lower_bound, error.proven
     else:
         return best, last.plan if isinstance(last, Found) else None
-    if isinstance(last, Exhausted):
+    held = isinstance(last, Exhausted) and held_back(problem, last.matrices)
+    if isinstance(last, Exhausted) and not held:
         raise no_path(problem, last.matrices)
-    assert isinstance(last, OutOfBudget), "what was found is a plan"
+    assert not isinstance(last, Found), "what was found is a plan"
     if proven:
         raise NoPathError(
             "no path: it is proven that no motion along these passes, at any contact positions, on "
@@ -121,7 +131,12 @@ def _search_range(
             explain(problem, in_turns.matrices),
         )
     tried = f"the {last.checks} best motions of the recursive search are not free"
-    if last.checks == 0:
+    if held:
+        tried = (
+            f"at {len(problem.field.contact_positions)} contact positions none is free that keeps "
+            f"{keys.SEARCH_CONTACT_CHANGE}"
+        )
+    elif last.checks == 0:
         tried = "the recursive search came to no motion in the work allowed"
     raise NoPathError(
         f"no path found: {tried}, and "
@@ -146,7 +161,6 @@ def _search_best(
     search: Search, problem: GrindingProblem, recursive: Plan, report: Callable[[float], None]
 ) -> Plan:
     settings = search.optimal
-    change = settings.max_contact_change
     if search.objective is Objective.WEIGHTED:
         weights = search.objective_weights
         return plan_weighted(problem, weights, settings, recursive, report)
@@ -155,7 +169,7 @@ def _search_best(
     costs = replace(settings.costs, joint_weights=joint_weights, time_weight=time)
     # the cheapest at the cutter points need not be so between them
     alone = ObjectiveWeights(0.0, travel, time)
-    plans = (plan_cheapest(problem, costs, change), recursive)
+    plans = (plan_cheapest(problem, costs), recursive)
     values = [alone.value(_figures(problem, plan)) for plan in plans]
     value = min(values)
     known = ObjectiveValue(value, min(least_cost(problem, travel, time), value))

@@ -55,8 +55,8 @@ def test_another_side_moves_the_contact_and_leaves_the_wheel_where_it_is(kind):
     cell = v_job().cell
     now = cell.wheel.T_base_contact0
     axle = now[:3, 3] + cell.wheel.radius * now[:3, 2]
-    for _, changed in kind(cell):
-        T = changed.wheel.T_base_contact0
+    for _, changed in kind(v_job()):
+        T = changed.cell.wheel.T_base_contact0
         np.testing.assert_allclose(T[:3, 3] + cell.wheel.radius * T[:3, 2], axle, atol=1e-12)
         assert abs(T[:3, 0] @ now[:3, 0]) == pytest.approx(1.0)
         assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0)

@@ -401,7 +401,7 @@ def at_cutter_points(path):
 
 def test_the_least_travel_is_a_shortest_path_of_scipy():
     problem = one_row()
-    plan = plan_cheapest(problem, ONLY_TRAVEL, SETTINGS.max_contact_change)
+    plan = plan_cheapest(problem, ONLY_TRAVEL)
     q, _ = at_cutter_points(plan.path)
     least = shortest(problem, lambda a, b, *_: np.abs(b - a).sum(axis=1))
     assert plan.checks == 1  # nothing was in the way, so the field is scipy's
@@ -420,7 +420,7 @@ def test_the_least_time_is_a_shortest_path_of_scipy():
         sliding = np.abs(t_b - t_a) / problem.process.contact_speed
         return np.maximum(np.maximum(turning, sliding), arc[column])
 
-    plan = plan_cheapest(problem, ONLY_TIME, SETTINGS.max_contact_change)
+    plan = plan_cheapest(problem, ONLY_TIME)
     q, t = at_cutter_points(plan.path)
     steps = range(len(q) - 1)
     spent = sum(float(seconds(q[[k]], q[[k + 1]], t[[k]], t[[k + 1]], k)[0]) for k in steps)
@@ -453,7 +453,7 @@ def test_a_weighted_sum_is_what_the_motion_has_and_no_more_than_other_methods_ha
     plan = weighted(problem, WEIGHTS, recursive(one_row))
     assert plan.objective.value == pytest.approx(sum_of(problem, plan, WEIGHTS), abs=1e-12)
     assert 0.0 < plan.objective.lower_bound <= plan.objective.value
-    travel = plan_cheapest(problem, ONLY_TRAVEL, SETTINGS.max_contact_change)
+    travel = plan_cheapest(problem, ONLY_TRAVEL)
     for other in (recursive(one_row), travel):
         assert plan.objective.value <= sum_of(problem, other, WEIGHTS) + 1e-12
     again = weighted(problem, WEIGHTS, recursive(one_row))
@@ -503,7 +503,7 @@ def test_least_time_is_that_of_the_feed_or_of_slow_joints():
     slow = replace(problem.cell.robot, max_speed=problem.cell.robot.max_speed / 200.0)
     slowed = with_scene(problem, cell=replace(problem.cell, robot=slow))
     assert least_cost(slowed, 0.0, 1.0) > 1.05 * arc
-    plan = plan_cheapest(slowed, ONLY_TIME, SETTINGS.max_contact_change)
+    plan = plan_cheapest(slowed, ONLY_TIME)
     figures = figures_of_path(plan.path, plan.motion, slowed.points, slowed.process, slow)
     assert least_cost(slowed, 0.0, 1.0) <= figures.seconds
 
@@ -512,7 +512,7 @@ def test_prices_scale_and_are_added_up():
     problem = two_rows()
     travel = least_cost(problem, 1.0, 0.0)
     assert least_cost(problem, 3.0, 0.0) == pytest.approx(3.0 * travel)
-    plan = plan_cheapest(problem, ONLY_TRAVEL, SETTINGS.max_contact_change)
+    plan = plan_cheapest(problem, ONLY_TRAVEL)
     assert travel <= plan.path.joint_travel
     both = sum_of(problem, plan, ObjectiveWeights(0.0, 1.0, 1.0))
     assert 0.0 < least_cost(problem, 1.0, 1.0) <= both

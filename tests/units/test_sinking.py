@@ -130,7 +130,7 @@ def test_edges_that_pass_where_a_motion_collided_are_blocked_where_that_is_shut(
     problem, settings = small_problem(), v_job().search.optimal
     box, sampler, columns = near_a_box()
     most, push_away = Travel(np.inf, np.inf), PushAway(problem.cell, settings.costs)
-    search = TrackSearch(problem, sampler, settings.costs, np.inf, most, push_away)
+    search = TrackSearch(problem, sampler, settings.costs, most, push_away)
     spare, spacing = np.zeros(len(columns.places)), np.ones(len(columns.places))
     edge, t = 3, float(np.median(columns.t[3]))
     for shut in (False, True):
@@ -185,7 +185,7 @@ def test_where_a_box_leaves_no_depth_to_spare_tracks_are_sought_in_the_next_that
     monkeypatch.setattr(box_nodes.BoxNodes, "check", check)
     push_away = PushAway(problem.cell, settings.costs)
     most = Travel(np.inf, np.inf)
-    search = TrackSearch(problem, sampler, settings.costs, np.inf, most, push_away)
+    search = TrackSearch(problem, sampler, settings.costs, most, push_away)
     tracks = BoxTracks(search)
     tracks.plan(columns, NO_PASSAGES, box, 1e-3, lambda _: False)
     (_, before), (q, spared), *_ = checked
