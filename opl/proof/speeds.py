@@ -18,6 +18,7 @@ import numpy as np
 from opl.cell.robot import SAME_CONFIGURATION
 from opl.findings import Finding, Level
 from opl.geometry.toolpath import CutterPoints
+from opl.job import keys
 from opl.motion.motion import Motion, MoveKind, Phase, TimedMotion
 from opl.motion.repeats import short_passes
 from opl.motion.timing import Timing
@@ -33,6 +34,7 @@ BETWEEN = 2.5e-4  # [m] the same between two, where places are recognised less w
 LIMITED = 1.3
 FASTER = 1.05
 SLOWER = 1.5
+COARSE = 0.2  # of the time of a move: the last digit of its speed, where that may be to blame
 
 
 def speed_findings(
@@ -59,7 +61,7 @@ def speed_findings(
                 if _stays(motion, k):  # parts of a split program begin where the one before ended
                     continue
                 if not wanted / FASTER - digit <= takes <= slowest:
-                    yield _finding(written, playback, k, wanted, "the speed")
+                    yield _finding(written, playback, k, wanted, "the speed that the job asks for")
 
 
 def pass_findings(written: TimedMotion, points: CutterPoints, feed: float) -> Iterator[Finding]:
@@ -87,10 +89,13 @@ def _ahead(
     motion = written.motion
     lead = late = 0.0  # of the ground point in [m], negative if it is too early; of the time in [s]
     saved = 0.0  # [s] by which the moves so far were too fast where not the feed limits them
+    coarsest, because = 0.0, ""  # last digit of a speed so far in [s], and what to say of it
     for k in moves:
         takes, wanted = float(written.duration[k]), float(requested.timed.duration[k])
         distance = float(requested.surface_distance[k])
         digit = _last_digit(playback.moves[k], takes)
+        if max(COARSE * wanted, coarsest) < digit < np.inf:
+            coarsest, because = digit, _coarse(playback.moves[k], takes, digit)
         aims = wanted, min(max(wanted - late, wanted / MOST_CORRECTION), wanted * MOST_CORRECTION)
         late += takes - wanted
         place = AT_POINT if motion.kind[k] is MoveKind.GRIND else BETWEEN
@@ -104,7 +109,7 @@ def _ahead(
         too_fast, saved = not by_feed and saved > slack, min(saved, slack)
         too_slow = takes > max(aims) * LIMITED + digit + BETWEEN / feed
         if too_fast or too_slow or (early > allowed and wanted > FASTER * takes):
-            yield _finding(written, playback, k, wanted, "the feed")
+            yield _finding(written, playback, k, wanted, f"the feed that the job asks for{because}")
         elif early > allowed:  # because of the moves before it
             message = f"{1e3 * early:.2f} mm ahead of the feed that the job asks for"
             where = f"{motion.place(k)} ({playback.moves[k].place})"
@@ -128,6 +133,14 @@ def _last_digit(move: ReadMove, takes: float, wanted: float | None = None) -> fl
     return time * speed.digit / slower if slower > 0.0 else np.inf
 
 
+def _coarse(move: ReadMove, takes: float, digit: float) -> str:
+    """Return what to say of a speed whose last digit is much of the time of a move."""
+    return (
+        f"; one more in the last digit of its speed changes the {takes:.2g} s of {move.place} by "
+        f"{digit:.2g} s: a higher {keys.PROCESS_FEED}, or {keys.PROGRAM_MOTION}: straight, may help"
+    )
+
+
 def _pass_time(written: TimedMotion, requested: TimedMotion, moves: list[int]) -> Iterator[Finding]:
     wanted, takes = requested.duration[moves].sum(), written.duration[moves].sum()
     if abs(takes - wanted) > PASS_TIME_TOLERANCE * wanted:
@@ -141,5 +154,5 @@ def _finding(
 ) -> Finding:
     factor = wanted / max(float(written.duration[k]), 1e-9)
     place = f"{written.motion.place(k)} ({playback.moves[k].place})"
-    message = f"{factor:.2g} times {speed} that the job asks for"
+    message = f"{factor:.2g} times {speed}"
     return Finding(Level.ERROR, "speed", place, message)

@@ -12,8 +12,11 @@ FEED = 0.02  # [m/s]
 NOWHERE = np.full(6, np.nan)
 
 
-def found(wanted, takes, distance, cause=Cause.NEIGHBOUR):
-    """Return what is told of the moves of a pass that end between two cutter points."""
+def found(wanted, takes, distance, cause=Cause.NEIGHBOUR, digits=None):
+    """Return what is told of the moves of a pass that end between two cutter points.
+
+    Their speeds are written as times, with last digits in [s].
+    """
     n = len(wanted) + 2
     kinds = (MoveKind.GRIND, *[MoveKind.BETWEEN] * (n - 1))
     q = np.linspace(0.0, 0.1, n)[:, None] * np.ones(6)
@@ -25,9 +28,15 @@ def found(wanted, takes, distance, cause=Cause.NEIGHBOUR):
     timing = Timing(
         asked, np.array([0.0, 1.0 * FEED, *distance]), (cause,) * n, np.full(n, -1), 1.0
     )
-    speed = WrittenSpeed(SpeedUnit.SECONDS, 1.0, "1 s")
-    move = ReadMove(q[0], False, speed, Corner(1.0, "1"), "", "line", NOWHERE)
-    playback = Playback(q, written.duration, np.arange(n), (move,) * n, ())
+    speeds = [
+        WrittenSpeed(SpeedUnit.SECONDS, 1.0, "1 s", digit)
+        for digit in (0.0, 0.0, *(digits or [0.0] * len(wanted)))
+    ]
+    moves = tuple(
+        ReadMove(q[0], False, speed, Corner(1.0, "1"), "", f"line {k}", NOWHERE)
+        for k, speed in enumerate(speeds)
+    )
+    playback = Playback(q, written.duration, np.arange(n), moves, ())
     told = [one.message for one in speed_findings(written, timing, playback, FEED)]
     return [message for message in told if "times the feed" in message]  # not the pass as a whole
 
@@ -40,6 +49,15 @@ def test_a_move_shorter_than_places_are_known_is_not_too_fast():
 def test_many_such_moves_are_as_fast_as_one_long_move():
     assert found([0.1], [0.05], [1e-3]) == ["2 times the feed that the job asks for"]
     assert found([0.004] * 25, [0.002] * 25, [4e-5] * 25)
+
+
+def test_a_speed_of_few_digits_that_others_make_up_for_is_named():
+    (message,) = found([3.0, 0.3], [2.0, 0.9], [6e-2, 6e-3], digits=[1.0, 0.01])
+    assert message == (
+        "0.33 times the feed that the job asks for; one more in the last digit of its speed "
+        "changes the 2 s of line 2 by 1 s: a higher process.feed_mm_s, or program.motion: "
+        "straight, may help"
+    )
 
 
 def test_a_slow_neighbour_excuses_no_more_than_any_other_limit():
