@@ -100,6 +100,14 @@ HEAD = (
 )
 
 
+def revision() -> str:
+    """Return the commit that is measured."""
+    return subprocess.run(
+        ["git", "describe", "--always", "--dirty"],
+        capture_output=True, text=True, cwd=Path(__file__).parent, check=False,
+    ).stdout.strip()  # fmt: skip
+
+
 def page(seed: int, outcomes: Sequence[Outcome]) -> str:
     """Return the results of a seed as a page of Markdown."""
     searched = [one for one in outcomes if one.status in SEARCHED]
@@ -109,10 +117,6 @@ def page(seed: int, outcomes: Sequence[Outcome]) -> str:
     unproven = [one for one in searched if one.bound_rad is None]
     again = Counter(one.status for one in outcomes if one.status not in SEARCHED)
     slowest = max((one.search_s for one in outcomes), default=0.0)
-    revision = subprocess.run(
-        ["git", "describe", "--always", "--dirty"],
-        capture_output=True, text=True, cwd=Path(__file__).parent, check=False,
-    ).stdout.strip()  # fmt: skip
     versions = ", ".join(f"{name} {version(name)}" for name in LIBRARIES)
     drawn_again = ", ".join(f"{count} {status}" for status, count in sorted(again.items()))
     return "\n".join(
@@ -128,9 +132,9 @@ def page(seed: int, outcomes: Sequence[Outcome]) -> str:
             f"{len(without_path)} without a path, {len(unproven)} without a bound; slowest "
             f"{slowest:.1f} s of all drawn. Drawn again: {drawn_again or 'none'}.",
             "",
-            f"opl {opl.__version__} at {revision}, Python {platform.python_version()}, {versions}; "
-            f"{os.cpu_count()} processors. Search: wall clock of search and clearance; processor: "
-            "that of both; total: wall clock from the job file on.",
+            f"opl {opl.__version__} at {revision()}, Python {platform.python_version()}, "
+            f"{versions}; {os.cpu_count()} processors. Search: wall clock of search and clearance; "
+            "processor: that of both; total: wall clock from the job file on.",
             "",
             HEAD,
             *map(row, outcomes),

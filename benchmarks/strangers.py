@@ -101,9 +101,11 @@ def _program(job: opl.Job, out: Path, watch: opl.Watch) -> Facts:
     return facts
 
 
-def _serve(pipe: Connection, whole: bool, threads: int) -> None:
+def _serve(pipe: Connection, whole: bool, threads: int, begin: Callable[[], None] | None) -> None:
     """Run the jobs that come through a pipe, until None comes."""
     use_threads(threads)
+    if begin is not None:
+        begin()
     while (path := pipe.recv()) is not None:
         clock = Clock()
         facts: Facts
@@ -126,10 +128,11 @@ class Worker:
     Args:
         whole: Whether jobs are run to their end, not only to their path.
         threads: How many threads it may use.
+        begin: Called in it before any job, if given.
     """
 
-    def __init__(self, whole: bool, threads: int) -> None:
-        self._given = whole, threads
+    def __init__(self, whole: bool, threads: int, begin: Callable[[], None] | None) -> None:
+        self._given = whole, threads, begin
         self._start()
 
     def _start(self) -> None:
@@ -167,6 +170,7 @@ def run_strangers(
     workers: int,
     whole: bool,
     done: Callable[[Outcome], None],
+    begin: Callable[[], None] | None = None,
 ) -> None:
     """Draw jobs and run them side by side.
 
@@ -177,10 +181,11 @@ def run_strangers(
         workers: How many are run at once.
         whole: Whether jobs are run to their end, not only to their path.
         done: Called with each draw as it ends, never twice at once.
+        begin: Called in each worker before any job, if given.
     """
     idle: SimpleQueue[Worker] = SimpleQueue()
     for _ in range(workers):
-        idle.put(Worker(whole, max((os.cpu_count() or 1) // workers, 1)))
+        idle.put(Worker(whole, max((os.cpu_count() or 1) // workers, 1), begin))
     lock = Lock()
 
     def run(job: Sequence[Draw]) -> None:

@@ -5,6 +5,8 @@ import sys
 from benchmarks.measuring import MICRO, SECOND, Row, Timing, timed, timed_process
 from benchmarks.results import FILE, PLOT, write_results
 from benchmarks.stranger_table import Outcome, page
+from benchmarks.without import PARTS
+from benchmarks.without import page as page_without
 
 
 def row(name, seconds, unit=SECOND):
@@ -65,3 +67,25 @@ def test_a_page_of_strangers_counts_what_is_closed_and_what_has_no_bound():
     )
     assert "| 2.0 | cone | mh12 | upright | 0 in 0 | ok | no | 1.000 % |" in text
     assert "a wall / too few |" in text and "cutter point 3" not in text
+
+
+def test_what_is_left_out_of_the_proof_is_there():
+    for part in PARTS.values():
+        assert part.lines > 0
+        for owner, attribute, other in part.instead:
+            assert callable(getattr(owner, attribute)) and callable(other)
+
+
+def test_a_page_without_a_part_counts_what_was_closed_with_everything():
+    def outcomes(*gaps):
+        facts = [{} if gap is None else {"sum_rad": 1.0, "bound_rad": 1.0 - gap} for gap in gaps]
+        status = ["not found" if gap is None else "ok" for gap in gaps]
+        found = [stranger(k, status[k], processor_s=2.0, **facts[k]) for k in range(len(gaps))]
+        return {(one.index, one.attempt): one for one in found}
+
+    text = page_without(
+        7, {"nothing": outcomes(0.0, 0.001, 0.0, 0.3), "hope": outcomes(0.0, None, 0.05, 0.0)}
+    )
+    assert "Of the 3 random jobs" in text
+    assert "| nothing | - | 3 | 0 | - | 6 | - |" in text
+    assert f"| {PARTS['hope'].lines} | 1 | 1 | 5.0 % | 6 | 1.0, 2.0 |" in text
