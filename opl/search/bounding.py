@@ -6,7 +6,7 @@ import numpy as np
 
 from opl.files.kernels import kernel
 from opl.search.outside import nearest_on_chord
-from opl.search.relaxation import ROUND_OFF, pressed
+from opl.search.relaxation import ROUND_OFF
 
 MOST_ROUNDS = 12  # of cutting spans off; more would cut little
 STILL = 1e-6  # [rad] a core that grows by less in a round has stopped growing
@@ -117,59 +117,6 @@ def tighten(cells, spans, pass_index, n_keys, limits, low, high, closing, sizes)
             return 0
         if change < STILL:
             break
-    return n
-
-
-@kernel("float64(float64[:,::1],int64,float64[::1],float64[::1],float64[::1])")
-def _pressed(cells, cell, prices, low, high):  # type: ignore[no-untyped-def]
-    """Return how far a cell presses the faces of a core outwards at the least, at their prices."""
-    start, end = 0.0, 0.0
-    for f in range(12):
-        if prices[f] > 0.0:
-            start += prices[f] * pressed(cells, cell, 0, f, low, high)
-            end += prices[f] * pressed(cells, cell, 1, f, low, high)
-    return min(start, end)
-
-
-@kernel(
-    "int64(float64[:,::1],int64[:,::1],int64,float64[:,::1],float64[::1],float64[::1],float64)",
-    early=True,
-)
-def trim(cells, spans, n_walls, prices, low, high, left):  # type: ignore[no-untyped-def]
-    """Cut cells off the ends of spans that no box below a size can hold; return how many are left.
-
-    At the prices of a linear program each wall adds to the bound what its cheapest cell does, and
-    whoever takes another cell of it pays the difference. 0 if a wall has no cell left.
-
-    Args:
-        cells: The table of `Cells`.
-        spans: Sorted by their walls; those left become shorter and are moved to the front.
-        n_walls: How many walls.
-        prices: As of `least_box`, shape (n_walls, 12).
-        low: The lower faces of the box are not above these, in [rad], shape (6,).
-        high: The upper faces are not below these.
-        left: From the bound at these prices to the size, in [rad].
-    """
-    n, k = 0, 0
-    for wall in range(n_walls):
-        start, least, before = k, np.inf, n
-        while k < len(spans) and spans[k, 0] == wall:
-            for cell in range(spans[k, 3], spans[k, 4]):
-                least = min(least, _pressed(cells, cell, prices[wall], low, high))
-            k += 1
-        most = least + left + ROUND_OFF
-        for i in range(start, k):
-            first, end = spans[i, 3], spans[i, 4]
-            while first < end and _pressed(cells, first, prices[wall], low, high) >= most:
-                first += 1
-            while first < end and _pressed(cells, end - 1, prices[wall], low, high) >= most:
-                end -= 1
-            if first < end:
-                spans[n] = spans[i]
-                spans[n, 3], spans[n, 4] = first, end
-                n += 1
-        if n == before:
-            return 0
     return n
 
 

@@ -16,7 +16,7 @@ from copy import copy
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.search.bounding import tighten, trim
+from opl.search.bounding import tighten
 from opl.search.box import JointBox
 from opl.search.branching import parts, where_to_split
 from opl.search.cells import END, FIRST, KEY, WALL, Cells
@@ -27,13 +27,11 @@ from opl.search.subproblems import Candidate, Relaxation, Subproblem
 from opl.search.walls import Image, Piece, Wall
 
 SETTLED = 0.04  # of the gap wanted: what the bend of the spans may lose where none is split further
-MOST_TRIMS = 3  # of spans, before one is split
 NUMBERS_OF_A_CELL = 200  # worked on to cut off what no box can hold
 NUMBERS_OF_A_SOURCE = 6  # that it is worth to tell whether a box can hold a piece in one image
 NUMBERS_OF_AN_ENTRY = 2500  # that entering a cell into the table is worth
 MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
-TRIMMED = 0.9  # of the cells: more left, and trimming goes on no longer
 FURTHER = 1.5  # times a size: cells are at hand for boxes up to there
 FEWEST_UNSEEN = 8  # subproblems split before a box is shown that is not settled
 FEWEST_BEFORE_ANEW = 256  # subproblems of a tree that is begun anew for walls added since
@@ -263,26 +261,19 @@ class BoxProof:
         sizes, lost, place = np.empty(n_walls), np.empty(n_walls), np.empty((n_walls, 2))
         box, prices = np.empty((2, 6)), np.empty((n_walls, 12))
         limits = np.array([(one.lower, one.upper) for one in self._limits_of(spans)])
-        for _ in range(MOST_TRIMS):
-            self.work += NUMBERS_OF_A_CELL * float((spans[:, END] - spans[:, FIRST]).sum())
-            passes = cells.pass_index[:n_walls], cells.n_keys
-            spans = spans[: tighten(table, spans, *passes, limits, low, high, closing, sizes)]
-            if not len(spans):
-                return False
-            few = spans[self._few_cells(spans)]
-            bound, numbers = least_box(
-                table, few, n_walls, low, high, closing, box, place, lost, prices
-            )
-            self.work += numbers
-            node.bound = max(node.bound, bound, float(sizes.max()))
-            if node.bound >= closing:
-                return False
-            before = (spans[:, END] - spans[:, FIRST]).sum()
-            spans = spans[: trim(table, spans, n_walls, prices, low, high, closing - bound)]
-            if not len(spans):
-                return False
-            if (spans[:, END] - spans[:, FIRST]).sum() > TRIMMED * before:
-                break
+        self.work += NUMBERS_OF_A_CELL * float((spans[:, END] - spans[:, FIRST]).sum())
+        passes = cells.pass_index[:n_walls], cells.n_keys
+        spans = spans[: tighten(table, spans, *passes, limits, low, high, closing, sizes)]
+        if not len(spans):
+            return False
+        few = spans[self._few_cells(spans)]
+        bound, numbers = least_box(
+            table, few, n_walls, low, high, closing, box, place, lost, prices
+        )
+        self.work += numbers
+        node.bound = max(node.bound, bound, float(sizes.max()))
+        if node.bound >= closing:
+            return False
         node.spans, node.n_walls, node.low, node.high = spans, n_walls, low, high
         node.found = Relaxation(box[0], box[1], place, lost, closing, cells.changes)
         return True
