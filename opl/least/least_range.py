@@ -12,7 +12,7 @@ from opl.planning.problem import GrindingProblem
 from opl.planning.settings import OptimalSettings
 from opl.walls.images import Seams
 
-# of the work, and all that is left: a motion sought in another way, where the proof found none
+# of the work at the least: a motion sought in another way, where the proof found none
 OTHERWISE_SHARE = 0.3
 
 
@@ -66,7 +66,8 @@ def plan_optimal(
 
     go_on(share)
     if search.plan is None and otherwise is not None:
-        search.keep(otherwise((1.0 - search.work_share) * settings.max_subproblems))
+        left = max(OTHERWISE_SHARE, 1.0 - search.work_share)  # a step may take more than was left
+        search.keep(otherwise(left * settings.max_subproblems))
         go_on(1.0)
     if search.plan is None:
         robot, least = problem.cell.robot, search.lower_bound
