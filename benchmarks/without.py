@@ -129,12 +129,13 @@ def page(seed: int, found: Mapping[str, Mapping[Draw, Outcome]]) -> str:
     """Return the table as a page of Markdown; what was found with everything comes first."""
     everything, *others = found
     among = {key for key, one in found[everything].items() if one.closed}
+    count = 1 + max(index for index, _ in found[everything])
     return "\n".join(
         [
             f"# The proof without one of its parts, seed {seed}",
             "",
-            f"Written by `python -m benchmarks.without --seed {seed}`, opl {opl.__version__} at "
-            f"{revision()}. Of the {len(among)} random jobs that are closed with everything: how "
+            f"Written by `python -m benchmarks.without --seed {seed} --count {count}`, opl "
+            f"{opl.__version__} at {revision()}. Of the {len(among)} random jobs that are closed with everything: how "
             "many still are without a part, how many of the others have no motion at all (or took "
             f"more than {LONGEST:g} s), the largest gap of the rest, and the processor time of "
             "search and clearance of all of them, side by side with others.",
