@@ -135,9 +135,10 @@ def page(seed: int, found: Mapping[str, Mapping[Draw, Outcome]]) -> str:
             f"# The proof without one of its parts, seed {seed}",
             "",
             f"Written by `python -m benchmarks.without --seed {seed} --count {count}`, opl "
-            f"{opl.__version__} at {revision()}. Of the {len(among)} random jobs that are closed with everything: how "
-            "many still are without a part, how many of the others have no motion at all (or took "
-            f"more than {LONGEST:g} s), the largest gap of the rest, and the processor time of "
+            f"{opl.__version__} at {revision()}. Of the {len(among)} random jobs that are closed "
+            "with everything: how many still are without a part, how many of the others have no "
+            f"motion at all (or took more than {LONGEST:g} s), the largest gap of the rest, and "
+            "the processor time of "
             "search and clearance of all of them, side by side with others.",
             "",
             "| without | lines of its own | closed | no motion | largest gap | processor, s "
