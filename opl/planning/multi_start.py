@@ -92,9 +92,9 @@ def only_apart(problem: GrindingProblem, matrices: list[OpenMatrix]) -> bool:
 
 
 def held_back(problem: GrindingProblem, matrices: list[OpenMatrix]) -> bool:
-    """Return whether all would lead through a matrix were the contact to move as far as it likes.
+    """Return whether it is the largest change of t alone that lets no track through any matrix.
 
-    Then contact positions between those of the field may do as well.
+    Then tracks at contact positions between those of the field may keep it.
     """
     if problem.interpolation.max_contact_change >= np.ptp(problem.field.contact_positions):
         return False

@@ -166,7 +166,11 @@ def _where_it_ended(n_points: int, matrices: list[OpenMatrix]) -> list[str]:
         ladder = farthest.ladder
         most = float(ladder.contact_changes.min(initial=np.inf))
         slow = most < np.ptp(ladder.contact_position)
-        further = f", the contact move by more than {most:g} between cutter points" if slow else ""
+        further = (
+            f", the contact move by more than {most:g} mm or deg between cutter points"
+            if slow
+            else ""
+        )
         lines.append(
             f"no continuous edge leads on: the arm would have to change its IK branch{further} or "
             "jump; a wider range of contact positions or a turned fixture may help"
