@@ -32,15 +32,16 @@ def _within_limits(cells, cell, low, high, limits):  # type: ignore[no-untyped-d
 
 
 @kernel(
-    "int64(float64[:,::1],int64[:,::1],int64[::1],int64,float64[:,:,::1],"
+    "int64(float64[:,::1],float64[:,::1],int64[:,::1],int64[::1],int64,float64[:,:,::1],"
     "float64[::1],float64[::1],float64,float64[::1])",
     early=True,
 )
-def tighten(cells, spans, pass_index, n_keys, limits, low, high, closing, sizes):  # type: ignore[no-untyped-def]
+def tighten(cells, turns, spans, pass_index, n_keys, limits, low, high, closing, sizes):  # type: ignore[no-untyped-def]
     """Cut off what no box below a size can hold; return how many spans are left, 0 if none can be.
 
     Args:
         cells: The table of `Cells`.
+        turns: What the cells of each source are shifted by.
         spans: Sorted by their walls; those left are moved to the front, shape (n, 5).
         pass_index: Of each wall, shape (k,).
         n_keys: Number of keys.
@@ -59,22 +60,25 @@ def tighten(cells, spans, pass_index, n_keys, limits, low, high, closing, sizes)
     for wall in range(n_walls):
         walls_of[pass_index[wall]] += 1
     least, most = np.empty(6), np.empty(6)
+    below, above = np.empty(6), np.empty(6)  # the core, as seen from a span that is not shifted
     for _ in range(MOST_ROUNDS):
         change, left, k = 0.0, 0, 0
         for wall in range(n_walls):
             before, smallest = left, np.inf
             least[:], most[:] = np.inf, -np.inf
             while k < n and spans[k, 0] == wall:
-                begin, stop = -1, -1
+                begin, stop, turn = -1, -1, turns[spans[k, 2]]
+                for j in range(6):
+                    below[j], above[j] = low[j] - turn[j], high[j] - turn[j]
                 for cell in range(spans[k, 3], spans[k, 4]):
                     size = 0.0
                     for j in range(6):
                         a, b = cells[cell, j], cells[cell, 6 + j]
-                        edge = max(min(a, b) + cells[cell, 12 + j], high[j]) - min(
-                            max(a, b) + cells[cell, 18 + j], low[j]
+                        edge = max(min(a, b) + cells[cell, 12 + j], above[j]) - min(
+                            max(a, b) + cells[cell, 18 + j], below[j]
                         )
                         size += max(edge, 0.0)
-                    if size < closing and _within_limits(cells, cell, low, high, limits):
+                    if size < closing and _within_limits(cells, cell, below, above, limits):
                         if begin < 0:
                             begin = cell
                         stop = cell + 1
@@ -83,8 +87,8 @@ def tighten(cells, spans, pass_index, n_keys, limits, low, high, closing, sizes)
                     for cell in range(begin, stop):
                         for j in range(6):
                             a, b = cells[cell, j], cells[cell, 6 + j]
-                            least[j] = min(least[j], min(a, b) + cells[cell, 12 + j])
-                            most[j] = max(most[j], max(a, b) + cells[cell, 18 + j])
+                            least[j] = min(least[j], min(a, b) + cells[cell, 12 + j] + turn[j])
+                            most[j] = max(most[j], max(a, b) + cells[cell, 18 + j] + turn[j])
                     for i in range(3):
                         spans[left, i] = spans[k, i]
                     spans[left, 3], spans[left, 4] = begin, stop
@@ -120,11 +124,17 @@ def tighten(cells, spans, pass_index, n_keys, limits, low, high, closing, sizes)
     return n
 
 
-@kernel("float64[::1](float64[:,::1],int64[:,::1],float64[::1],float64[::1])", early=True)
-def distances(cells, spans, low, high):  # type: ignore[no-untyped-def]
-    """Return by how much a box misses the chords of each span, shape (n, 5), in [rad]."""
+@kernel(
+    "float64[::1](float64[:,::1],float64[:,::1],int64[:,::1],float64[::1],float64[::1])",
+    early=True,
+)
+def distances(cells, turns, spans, low, high):  # type: ignore[no-untyped-def]
+    """Return by how much a box misses the chords of each span, shape (n,), in [rad]."""
     found = np.empty(len(spans))
+    below, above = np.empty(6), np.empty(6)
     for k in range(len(spans)):
+        for j in range(6):
+            below[j], above[j] = low[j] - turns[spans[k, 2], j], high[j] - turns[spans[k, 2], j]
         # what is nearest by its joints, each for itself, soon rules out the others
         nearest, least, best = -1, np.inf, np.inf
         for cell in range(spans[k, 3], spans[k, 4]):
@@ -133,15 +143,15 @@ def distances(cells, spans, low, high):  # type: ignore[no-untyped-def]
             away = 0.0
             for j in range(6):
                 a, b = cells[cell, j], cells[cell, 6 + j]
-                away += max(min(a, b) - high[j], 0.0) + max(low[j] - max(a, b), 0.0)
+                away += max(min(a, b) - above[j], 0.0) + max(below[j] - max(a, b), 0.0)
             if away < least:
                 nearest, least = cell, away
         if nearest >= 0:
-            best, _ = nearest_on_chord(cells[nearest, :6], cells[nearest, 6:12], low, high, best)
+            best, _ = nearest_on_chord(cells[nearest, :6], cells[nearest, 6:12], below, above, best)
         for cell in range(spans[k, 3], spans[k, 4]):
             if best == 0.0:
                 break
             if cells[cell, 12] <= 0.0 and cell != nearest:
-                best, _ = nearest_on_chord(cells[cell, :6], cells[cell, 6:12], low, high, best)
+                best, _ = nearest_on_chord(cells[cell, :6], cells[cell, 6:12], below, above, best)
         found[k] = best
     return found

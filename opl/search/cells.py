@@ -1,9 +1,8 @@
 """The cells of walls in one table, and the runs of them that a subproblem is about.
 
-A row of the table is a cell in one image: joint positions at its two ends, how far below and above
-the chord the postures can be, and its ends along the wall. A run of cells is a span. Where parts of
-cells are beyond the limits of joints, or turn out to be forbidden, their rows are made shorter, for
-all subproblems at once.
+A run of cells in one image is a span. Images that only full turns tell apart share rows of the
+table, and each has the turns that its spans are shifted by. Where parts of cells turn out to be
+forbidden, their rows are made shorter, for all subproblems at once.
 """
 
 from __future__ import annotations
@@ -15,26 +14,23 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
+from opl.search.cell_rows import COLUMNS, rows_of
 from opl.search.forbidden import Forbidden
-from opl.search.limit_cuts import within_limits
-from opl.search.reach import Reach, around_families, ends_of
-from opl.search.walls import Image, Piece, Wall
+from opl.search.reach import Reach, around_families
+from opl.search.walls import FLIPS, Image, Moves, Piece, Wall
 
-COLUMNS = 26  # start 0:6, end 6:12, pad_low 12:18, pad_high 18:24, places 24 and 25
 WALL, KEY, SOURCE, FIRST, END = range(5)  # columns of a span
-# columns of a source: its piece, number of its image, whether the whole motion has the wrist
-# flipped, its cells, the first -1 where they are not in the table yet, its kind (family, side and
-# image), and which flip of its piece the robot makes
-PIECE, IMAGE, MIRRORED, FIRST_CELL, N_CELLS, KIND, FLIP = range(7)
+IMAGE, ROWS, N_CELLS, KIND = range(4)  # columns of a source; its kind: family, side and image
+ROWS_OF_A_PIECE = FLIPS * FLIPS  # for each flip of its image, and of the wrist of the whole motion
 Key = tuple[int, tuple[int, ...], int]  # a family, the key of its image, and the side
-FORBIDDEN = 1e3  # [rad] presses on every face of any box by more than is of interest
 
 
 class Cells:
     """All cells that some subproblem is about; grows.
 
     Args:
-        images: The images of each family, the family itself first.
+        images: The images of each family, the family itself first. Only full turns tell those
+            with the same flip apart.
         cut: Cuts a cell of a wall into smaller ones.
         forbidden: Tells which parts of cells are forbidden; None to allow all.
         limits: As of `BoxProof`; what is beyond all of them is no part of a cell.
@@ -44,7 +40,7 @@ class Cells:
         walls: The walls.
         pass_index: The pass of each.
         table: The cells, shape (capacity, 26); rows not in use are at its end.
-        entered: How many cells were entered into the table, again or for the first time.
+        turns: What the cells of each source are shifted by in [rad], shape (capacity, 6).
         changes: How often cells in the table became shorter.
         reach: Tells which images are left out.
     """
@@ -67,20 +63,21 @@ class Cells:
         self.table = np.empty((1024, COLUMNS))
         self._used = 0
         self._keys: dict[Key, int] = {}
-        # a source is a piece in one image; those of a piece follow each other
+        # a source is a piece in one image
         self._pieces: list[Piece] = []
-        self._sources_of: list[slice] = []
-        self._sources = np.empty((1024, 7), dtype=np.int64)
+        self._sources = np.empty((1024, 4), dtype=np.int64)
+        self.turns = np.empty((1024, 6))
         self._n_sources = 0
-        # of each family sign, shift and flip of its images
-        self._moves: dict[int, tuple[Array, Array, np.ndarray]] = {}
+        # where rows begin in the table, -1 where they are not entered yet
+        self._first_cell = np.empty(0, dtype=np.int64)
+        self._moves: dict[int, Moves] = {}
         self._first_kind: dict[tuple[int, int], int] = {}  # of a family and side
         self._key_of_kind = np.empty(0, dtype=np.int64)  # number of its key, -1 where none has it
         # sources, their kinds, and boxes around them
         self._of_wall: list[tuple[np.ndarray, np.ndarray, Array, Array]] = []
         self._finer: dict[tuple[int, int], np.ndarray] = {}
         self._looks: dict[tuple[int, int], np.ndarray] = {}  # at the cells of a flip of a piece
-        self.entered = self.changes = 0
+        self.changes = 0
 
     @property
     def n_keys(self) -> int:
@@ -92,14 +89,16 @@ class Cells:
         first, low, high = self._n_sources, [np.empty((0, 6))], [np.empty((0, 6))]
         both = np.arange(1 if self._forbidden is None else self._forbidden.n_flips)
         around = around_families(wall.pieces)
-        near = {one: self.reach.near(around, one, *self._moves_of(one)[:2]) for one in around}
-        for piece in wall.pieces:
-            numbers = near[piece.family]
-            sign, shift, _ = (of[numbers] for of in self._moves_of(piece.family))
-            moved = np.repeat(sign[:, None] * ends_of(piece) + shift[:, None], len(both), axis=0)
-            low.append(moved.min(axis=1))
-            high.append(moved.max(axis=1))
-            self._new_sources(piece, np.repeat(numbers, len(both)), np.tile(both, len(numbers)))
+        for family in around:
+            pieces = [piece for piece in wall.pieces if piece.family == family]
+            moves = self._moves_of(family)
+            numbers = self.reach.near(around, family, moves.sign, moves.shift)
+            sign, shift = moves.sign[numbers, None], moves.shift[numbers, None]
+            moved = sign * np.array([piece.ends for piece in pieces])[:, None] + shift
+            moved = moved.reshape(-1, 2, 6)
+            low.append(np.repeat(moved.min(axis=1), len(both), axis=0))
+            high.append(np.repeat(moved.max(axis=1), len(both), axis=0))
+            self._note(pieces, np.repeat(numbers, len(both)), np.tile(both, len(numbers)))
         sources = np.arange(first, self._n_sources)
         kinds = self._sources[sources, KIND]
         self._of_wall.append((sources, kinds, np.concatenate(low), np.concatenate(high)))
@@ -121,7 +120,7 @@ class Cells:
 
     def mirrored(self, spans: np.ndarray) -> bool:
         """Return whether spans are of whole motions with the wrist flipped."""
-        return bool(self._sources[spans[0, SOURCE], MIRRORED])
+        return bool(self._sources[spans[0, SOURCE], ROWS] % FLIPS)
 
     def spans_of(
         self,
@@ -144,7 +143,7 @@ class Cells:
             # the whole motion has images: of these the first is looked at, and its flip
             kept = self._sources[sources, IMAGE] == 0
         else:
-            kept = self._sources[sources, MIRRORED] == mirrored
+            kept = self._sources[sources, ROWS] % FLIPS == mirrored
         edges = np.maximum(least, high) - np.minimum(most, low)
         kept &= np.maximum(edges, 0.0).sum(axis=1) < closing
         return self._spans(wall, sources[kept])
@@ -158,10 +157,11 @@ class Cells:
         wall, _, source, cell, _ = span.tolist()
         at = source, cell
         if at not in self._finer:
-            number, image, mirrored, first = self._sources[source, : FIRST_CELL + 1].tolist()
-            begin = self._n_sources
-            for smaller in self._cut(self._pieces[number], cell - first):
-                self._new_sources(smaller, np.array([image]), np.array([mirrored]))
+            image, rows, _, _ = self._sources[source].tolist()
+            begin, first_cell = self._n_sources, int(self._first_cell[rows])
+            smaller = self._cut(self._piece(rows), cell - first_cell)
+            if smaller:
+                self._note(smaller, np.array([image]), np.array([rows % FLIPS]))
             self._finer[at] = self._spans(wall, np.arange(begin, self._n_sources))
         return self._finer[at]
 
@@ -176,20 +176,20 @@ class Cells:
             return False
         before = self.changes
         for _, _, source, first, end in spans.tolist():
-            number, _, _, first_cell, _, _, flip = self._sources[source].tolist()
-            piece = self._pieces[number]
+            rows = int(self._sources[source, ROWS])
+            number, flip = rows // ROWS_OF_A_PIECE, _flip_made(rows)
+            piece, first_cell = self._piece(rows), int(self._first_cell[rows])
             cells = slice(first - first_cell, end - first_cell)
             looked = self._looks.setdefault((number, flip), np.zeros(len(piece.pad_low), int))
             if (looked[cells] >= looks).all():
                 continue
             looked[cells] = looks
-            rows = self.table[first:end]
-            known = rows.copy()
+            known = self.table[first:end].copy()
             self._forbidden.clear(piece, flip, cells.start, cells.stop, looks)
-            same = self._sources_of[number]
-            alike = (self._sources[same, FLIP] == flip) & (self._sources[same, FIRST_CELL] >= 0)
-            self._enter(same.start + np.flatnonzero(alike))
-            self.changes += int((rows != known).any())
+            same = range(number * ROWS_OF_A_PIECE, (number + 1) * ROWS_OF_A_PIECE)
+            alike = [one for one in same if _flip_made(one) == flip]
+            self._enter([one for one in alike if self._first_cell[one] >= 0])
+            self.changes += int((self.table[first:end] != known).any())
         return self.changes > before
 
     def reaching(self, reach: float) -> Cells:
@@ -199,12 +199,9 @@ class Cells:
             others.add(wall)
         return others
 
-    def _moves_of(self, family: int) -> tuple[Array, Array, np.ndarray]:
-        """Return sign, shift, shape (n, 6), and flip, shape (n,), of the images of a family."""
+    def _moves_of(self, family: int) -> Moves:
         if family not in self._moves:
-            images = self._images(family)
-            sign, shift = np.array([image.sign for image in images]), [one.shift for one in images]
-            self._moves[family] = sign, np.array(shift), np.array([one.flip for one in images])
+            self._moves[family] = Moves.of(self._images(family))
         return self._moves[family]
 
     def _kinds_of(self, family: int, side: int) -> int:
@@ -215,79 +212,77 @@ class Cells:
             self._key_of_kind = np.concatenate([self._key_of_kind, more])
         return self._first_kind[family, side]
 
-    def _new_sources(self, piece: Piece, numbers: np.ndarray, mirrored: np.ndarray) -> None:
-        """Note a piece in some of its images."""
-        first, end = self._n_sources, self._n_sources + len(numbers)
-        self._sources = _with_room(self._sources, end)
-        new = self._sources[first:end]
-        new[:, PIECE], new[:, IMAGE], new[:, MIRRORED] = len(self._pieces), numbers, mirrored
-        new[:, FIRST_CELL], new[:, N_CELLS] = -1, len(piece.pad_low)
-        new[:, KIND] = self._kinds_of(piece.family, piece.side) + numbers
-        # the one that the robot makes
-        new[:, FLIP] = self._moves_of(piece.family)[2][numbers] ^ mirrored
-        self._pieces.append(piece)
-        self._sources_of.append(slice(first, end))
+    def _note(self, pieces: Sequence[Piece], numbers: np.ndarray, mirrored: np.ndarray) -> None:
+        """Note pieces of one family as sources, each in some of its images.
+
+        Args:
+            pieces: The pieces.
+            numbers: Of the images, shape (n,).
+            mirrored: Whether the whole motion has the wrist flipped, likewise.
+        """
+        moves = self._moves_of(pieces[0].family)
+        own = np.arange(len(self._pieces), len(self._pieces) + len(pieces))
+        image = np.tile(numbers, len(pieces))
+        rows = (ROWS_OF_A_PIECE * own[:, None] + FLIPS * moves.flip[numbers] + mirrored).ravel()
+        n_cells = np.repeat([len(piece.pad_low) for piece in pieces], len(numbers))
+        first_kind = [self._kinds_of(piece.family, piece.side) for piece in pieces]
+        kind = np.repeat(first_kind, len(numbers)) + image
+        first, end = self._n_sources, self._n_sources + len(image)
+        self._sources, self.turns = _with_room(self._sources, end), _with_room(self.turns, end)
+        self._sources[first:end] = np.stack([image, rows, n_cells, kind], axis=1)
+        self.turns[first:end] = moves.shift[image] - moves.shift[moves.first[moves.flip[image]]]
+        self._pieces += pieces
+        missing = np.full(len(pieces) * ROWS_OF_A_PIECE, -1, dtype=np.int64)
+        self._first_cell = np.concatenate([self._first_cell, missing])
         self._n_sources = end
 
     def _spans(self, wall: int, sources: np.ndarray) -> np.ndarray:
-        """Return whole pieces as spans; cells that are not in the table are entered."""
-        new = sources[self._sources[sources, FIRST_CELL] < 0]
-        if len(new):
-            n_cells = self._sources[new, N_CELLS]
-            self._sources[new, FIRST_CELL] = self._used + np.cumsum(n_cells) - n_cells
-            self._used += int(n_cells.sum())
-            self.table = _with_room(self.table, self._used)
-            self._name(new)
-            for number in np.unique(self._sources[new, PIECE]).tolist():
-                own = new[self._sources[new, PIECE] == number]
-                for flip in np.unique(self._sources[own, FLIP]).tolist():
-                    self._enter(own[self._sources[own, FLIP] == flip])
-        of = self._sources[sources]
-        ends = of[:, FIRST_CELL] + of[:, N_CELLS]
-        walls = np.full(len(sources), wall)
-        return np.stack(
-            [walls, self._key_of_kind[of[:, KIND]], sources, of[:, FIRST_CELL], ends], axis=1
-        )
+        """Return whole pieces as spans; rows that are not in the table are entered."""
+        rows, n_cells, kinds = self._sources[sources, 1:].T
+        new = np.unique(rows[self._first_cell[rows] < 0]).tolist()
+        for number in new:
+            self._first_cell[number] = self._used
+            self._used += len(self._piece(number).pad_low)
+        self.table = _with_room(self.table, self._used)
+        self._enter(new)
+        self._name(sources[self._key_of_kind[kinds] < 0])
+        walls, first = np.full(len(sources), wall), self._first_cell[rows]
+        return np.stack([walls, self._key_of_kind[kinds], sources, first, first + n_cells], axis=1)
 
     def _name(self, sources: np.ndarray) -> None:
         """Give the keys of sources their numbers."""
-        nameless = sources[self._key_of_kind[self._sources[sources, KIND]] < 0]
-        for number, image, kind in self._sources[nameless][:, [PIECE, IMAGE, KIND]].tolist():
-            piece = self._pieces[number]
+        for image, rows, _, kind in self._sources[sources].tolist():
+            piece = self._piece(rows)
             key = piece.family, self._images(piece.family)[image].key, piece.side
             self._key_of_kind[kind] = self._keys.setdefault(key, len(self._keys))
 
-    def _enter(self, sources: np.ndarray) -> None:
-        """Enter the cells of sources into the table, as far as they are not forbidden.
+    def _enter(self, numbers: Sequence[int]) -> None:
+        """Enter rows into the table, as far as they are not forbidden."""
+        alike: dict[tuple[int, int], list[int]] = {}
+        for number in numbers:
+            alike.setdefault((self._piece(number).family, number // FLIPS % FLIPS), []).append(
+                number
+            )
+        for (family, flip), own in alike.items():
+            moves, pieces = self._moves_of(family), [self._piece(number) for number in own]
+            sign, shift = moves.sign[moves.first[flip]], moves.shift[moves.first[flip]]
+            left = []
+            if self._forbidden is not None:
+                made = zip(pieces, map(_flip_made, own), strict=True)
+                left = [self._forbidden.clear(*one, 0, 0, 1) for one in made]
+            rows = rows_of(pieces, sign, shift, self._limits, left)
+            counts = [len(piece.pad_low) for piece in pieces]
+            before = np.cumsum(counts) - counts
+            at = np.repeat(self._first_cell[own] - before, counts) + np.arange(len(rows))
+            self.table[at] = rows
 
-        Those of one piece, which the robot makes with the same flip of the wrist.
-        """
-        piece = self._pieces[self._sources[sources[0], PIECE]]
-        sign, shift, _ = self._moves_of(piece.family)
-        number, n = self._sources[sources, IMAGE], len(piece.pad_low)
-        mirrored = sign[number, None] < 0.0
-        corners = piece.corners * sign[number, None] + shift[number, None]
-        start, end = corners[:, :-1], corners[:, 1:]
-        rows = np.empty((len(sources), n, COLUMNS))
-        rows[..., 0:6], rows[..., 6:12] = start, end
-        rows[..., 12:18] = np.where(mirrored, -piece.pad_high, piece.pad_low)
-        rows[..., 18:24] = np.where(mirrored, -piece.pad_low, piece.pad_high)
-        rows[..., 24], rows[..., 25] = piece.at[:-1], piece.at[1:]
-        low, high = within_limits(rows, self._limits)
-        if self._forbidden is not None:
-            flip = int(self._sources[sources[0], FLIP])
-            begin, until = self._forbidden.clear(piece, flip, 0, 0, 1)
-            low, high = np.maximum(low, begin), np.minimum(high, until)
-        none, step, along = low > high, end - start, np.diff(piece.at)
-        begins, ends = (low > 0.0) & ~none, (high < 1.0) & ~none
-        rows[begins, 0:6] += (low[..., None] * step)[begins]
-        rows[ends, 6:12] = (start + high[..., None] * step)[ends]
-        rows[none, 6:12] = start[none]
-        rows[none, 12:18], rows[none, 18:24] = FORBIDDEN, -FORBIDDEN
-        rows[..., 24] += np.where(none, 0.0, low * along)
-        rows[..., 25] -= np.where(none, 0.0, (1.0 - high) * along)
-        self.table[self._sources[sources, FIRST_CELL][:, None] + np.arange(n)] = rows
-        self.entered += len(sources) * n
+    def _piece(self, rows: int) -> Piece:
+        return self._pieces[rows // ROWS_OF_A_PIECE]
+
+
+def _flip_made(rows: int) -> int:
+    """Return which flip of a piece the robot makes, given its rows."""
+    return (rows // FLIPS ^ rows) % FLIPS
 
 
 def _with_room(table: Any, rows: int) -> Any:

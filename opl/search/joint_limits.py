@@ -12,7 +12,7 @@ import numpy as np
 from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
-from opl.search.cells import END, FIRST
+from opl.search.cells import END, FIRST, SOURCE
 
 TOUCHING = 1e-8  # [rad] of a limit
 UNLIMITED = (JointBox(np.full(6, -np.inf), np.full(6, np.inf)),)
@@ -31,7 +31,12 @@ def cut_at(box: JointBox, limits: Sequence[JointBox]) -> JointBox:
 
 
 def torn(
-    cells: Array, spans: np.ndarray, box: JointBox, limits: Sequence[JointBox], least: float
+    cells: Array,
+    shifts: Array,
+    spans: np.ndarray,
+    box: JointBox,
+    limits: Sequence[JointBox],
+    least: float,
 ) -> Array:
     """Return how far spans turn that reach a limit which a box is beyond most, shape (n,).
 
@@ -40,6 +45,7 @@ def torn(
 
     Args:
         cells: The table of `Cells`.
+        shifts: What the cells of each source are shifted by in [rad], its turns there.
         spans: The spans, shape (n, 5).
         box: The box.
         limits: As of `BoxProof`.
@@ -53,12 +59,12 @@ def torn(
     for near, excess in zip(turned, excesses, strict=True):
         face, joint = divmod(int(np.argmax(excess)), 6)
         limit = float((near.lower, near.upper)[face][joint])
-        _turns(cells, np.ascontiguousarray(spans), joint, limit, found)
+        _turns(cells, shifts, np.ascontiguousarray(spans), joint, limit, found)
     return found
 
 
-@kernel("void(float64[:,::1],int64[:,::1],int64,float64,float64[::1])")
-def _turns(cells, spans, joint, limit, found):  # type: ignore[no-untyped-def]
+@kernel("void(float64[:,::1],float64[:,::1],int64[:,::1],int64,float64,float64[::1])")
+def _turns(cells, shifts, spans, joint, limit, found):  # type: ignore[no-untyped-def]
     """Raise ``found`` to how far a joint turns over spans that reach a limit of it."""
     for k in range(len(spans)):
         low, high = np.inf, -np.inf
@@ -66,6 +72,7 @@ def _turns(cells, spans, joint, limit, found):  # type: ignore[no-untyped-def]
             start, stop = cells[cell, joint], cells[cell, 6 + joint]
             low = min(low, min(start, stop) + cells[cell, 12 + joint])
             high = max(high, max(start, stop) + cells[cell, 18 + joint])
+        low, high = low + shifts[spans[k, SOURCE], joint], high + shifts[spans[k, SOURCE], joint]
         if low <= limit + TOUCHING and high >= limit - TOUCHING:
             found[k] = max(found[k], high - low)
 

@@ -29,7 +29,6 @@ from opl.search.walls import Image, Piece, Wall
 SETTLED = 0.04  # of the gap wanted: what the bend of the spans may lose where none is split further
 NUMBERS_OF_A_CELL = 200  # worked on to cut off what no box can hold
 NUMBERS_OF_A_SOURCE = 6  # that it is worth to tell whether a box can hold a piece in one image
-NUMBERS_OF_AN_ENTRY = 2500  # that entering a cell into the table is worth
 MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 FURTHER = 1.5  # times a size: cells are at hand for boxes up to there
@@ -81,8 +80,9 @@ class BoxProof:
         """Begin a tree of subproblems: one of which nothing but a bound is known."""
         self._of_tree, self._walls_then = 0, len(self.walls)
         self._open: list[Subproblem] = []
-        nothing = np.empty((0, 5), dtype=np.int64)
-        self._push(bound, nothing, 0, np.full(6, np.inf), np.full(6, -np.inf))
+        core = np.outer([np.inf, -np.inf], np.ones(6))
+        nothing, low, high = np.empty((0, 5), dtype=np.int64), core[0], core[1]
+        heapq.heappush(self._open, Subproblem(bound, self._count, nothing, 0, low, high, core))
 
     def again(self, threshold: float) -> BoxProof:
         """Return the proof begun again for boxes below another size, with the walls of this one."""
@@ -172,10 +172,11 @@ class BoxProof:
         assert node.found is not None
         # against a core turned inside out, so that no face is held by it
         n, low, high = node.n_walls, node.found.high, node.found.low
-        box, place, lost = np.empty((2, 6)), np.empty((n, 2)), np.empty(n)
+        box, place, lost = np.stack([low, high]), np.empty((n, 2)), np.empty(n)
         prices = np.empty((n, 12))
         size = float((low - high).sum())
-        least_box(self._cells.table, node.spans, n, low, high, size, box, place, lost, prices)
+        table, turns = self._cells.table, self._cells.turns
+        least_box(table, turns, node.spans, n, low, high, size, box, place, lost, prices)
         return np.asarray(prices[:, :6] - prices[:, 6:])
 
     def show_soon(self) -> None:
@@ -200,7 +201,7 @@ class BoxProof:
         if self._branch is not None:
             node = self._kept
             for spans in parts(node, self._cells, self._branch):
-                self._push(node.bound, spans, node.n_walls, node.low, node.high)
+                heapq.heappush(self._open, self._part(node, spans))
 
     def split_keys(self, places: Sequence[float] | None = None) -> bool:
         """Split the last subproblem between keys at a wall, if it can: of some places, or of all.
@@ -212,10 +213,8 @@ class BoxProof:
             own = node.spans[node.spans[:, WALL] == number, KEY]
             if (places is None or wall.place in places) and len(own) and (own != own[0]).any():
                 one, other = parts(node, self._cells, number)
-                self._push(node.bound, other, node.n_walls, node.low, node.high)
-                low, high = node.low, node.high
-                self._kept = Subproblem(node.bound, self._count, one, node.n_walls, low, high)
-                self._count += 1
+                heapq.heappush(self._open, self._part(node, other))
+                self._kept = self._part(node, one)
                 return True
         return False
 
@@ -231,14 +230,15 @@ class BoxProof:
         lower = self.closing < found.closing * (1.0 - SHARPER)
         return lower or self._cells.changes > found.changes
 
-    def _push(self, bound: float, spans: np.ndarray, n_walls: int, low: Array, high: Array) -> None:
-        heapq.heappush(self._open, Subproblem(bound, self._count, spans, n_walls, low, high))
+    def _part(self, node: Subproblem, spans: np.ndarray) -> Subproblem:
+        """Return the part of a subproblem that leads through some spans."""
         self._count += 1
+        low, high = node.low, node.high
+        return Subproblem(node.bound, self._count, spans, node.n_walls, low, high, node.near)
 
     def _bound(self, node: Subproblem) -> bool:
         """Bound a subproblem; return whether it is still of interest."""
         cells, closing, n_walls = self._cells, self.closing, len(self.walls)
-        entered = cells.entered
         if len(node.spans) != 1 and node.n_walls <= 1:
             n_walls = 1  # one span of the first wall tells which images of the others matter
         mirrored = len(node.spans) > 0 and cells.mirrored(node.spans)
@@ -255,26 +255,27 @@ class BoxProof:
                 cells.spans_of(wall, node.low, node.high, closing, mirrored, keys.get(index))
             )
             keys[index] = np.unique(new[-1][:, KEY])
-        self.work += NUMBERS_OF_AN_ENTRY * (cells.entered - entered)
         spans = np.concatenate([node.spans, *new])
         low, high, table = node.low.copy(), node.high.copy(), cells.table
         sizes, lost, place = np.empty(n_walls), np.empty(n_walls), np.empty((n_walls, 2))
-        box, prices = np.empty((2, 6)), np.empty((n_walls, 12))
+        box, prices = node.near.copy(), np.empty((n_walls, 12))
         limits = np.array([(one.lower, one.upper) for one in self._limits_of(spans)])
         self.work += NUMBERS_OF_A_CELL * float((spans[:, END] - spans[:, FIRST]).sum())
         passes = cells.pass_index[:n_walls], cells.n_keys
-        spans = spans[: tighten(table, spans, *passes, limits, low, high, closing, sizes)]
+        spans = spans[
+            : tighten(table, cells.turns, spans, *passes, limits, low, high, closing, sizes)
+        ]
         if not len(spans):
             return False
         few = spans[self._few_cells(spans)]
         bound, numbers = least_box(
-            table, few, n_walls, low, high, closing, box, place, lost, prices
+            table, cells.turns, few, n_walls, low, high, closing, box, place, lost, prices
         )
         self.work += numbers
         node.bound = max(node.bound, bound, float(sizes.max()))
         if node.bound >= closing:
             return False
-        node.spans, node.n_walls, node.low, node.high = spans, n_walls, low, high
+        node.spans, node.n_walls, node.low, node.high, node.near = spans, n_walls, low, high, box
         node.found = Relaxation(box[0], box[1], place, lost, closing, cells.changes)
         return True
 

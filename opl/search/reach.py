@@ -13,19 +13,14 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.search.walls import Piece
 
-Around = Mapping[int, Array]  # what holds the pieces of a wall, by family, as of `ends_of`
-
-
-def ends_of(piece: Piece) -> Array:
-    """Return the least and the greatest postures of a piece in [rad], shape (2, 6)."""
-    return np.stack([piece.low.min(axis=0), piece.high.max(axis=0)])
+Around = Mapping[int, Array]  # what holds the pieces of a wall, by family, as of `Piece.ends`
 
 
 def around_families(pieces: Sequence[Piece]) -> dict[int, Array]:
     """Return what holds pieces of each family."""
     found: dict[int, Array] = {}
     for piece in pieces:
-        (low, high), ends = found.get(piece.family, ends_of(piece)), ends_of(piece)
+        (low, high), ends = found.get(piece.family, piece.ends), piece.ends
         found[piece.family] = np.stack([np.minimum(low, ends[0]), np.maximum(high, ends[1])])
     return found
 

@@ -90,24 +90,28 @@ def _pivot(table, basis, n_rows, n_columns, dual):  # type: ignore[no-untyped-de
 
 
 @kernel(
-    "UniTuple(float64,2)(float64[:,::1],int64[:,::1],int64,float64[::1],float64[::1],float64,"
-    "float64[:,::1],float64[:,::1],float64[::1],float64[:,::1])",
+    "UniTuple(float64,2)(float64[:,::1],float64[:,::1],int64[:,::1],int64,float64[::1],float64[::1],"
+    "float64,float64[:,::1],float64[:,::1],float64[::1],float64[:,::1])",
     early=True,
 )
-def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, prices):  # type: ignore[no-untyped-def]
+def least_box(  # type: ignore[no-untyped-def]
+    cells, turns, spans, n_walls, low, high, closing, box, place, lost, prices
+):
     """Return a bound on the box that holds a core and a point of each wall, in [rad].
 
     And how many numbers were worked on, about.
 
     Args:
         cells: The table of `Cells`.
+        turns: What the cells of each source are shifted by in [rad], shape (m, 6).
         spans: What is left of walls, sorted by their walls, shape (n, 5). Walls without any are
             left out.
         n_walls: How many walls.
         low: The lower faces are not above these, in [rad], shape (6,).
         high: The upper faces are not below these.
         closing: A larger bound than this is of no interest, in [rad].
-        box: Filled with lower and upper faces of the box found, shape (2, 6).
+        box: Faces, lower ones first, of a box known before, or the core; filled with those of the
+            box found, shape (2, 6).
         place: Filled with where the box meets the hull of each wall: along it, and at which source,
             both the mean of the points that it meets, shape (n_walls, 2).
         lost: Filled with how much more each wall would press had its cells no pads, in [rad].
@@ -120,11 +124,19 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
         core += high[j] - low[j]
     begin, end = np.zeros(n_walls, dtype=np.int64), np.zeros(n_walls, dtype=np.int64)
     n_cells = 0
+    below, above = np.empty((len(spans), 6)), np.empty((len(spans), 6))  # the core, as spans see it
     for k in range(len(spans) - 1, -1, -1):
+        for j in range(6):
+            below[k, j] = low[j] - turns[spans[k, 2], j]
+            above[k, j] = high[j] - turns[spans[k, 2], j]
         n_cells += spans[k, 4] - spans[k, 3]
         begin[spans[k, 0]] = k
         end[spans[k, 0]] = max(end[spans[k, 0]], k + 1)
-    # the point of each wall that is nearest to the core, and the faces it can press on at all
+    beyond = np.empty(12)  # how far the faces of a box known before are beyond the core
+    for j in range(6):
+        beyond[j] = max(box[1, j], high[j]) - high[j]
+        beyond[6 + j] = low[j] - min(box[0, j], low[j])
+    # the point of each wall that is nearest to that box, and the faces it can press on at all
     first, most = np.zeros((n_walls, 12)), np.full((n_walls, 12), -np.inf)
     for w in range(n_walls):
         nearest = np.inf
@@ -135,13 +147,13 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
                 for side in range(2):
                     away = 0.0
                     for f in range(12):
-                        out = pressed(cells, cell, side, f, low, high)
+                        out = pressed(cells, cell, side, f, below[k], above[k])
                         most[w, f] = max(most[w, f], out)
-                        away += max(out, 0.0)
+                        away += max(out - beyond[f], 0.0)
                     if away < nearest:
                         nearest, place[w, 0] = away, cells[cell, 24 + side]
                         for f in range(12):
-                            first[w, f] = pressed(cells, cell, side, f, low, high)
+                            first[w, f] = pressed(cells, cell, side, f, below[k], above[k])
                         place[w, 1] = spans[k, 2]
     n = 0
     wall_of, face_of = (
@@ -209,7 +221,7 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
                         out = 0.0
                         for f in range(12):
                             if now[w, f] > 0.0:
-                                out += now[w, f] * pressed(cells, cell, side, f, low, high)
+                                out += now[w, f] * pressed(cells, cell, side, f, below[k], above[k])
                         if out < best:
                             best, at, at_side, at_span = out, cell, side, k
             press[w], press_cell[w] = best, at
@@ -220,7 +232,7 @@ def least_box(cells, spans, n_walls, low, high, closing, box, place, lost, price
                 for i in range(n):
                     if wall_of[i] == w:
                         f = face_of[i]
-                        out = pressed(cells, at, at_side, f, low, high)
+                        out = pressed(cells, at, at_side, f, below[at_span], above[at_span])
                         table[row, 1 + i] = first[w, f] - out
                 table[row, 1 + n + w] = -1.0
                 table[row, points + n_points] = 1.0

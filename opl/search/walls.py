@@ -11,7 +11,10 @@ wrist flipped.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +23,7 @@ from opl.geometry.frames import Array
 # corners in the rectangle of fractional cutter points and contact positions, along one of the two
 # from each to the next; what leads to lesser contact positions is no part of the wall
 Chain = tuple[tuple[float, float], ...]
+FLIPS = 2  # of the wrist that there may be
 UNKNOWN = 50.0  # [rad] pad where nothing is known; beyond what any joint turns
 
 
@@ -71,6 +75,11 @@ class Piece:
         """Upper faces of it."""
         return np.maximum(self.corners[:-1], self.corners[1:]) + self.pad_high
 
+    @cached_property
+    def ends(self) -> Array:
+        """Least and greatest postures in [rad], shape (2, 6)."""
+        return np.stack([self.low.min(axis=0), self.high.max(axis=0)])
+
     def part(self, first: int, end: int) -> Piece:
         """Return the cells from ``first`` to before ``end`` alone."""
         corners = slice(first, end + 1)
@@ -114,6 +123,30 @@ class Image:
             pad_low=np.where(mirrored, -piece.pad_high, piece.pad_low),
             pad_high=np.where(mirrored, -piece.pad_low, piece.pad_high),
         )
+
+
+class Moves(NamedTuple):
+    """Images of a family as arrays.
+
+    Attributes:
+        sign: Of each, shape (n, 6).
+        shift: Of each in [rad], shape (n, 6).
+        flip: Which flip of the wrist each is, shape (n,).
+        first: The number of the first with each flip, shape (2,).
+    """
+
+    sign: Array
+    shift: Array
+    flip: np.ndarray
+    first: np.ndarray
+
+    @classmethod
+    def of(cls, images: Sequence[Image]) -> Moves:
+        """Return those of some images."""
+        flip = [image.flip for image in images]
+        first = np.array([flip.index(one) if one in flip else 0 for one in range(FLIPS)])
+        sign, shift = ([getattr(image, name) for image in images] for name in ("sign", "shift"))
+        return cls(np.array(sign), np.array(shift), np.array(flip), first)
 
 
 @dataclass(frozen=True)

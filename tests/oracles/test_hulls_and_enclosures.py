@@ -25,7 +25,7 @@ def bent_walls(random, n_walls):
             q = a + np.outer(t, b) + np.outer(t**2, c)
             below, above = -random.uniform(0.0, 1e-3, (n, 6)), random.uniform(0.0, 1e-3, (n, 6))
             cells += [*np.hstack([q[:-1], q[1:], below, above, t[:-1, None], t[1:, None]])]
-            spans.append((wall, 0, 0, first, len(cells)))
+            spans.append((wall, 0, len(spans), first, len(cells)))
     return np.array(cells), np.array(spans, dtype=np.int64)
 
 
@@ -63,7 +63,12 @@ def test_the_bound_over_hulls_is_that_of_another_solver(seed):
     wanted = by_scipy(cells, spans, low, high)
     box, place, lost = np.empty((2, 6)), np.empty((n_walls, 2)), np.empty(n_walls)
     prices = np.empty((n_walls, 12))
-    bound, _ = least_box(cells, spans, n_walls, low, high, wanted + 1e-9, box, place, lost, prices)
+    box[:] = low - random.uniform(0.0, 0.1, 6), high + random.uniform(0.0, 0.1, 6)
+    turns = 2.0 * np.pi * random.integers(-2, 3, (int(spans[:, 2].max()) + 1, 6))
+    for _, _, source, first, end in spans.tolist():
+        cells[first:end, :12] -= np.tile(turns[source], 2)
+    sought = wanted + 1e-9, box, place, lost, prices
+    bound, _ = least_box(cells, turns, spans, n_walls, low, high, *sought)
     assert bound <= wanted + 1e-8
     assert bound >= wanted - 1e-4
     assert (prices >= 0.0).all() and (prices.sum(axis=0) <= 1.0 + 1e-9).all()

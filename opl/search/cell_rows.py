@@ -1,0 +1,64 @@
+"""The cells of pieces as rows of numbers: what the compiled parts of the proof read.
+
+A row is a cell: joint positions at its two ends, how far below and above the chord the postures can
+be, and its ends along the wall. Where part of it is beyond the limits of joints, or forbidden, the
+row is that of what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from opl.geometry.frames import Array
+from opl.search.box import JointBox
+from opl.search.limit_cuts import within_limits
+from opl.search.walls import Piece
+
+COLUMNS = 26  # start 0:6, end 6:12, pad_low 12:18, pad_high 18:24, places 24 and 25
+NOTHING_LEFT = 1e3  # [rad] presses on every face of any box by more than is of interest
+
+
+def rows_of(
+    pieces: Sequence[Piece],
+    sign: Array,
+    shift: Array,
+    limits: Sequence[JointBox],
+    left: Sequence[tuple[Array, Array]],
+) -> Array:
+    """Return the rows of pieces in one image, one after the other, shape (n, 26).
+
+    Args:
+        pieces: The pieces.
+        sign: Of the image, shape (6,).
+        shift: Of the image in [rad], shape (6,).
+        limits: As of `BoxProof`.
+        left: What of the cells of each piece is not forbidden, as of `Forbidden.clear`; empty for
+            all.
+    """
+    start, end = (
+        np.concatenate([piece.corners[part] for piece in pieces]) * sign + shift
+        for part in (slice(None, -1), slice(1, None))
+    )
+    pad_low = np.concatenate([piece.pad_low for piece in pieces])
+    pad_high = np.concatenate([piece.pad_high for piece in pieces])
+    rows = np.empty((len(start), COLUMNS))
+    rows[:, 0:6], rows[:, 6:12] = start, end
+    rows[:, 12:18] = np.where(sign < 0.0, -pad_high, pad_low)
+    rows[:, 18:24] = np.where(sign < 0.0, -pad_low, pad_high)
+    rows[:, 24] = np.concatenate([piece.at[:-1] for piece in pieces])
+    rows[:, 25] = np.concatenate([piece.at[1:] for piece in pieces])
+    low, high = within_limits(rows, limits)
+    if left:
+        low = np.maximum(low, np.concatenate([begin for begin, _ in left]))
+        high = np.minimum(high, np.concatenate([until for _, until in left]))
+    none, step, along = low > high, end - start, rows[:, 25] - rows[:, 24]
+    begins, ends = (low > 0.0) & ~none, (high < 1.0) & ~none
+    rows[begins, 0:6] += (low[:, None] * step)[begins]
+    rows[ends, 6:12] = (start + high[:, None] * step)[ends]
+    rows[none, 6:12] = start[none]
+    rows[none, 12:18], rows[none, 18:24] = NOTHING_LEFT, -NOTHING_LEFT
+    rows[:, 24] += np.where(none, 0.0, low * along)
+    rows[:, 25] -= np.where(none, 0.0, (1.0 - high) * along)
+    return rows
