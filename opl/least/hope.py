@@ -10,6 +10,7 @@ from opl.planning.plan import AT_REST
 
 RAISED = 1.004  # times what was hoped for and does not exist: what is hoped for next
 GUESSED = 1.5  # times what is proven: what is hoped for where no box tells
+LITTLE = 0.1  # of all work: what is hoped for rises faster where that tells that it does not exist
 FIRST_GUESS = 0.5  # [rad] what is hoped for where nothing is proven either
 
 
@@ -22,7 +23,7 @@ class Hope:
 
     def __init__(self, told: bool) -> None:
         self._told = told
-        self._raised = RAISED  # grows as long as neither a motion nor a new box tells
+        self._raised = RAISED  # grows as long as no new box tells, and rising costs little
         self._least = 0.0  # what is proven not to exist
 
     def told(self, size: float, hoped: float) -> float:
@@ -39,15 +40,17 @@ class Hope:
         """Return what to hope for at first, in [rad]: all images of all walls are many."""
         return best if self._told else min(max(GUESSED * proven, FIRST_GUESS), best)
 
-    def more(self, hoped: float, best: float, found: bool) -> float:
+    def more(self, hoped: float, best: float, found: bool, share: float) -> float:
         """Return what is hoped for next where what was does not exist, in [rad].
 
         Args:
             hoped: What was hoped for.
             best: The best motion known, or more than any has.
             found: Whether a motion is known.
+            share: How much of all work so far it took to find out.
         """
         raised = self._raised if self._told else GUESSED
-        self._raised = RAISED if found else min(self._raised**2, GUESSED)
+        faster = not found or share < LITTLE
+        self._raised = min(self._raised**2, GUESSED) if faster else RAISED
         self._least = min(best, hoped * raised)
         return self._least

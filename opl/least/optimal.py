@@ -72,17 +72,18 @@ class OptimalSearch:
         push_away = PushAway(problem.cell, settings.costs)
         self._search = TrackSearch(problem, self._sampler, settings.costs, most, push_away)
         self._tracks = BoxTracks(self._search)
-        self.plan = fallback
-        self._largest = largest
-        self._proven = 0.0
+        self.plan, self._largest = fallback, largest
+        self._proven, self._given_up = 0.0, 0
         self._hoped = Hope(fallback is not None)
-        self._given_up = 0
         self.forbidden: Forbidden | None = None  # of collisions, once they are known to matter
-        self._in_vain = 0  # boxes in which none of these was free
+        if fallback is None or fallback.checks > 1:  # what was proposed first is not free
+            self._tell_collisions()
+        self._in_vain = 0  # boxes in which no motion was free
         self.proof = self._new_proof(largest)
         self._places: set[float] = set()
         self._work = Work(problem.scene, self._walls, self._families, self._search)
-        self._hope(self._families.smallest_grown())
+        # boxes grown know nothing of collisions
+        self._hope(None if self._sampler.collisions else self._families.smallest_grown())
         hoped = min(self.proof.threshold, self._hoped.guess(0.0, largest))
         self._begin_again(self._new_proof(hoped), hoped)
         first = [0.0, float(len(points) // 2), float(len(points) - 1)]
@@ -238,9 +239,7 @@ class OptimalSearch:
 
     def _mind_collisions(self) -> None:
         """Leave out where the robot collides: it does wherever a motion might have been."""
-        scene, leads = self._problem.scene.collision, self._sampler.leads
-        self.forbidden = Obstructions(scene, leads, self._walls)
-        self._sampler.collisions = True
+        self._tell_collisions()
         self._places.clear()
         self.proof.put_back()  # before what is proven is noted
         self._hoped = Hope(self.plan is not None)
@@ -249,6 +248,11 @@ class OptimalSearch:
         for wall in self.proof.walls:
             minding.add(wall)
         self._begin_again(minding, hoped)
+
+    def _tell_collisions(self) -> None:
+        scene = self._problem.scene.collision
+        self.forbidden = Obstructions(scene, self._sampler.leads, self._walls)
+        self._sampler.collisions = True
 
     def _new_proof(self, threshold: float) -> BoxProof:
         """Return a proof without walls, for boxes below a size."""
@@ -260,8 +264,8 @@ class OptimalSearch:
         if self.plan is None and not crossed_by_any(self.proof.walls, self.forbidden):
             self._proven = self._largest
             return
-        more = self._hoped.more(self.proof.threshold, self._value, self.plan is not None)
-        self._begin_again(self.proof, more)
+        known = self._value, self.plan is not None, self._work.share_of_proof
+        self._begin_again(self.proof, self._hoped.more(self.proof.threshold, *known))
 
     def _begin_again(self, proof: BoxProof, threshold: float) -> None:
         """Begin a proof again: boxes up to another size are of interest."""

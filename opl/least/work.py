@@ -48,6 +48,7 @@ class Work:
         self._families, self._tracks = families, tracks
         self._before = -self._counted()
         self._early = 0.0  # work on early motions
+        self._begun = 0.0  # what was done when the proof was begun
         self.proof: BoxProof | None = None
 
     @property
@@ -55,6 +56,11 @@ class Work:
         """All of it, in units."""
         proof = 0.0 if self.proof is None else work_of_proof(self.proof)
         return self._before + self._counted() + proof
+
+    @property
+    def share_of_proof(self) -> float:
+        """How much of all work was done since the proof was begun again."""
+        return 1.0 - self._begun / self.done
 
     @property
     def left_for_early(self) -> bool:
@@ -80,6 +86,7 @@ class Work:
     def begin_again(self, proof: BoxProof) -> None:
         """Go on with another proof."""
         self._before += 0.0 if self.proof is None else work_of_proof(self.proof)
+        self._begun = self._before + self._counted()
         self.proof = proof
 
     @property
