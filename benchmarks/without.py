@@ -23,7 +23,7 @@ from benchmarks.strangers import LONGEST, MOST_DRAWS, Draw, run_strangers
 from opl.least import box_nodes, search_space
 from opl.least.hope import Hope
 from opl.least.passages import NO_PASSAGES, Rectangles
-from opl.search import cells
+from opl.search import cell_rows
 from opl.walls.shut_leads import ShutLeads
 from opl.walls.sides import ANY_SIDE
 
@@ -88,7 +88,7 @@ PARTS: Mapping[str, Part] = {
         ("search/limit_cuts.py",),
         [
             (
-                cells,
+                cell_rows,
                 "within_limits",
                 lambda rows, limits: (np.zeros(rows.shape[:-1]), np.ones(rows.shape[:-1])),
             )

@@ -55,6 +55,7 @@ class BoxTracks:
         box: JointBox,
         room: float,
         learn: Learn,
+        worth: float = 0.0,
     ) -> Plan | None:
         """Return the motion of the smoothest free track in a box.
 
@@ -64,6 +65,8 @@ class BoxTracks:
             box: The box.
             room: By how much the motion may leave it, in [rad] of its size.
             learn: Told where tracks leave the box, end or collide.
+            worth: A motion of a smaller joint range sum in [rad] is worth having, though what
+                spares depth needs more room.
 
         Returns:
             The motion; None if nothing is free, or if something was learnt instead.
@@ -80,7 +83,7 @@ class BoxTracks:
             )
             if learn(bars(places, ladders, blocked)):
                 return None
-            return self.plan(columns, NO_PASSAGES, box, room, learn) if rows else None
+            return self.plan(columns, NO_PASSAGES, box, room, learn, worth) if rows else None
         bulges = coarse.bulges(track, box.widened(BULGE * room))
         if any(bulge.steep for bulge in bulges) and learn(bulges):
             return None
@@ -104,7 +107,8 @@ class BoxTracks:
             columns = self._search.sampler.columns(box, columns.placements, places, spare)
             larger = grown(columns.q, columns.free, box)
             # places may cost less than depth does
-            if (larger is None or larger.size > most) and learn(places_for(places, sunk)):
+            learnt = (larger is None or larger.size > most) and learn(places_for(places, sunk))
+            if learnt and (larger is None or larger.size > worth):
                 return None
             box = larger or box
             sampled = self._sampled(columns, passages, box, room, spare)

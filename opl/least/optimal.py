@@ -58,8 +58,7 @@ class OptimalSearch:
         fallback: Plan | None,
         seams: Seams | None = None,
     ) -> None:
-        self._problem = problem
-        self._settings = settings
+        self._problem, self._settings = problem, settings
         robot, points, most = problem.cell.robot, problem.points, Travel(np.inf, np.inf)
         # the proof, closed below that, leaves no motion
         largest = float((robot.upper - robot.lower).sum()) / (1.0 - settings.widen)
@@ -73,12 +72,12 @@ class OptimalSearch:
         self._search = TrackSearch(problem, self._sampler, settings.costs, most, push_away)
         self._tracks = BoxTracks(self._search)
         self.plan, self._largest = fallback, largest
-        self._proven, self._given_up = 0.0, 0
+        self._proven = 0.0
+        self._given_up = self._in_vain = 0  # boxes without a motion near the bound, or a free one
         self._hoped = Hope(fallback is not None)
         self.forbidden: Forbidden | None = None  # of collisions, once they are known to matter
         if fallback is None or fallback.checks > 1:  # what was proposed first is not free
             self._tell_collisions()
-        self._in_vain = 0  # boxes in which no motion was free
         self.proof = self._new_proof(largest)
         self._places: set[float] = set()
         self._work = Work(problem.scene, self._walls, self._families, self._search)
@@ -289,7 +288,8 @@ class OptimalSearch:
             learnt = self._rectangles.refine(bulges, box)
             return learnt
 
-        found = self._tracks.plan(columns, passages, box, self._settings.room(box.size), learn)
+        room, worth = self._settings.room(box.size), self._value * (1.0 - CLEARLY_LESS)
+        found = self._tracks.plan(columns, passages, box, room, learn, worth)
         self.keep(found)
         return learnt or (found is None and learn(passages.narrow))
 
