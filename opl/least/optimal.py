@@ -77,7 +77,7 @@ class OptimalSearch:
         self._hoped = Hope(fallback is not None)
         self.forbidden: Forbidden | None = None  # of collisions, once they are known to matter
         if fallback is None or fallback.checks > 1:  # what was proposed first is not free
-            self._tell_collisions()
+            self._leave_out_collisions()
         self.proof = self._new_proof(largest)
         self._places: set[float] = set()
         self._work = Work(problem.scene, self._walls, self._families, self._search)
@@ -237,21 +237,21 @@ class OptimalSearch:
             self.proof.threshold = self._hoped.told(size, self.proof.threshold)
 
     def _mind_collisions(self) -> None:
-        """Leave out where the robot collides: it does wherever a motion might have been."""
-        self._tell_collisions()
+        """Begin again without what collides: the robot does wherever a motion might have been."""
+        self._leave_out_collisions()
         self._places.clear()
         self.proof.put_back()  # before what is proven is noted
         self._hoped = Hope(self.plan is not None)
-        hoped = self._hoped.guess(self.lower_bound, self._value)
-        minding = self._new_proof(hoped)
+        minding = self._new_proof(hoped := self._hoped.guess(self.lower_bound, self._value))
         for wall in self.proof.walls:
             minding.add(wall)
         self._begin_again(minding, hoped)
 
-    def _tell_collisions(self) -> None:
-        scene = self._problem.scene.collision
-        self.forbidden = Obstructions(scene, self._sampler.leads, self._walls)
-        self._sampler.collisions = True
+    def _leave_out_collisions(self) -> None:
+        """Leave out where the robot collides from now on: of walls, and of what is sampled."""
+        scene, sampler = self._problem.scene.collision, self._sampler
+        self.forbidden = Obstructions(scene, sampler.leads, self._walls)
+        sampler.collisions = True
 
     def _new_proof(self, threshold: float) -> BoxProof:
         """Return a proof without walls, for boxes below a size."""

@@ -36,12 +36,12 @@ def _within_limits(cells, cell, low, high, limits):  # type: ignore[no-untyped-d
     "float64[::1],float64[::1],float64,float64[::1])",
     early=True,
 )
-def tighten(cells, turns, spans, pass_index, n_keys, limits, low, high, closing, sizes):  # type: ignore[no-untyped-def]
+def tighten(cells, shifts, spans, pass_index, n_keys, limits, low, high, closing, sizes):  # type: ignore[no-untyped-def]
     """Cut off what no box below a size can hold; return how many spans are left, 0 if none can be.
 
     Args:
         cells: The table of `Cells`.
-        turns: What the cells of each source are shifted by.
+        shifts: What the cells of each source are shifted by in [rad], shape (m, 6).
         spans: Sorted by their walls; those left are moved to the front, shape (n, 5).
         pass_index: Of each wall, shape (k,).
         n_keys: Number of keys.
@@ -67,9 +67,9 @@ def tighten(cells, turns, spans, pass_index, n_keys, limits, low, high, closing,
             before, smallest = left, np.inf
             least[:], most[:] = np.inf, -np.inf
             while k < n and spans[k, 0] == wall:
-                begin, stop, turn = -1, -1, turns[spans[k, 2]]
+                begin, stop, shift = -1, -1, shifts[spans[k, 2]]
                 for j in range(6):
-                    below[j], above[j] = low[j] - turn[j], high[j] - turn[j]
+                    below[j], above[j] = low[j] - shift[j], high[j] - shift[j]
                 for cell in range(spans[k, 3], spans[k, 4]):
                     size = 0.0
                     for j in range(6):
@@ -87,8 +87,8 @@ def tighten(cells, turns, spans, pass_index, n_keys, limits, low, high, closing,
                     for cell in range(begin, stop):
                         for j in range(6):
                             a, b = cells[cell, j], cells[cell, 6 + j]
-                            least[j] = min(least[j], min(a, b) + cells[cell, 12 + j] + turn[j])
-                            most[j] = max(most[j], max(a, b) + cells[cell, 18 + j] + turn[j])
+                            least[j] = min(least[j], min(a, b) + cells[cell, 12 + j] + shift[j])
+                            most[j] = max(most[j], max(a, b) + cells[cell, 18 + j] + shift[j])
                     for i in range(3):
                         spans[left, i] = spans[k, i]
                     spans[left, 3], spans[left, 4] = begin, stop
@@ -128,13 +128,13 @@ def tighten(cells, turns, spans, pass_index, n_keys, limits, low, high, closing,
     "float64[::1](float64[:,::1],float64[:,::1],int64[:,::1],float64[::1],float64[::1])",
     early=True,
 )
-def distances(cells, turns, spans, low, high):  # type: ignore[no-untyped-def]
+def distances(cells, shifts, spans, low, high):  # type: ignore[no-untyped-def]
     """Return by how much a box misses the chords of each span, shape (n,), in [rad]."""
     found = np.empty(len(spans))
     below, above = np.empty(6), np.empty(6)
     for k in range(len(spans)):
         for j in range(6):
-            below[j], above[j] = low[j] - turns[spans[k, 2], j], high[j] - turns[spans[k, 2], j]
+            below[j], above[j] = low[j] - shifts[spans[k, 2], j], high[j] - shifts[spans[k, 2], j]
         # what is nearest by its joints, each for itself, soon rules out the others
         nearest, least, best = -1, np.inf, np.inf
         for cell in range(spans[k, 3], spans[k, 4]):

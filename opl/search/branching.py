@@ -33,12 +33,12 @@ def where_to_split(
     if np.count_nonzero(walls == 0) > 1:
         return 0
     missed = np.full(node.n_walls, np.inf)
-    np.minimum.at(missed, walls, distances(table, cells.turns, node.spans, found.low, found.high))
+    np.minimum.at(missed, walls, distances(table, cells.shifts, node.spans, found.low, found.high))
     first, end = node.spans[:, FIRST], node.spans[:, END]
     tiny = walls[(end == first + 1) & (table[first, 25] - table[first, 24] < SMALLEST)]
     score = np.maximum(missed, found.lost)
     box = JointBox(found.low, found.high)
-    np.maximum.at(score, walls, torn(table, cells.turns, node.spans, box, limits, settled))
+    np.maximum.at(score, walls, torn(table, cells.shifts, node.spans, box, limits, settled))
     score[tiny] = 0.0
     wall = int(np.argmax(score))
     return wall if score[wall] > settled else None
@@ -63,7 +63,7 @@ def parts(node: Subproblem, cells: Cells, wall: int) -> list[np.ndarray]:
         halves[0][0, END] = halves[1][0, FIRST] = middle
     elif wall == 0 or (kinds != kinds[0]).any():
         # the nearest, or all of its image, and all others
-        away = distances(cells.table, cells.turns, own, node.found.low, node.found.high)
+        away = distances(cells.table, cells.shifts, own, node.found.low, node.found.high)
         nearest = int(np.argmin(away))
         alike = np.arange(len(own)) == nearest if wall == 0 else kinds == kinds[nearest]
         halves = [own[alike], own[~alike]]

@@ -1,7 +1,7 @@
 """The cells of walls in one table, and the runs of them that a subproblem is about.
 
 A run of cells in one image is a span. Images that only full turns tell apart share rows of the
-table, and each has the turns that its spans are shifted by. Where parts of cells turn out to be
+table, and each has what its spans are shifted by. Where parts of cells turn out to be
 forbidden, their rows are made shorter, for all subproblems at once.
 """
 
@@ -40,7 +40,7 @@ class Cells:
         walls: The walls.
         pass_index: The pass of each.
         table: The cells, shape (capacity, 26); rows not in use are at its end.
-        turns: What the cells of each source are shifted by in [rad], shape (capacity, 6).
+        shifts: What the cells of each source are shifted by in [rad], shape (capacity, 6).
         changes: How often cells in the table became shorter.
         reach: Tells which images are left out.
     """
@@ -66,7 +66,7 @@ class Cells:
         # a source is a piece in one image
         self._pieces: list[Piece] = []
         self._sources = np.empty((1024, 4), dtype=np.int64)
-        self.turns = np.empty((1024, 6))
+        self.shifts = np.empty((1024, 6))
         self._n_sources = 0
         # where rows begin in the table, -1 where they are not entered yet
         self._first_cell = np.empty(0, dtype=np.int64)
@@ -228,9 +228,9 @@ class Cells:
         first_kind = [self._kinds_of(piece.family, piece.side) for piece in pieces]
         kind = np.repeat(first_kind, len(numbers)) + image
         first, end = self._n_sources, self._n_sources + len(image)
-        self._sources, self.turns = _with_room(self._sources, end), _with_room(self.turns, end)
+        self._sources, self.shifts = _with_room(self._sources, end), _with_room(self.shifts, end)
         self._sources[first:end] = np.stack([image, rows, n_cells, kind], axis=1)
-        self.turns[first:end] = moves.shift[image] - moves.shift[moves.first[moves.flip[image]]]
+        self.shifts[first:end] = moves.shift[image] - moves.shift[moves.first[moves.flip[image]]]
         self._pieces += pieces
         missing = np.full(len(pieces) * ROWS_OF_A_PIECE, -1, dtype=np.int64)
         self._first_cell = np.concatenate([self._first_cell, missing])

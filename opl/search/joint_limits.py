@@ -45,7 +45,7 @@ def torn(
 
     Args:
         cells: The table of `Cells`.
-        shifts: What the cells of each source are shifted by in [rad], its turns there.
+        shifts: What the cells of each source are shifted by in [rad], shape (m, 6).
         spans: The spans, shape (n, 5).
         box: The box.
         limits: As of `BoxProof`.

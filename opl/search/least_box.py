@@ -175,8 +175,8 @@ class BoxProof:
         box, place, lost = np.stack([low, high]), np.empty((n, 2)), np.empty(n)
         prices = np.empty((n, 12))
         size = float((low - high).sum())
-        table, turns = self._cells.table, self._cells.turns
-        least_box(table, turns, node.spans, n, low, high, size, box, place, lost, prices)
+        table, shifts = self._cells.table, self._cells.shifts
+        least_box(table, shifts, node.spans, n, low, high, size, box, place, lost, prices)
         return np.asarray(prices[:, :6] - prices[:, 6:])
 
     def show_soon(self) -> None:
@@ -263,13 +263,13 @@ class BoxProof:
         self.work += NUMBERS_OF_A_CELL * float((spans[:, END] - spans[:, FIRST]).sum())
         passes = cells.pass_index[:n_walls], cells.n_keys
         spans = spans[
-            : tighten(table, cells.turns, spans, *passes, limits, low, high, closing, sizes)
+            : tighten(table, cells.shifts, spans, *passes, limits, low, high, closing, sizes)
         ]
         if not len(spans):
             return False
         few = spans[self._few_cells(spans)]
         bound, numbers = least_box(
-            table, cells.turns, few, n_walls, low, high, closing, box, place, lost, prices
+            table, cells.shifts, few, n_walls, low, high, closing, box, place, lost, prices
         )
         self.work += numbers
         node.bound = max(node.bound, bound, float(sizes.max()))

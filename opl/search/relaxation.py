@@ -95,7 +95,7 @@ def _pivot(table, basis, n_rows, n_columns, dual):  # type: ignore[no-untyped-de
     early=True,
 )
 def least_box(  # type: ignore[no-untyped-def]
-    cells, turns, spans, n_walls, low, high, closing, box, place, lost, prices
+    cells, shifts, spans, n_walls, low, high, closing, box, place, lost, prices
 ):
     """Return a bound on the box that holds a core and a point of each wall, in [rad].
 
@@ -103,7 +103,7 @@ def least_box(  # type: ignore[no-untyped-def]
 
     Args:
         cells: The table of `Cells`.
-        turns: What the cells of each source are shifted by in [rad], shape (m, 6).
+        shifts: What the cells of each source are shifted by in [rad], shape (m, 6).
         spans: What is left of walls, sorted by their walls, shape (n, 5). Walls without any are
             left out.
         n_walls: How many walls.
@@ -127,8 +127,8 @@ def least_box(  # type: ignore[no-untyped-def]
     below, above = np.empty((len(spans), 6)), np.empty((len(spans), 6))  # the core, as spans see it
     for k in range(len(spans) - 1, -1, -1):
         for j in range(6):
-            below[k, j] = low[j] - turns[spans[k, 2], j]
-            above[k, j] = high[j] - turns[spans[k, 2], j]
+            below[k, j] = low[j] - shifts[spans[k, 2], j]
+            above[k, j] = high[j] - shifts[spans[k, 2], j]
         n_cells += spans[k, 4] - spans[k, 3]
         begin[spans[k, 0]] = k
         end[spans[k, 0]] = max(end[spans[k, 0]], k + 1)
