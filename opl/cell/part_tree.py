@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.geometry.mesh import TriangleMesh
+from opl.geometry.mesh import TriangleMesh, box_corners
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,11 @@ class PartTree:
     end: np.ndarray
     child: np.ndarray
     looks: np.ndarray
+
+    @property
+    def corners(self) -> Array:
+        """Corners of a box that holds the part in [m], shape (8, 3)."""
+        return box_corners(self.spheres[0, :3] + np.outer([-1.0, 1.0], self.boxes[0]))
 
 
 def part_tree(mesh: TriangleMesh) -> PartTree:

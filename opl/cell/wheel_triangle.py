@@ -73,23 +73,28 @@ def _may_cross_rim(a, b, half_width, radius, way):  # type: ignore[no-untyped-de
     return beside >= half_width and max(one, other) + way >= radius
 
 
-@kernel("float64(float64[::1],float64,float64,float64)")
-def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-def]
-    """Return minus the length of the shortest way out of a triangle that is in the wheel.
+@kernel("UniTuple(float64,4)(float64[:,::1],float64,float64,float64)")
+def shortest_way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-def]
+    """Return minus the length of the shortest way out of a triangle in the wheel, and where to.
 
     Of one that is outside it is some distance that it keeps at least, not less than 0. The corners,
-    x, y and z of each, are seen from contact frame 0. Ways no longer than ``enough`` says, such as
-    -0.001 for a millimetre, are all the same.
+    shape (3, 3), are seen from contact frame 0. Ways no longer than ``enough`` says, such as -0.001
+    for a millimetre, are all the same. The direction, x, y and z, is of any length.
     """
-    corners = triangle.reshape(3, 3).copy()
+    corners = triangle.copy()
     corners[:, 2] -= radius
-    most = -np.inf
+    most, x, y, z = -np.inf, 0.0, 0.0, -1.0
     for sign in (-1.0, 1.0):
-        most = max(most, _out_along(corners, half_width, radius, sign, 0.0, 0.0))
+        out = _out_along(corners, half_width, radius, sign, 0.0, 0.0)
+        if out > most:
+            most, x, y, z = out, sign, 0.0, 0.0
     for k in range(3):
-        most = max(most, _out_along(corners, half_width, radius, 0.0, corners[k, 1], corners[k, 2]))
+        cy, cz = corners[k, 1], corners[k, 2]
+        out = _out_along(corners, half_width, radius, 0.0, cy, cz)
+        if out > most:
+            most, x, y, z = out, 0.0, cy, cz
     if most >= min(enough, 0.0):
-        return most
+        return most, x, y, z
     edges = np.empty((3, 3))
     for k in range(3):
         for i in range(3):
@@ -98,17 +103,20 @@ def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-de
     ny = edges[0, 2] * edges[1, 0] - edges[0, 0] * edges[1, 2]
     nz = edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0]
     for sign in (-1.0, 1.0):
-        most = max(most, _out_along(corners, half_width, radius, sign * nx, sign * ny, sign * nz))
-    for k in range(3):
-        # square to an edge and to the axle: mostly that is enough
-        for sign in (-1.0, 1.0):
+        out = _out_along(corners, half_width, radius, sign * nx, sign * ny, sign * nz)
+        if out > most:
+            most, x, y, z = out, sign * nx, sign * ny, sign * nz
+        for k in range(3):
+            # square to an edge and to the axle: mostly that is enough
             ey, ez = sign * edges[k, 1], sign * edges[k, 2]
-            most = max(most, _out_along(corners, half_width, radius, 0.0, -ez, ey))
+            out = _out_along(corners, half_width, radius, 0.0, -ez, ey)
+            if out > most:
+                most, x, y, z = out, 0.0, -ez, ey
     across, tried = np.empty((2, 3)), np.empty(DIRECTIONS)
     turn = 2.0 * np.pi / DIRECTIONS
     for k in range(3):
         if most >= min(enough, 0.0):
-            return most
+            return most, x, y, z
         if not _may_cross_rim(corners[k], corners[(k + 1) % 3], half_width, radius, -most):
             continue
         ex, ey, ez = edges[k, 0], edges[k, 1], edges[k, 2]
@@ -143,8 +151,19 @@ def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-de
                     other = _out_around(
                         corners, half_width, radius, across, np.cos(second), np.sin(second)
                     )
-            most = max(most, tried[d], one, other)
-    return most
+            for angle, out in ((d * turn, tried[d]), (first, one), (second, other)):
+                if out > most:
+                    c, s = np.cos(angle), np.sin(angle)
+                    most, x = out, c * across[0, 0] + s * across[1, 0]
+                    y, z = c * across[0, 1] + s * across[1, 1], c * across[0, 2] + s * across[1, 2]
+    return most, x, y, z
+
+
+@kernel("float64(float64[::1],float64,float64,float64)")
+def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-def]
+    """Return minus the length of the shortest way out of a triangle: 9 numbers, see there."""
+    out, _, _, _ = shortest_way_out(triangle.reshape(3, 3), half_width, radius, enough)
+    return out
 
 
 @kernel("UniTuple(float64,4)(float64,float64,float64,float64,float64)")

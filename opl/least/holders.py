@@ -46,11 +46,12 @@ def holders(
         images: The images of each family.
         cut: Cuts a cell of a wall into smaller ones.
         value: Size of a box that is large enough, in [rad].
-        forbidden: Tells which parts of cells are forbidden.
+        forbidden: Tells which parts of cells are forbidden; nothing more is looked at.
         limits: What a box is within, as of `BoxProof`.
         beside: What may work beside this process, if anything.
     """
-    least = partial(_least, images=images, cut=cut, value=value, forbidden=forbidden, limits=limits)
+    known = None if forbidden is None else _Known(forbidden)
+    least = partial(_least, images=images, cut=cut, value=value, forbidden=known, limits=limits)
     _, prices = least(walls)
     pressing = np.argsort(-prices.sum(axis=1), kind="stable")[:MOST_HOLDERS].tolist()
     held = {}
@@ -66,6 +67,24 @@ def holders(
         for k, without in zip(pressing, bounds, strict=True)
     ]
     return tuple(sorted(found, key=lambda one: one.bound_without))
+
+
+class _Known:
+    """Tells what is known to be forbidden, and looks no further.
+
+    Args:
+        forbidden: Knows it.
+    """
+
+    def __init__(self, forbidden: Forbidden) -> None:
+        self._forbidden = forbidden
+        self.n_flips = forbidden.n_flips
+
+    def clear(
+        self, piece: Piece, flip: int, first: int, end: int, looks: int
+    ) -> tuple[Array, Array]:
+        """Return what `Forbidden.clear` does where no cell is asked about."""
+        return self._forbidden.clear(piece, flip, first, first, looks)
 
 
 @contextmanager

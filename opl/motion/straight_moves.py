@@ -16,7 +16,7 @@ from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import PART, SECOND_OPINION, WHEEL, WorkCell
 from opl.geometry.frames import Array
-from opl.motion.collision_check import RESOLUTION, densify
+from opl.motion.joint_lines import RESOLUTION, densify
 
 # [m] a piece may be as long as to move no point farther than this from its middle; what would need
 # a distance beyond the clearance smaller than the last is taken to be too near

@@ -13,7 +13,8 @@ from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.part_tree import part_tree
 from opl.cell.robot import forward_kinematics
 from opl.cell.wheel_distance import signed_wheel_distance
-from opl.motion.collision_check import RESOLUTION, MoveCheck, colliding_moves, densify
+from opl.motion.collision_check import MoveCheck, colliding_moves
+from opl.motion.joint_lines import RESOLUTION, densify
 from opl.motion.motion import MoveKind
 from tests.support.bare_cells import bare_cell, block, free_move, with_obstacle
 from tests.support.fcl_scene import FclScene

@@ -13,8 +13,8 @@ from opl.cell.part_tree import part_tree
 from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import pose, transform
 from opl.geometry.shapes import Body, Box
-from opl.motion.collision_check import RESOLUTION, densify
 from opl.motion.free_move_search import BlockedMoveError, FreeMoveSearch
+from opl.motion.joint_lines import RESOLUTION, densify
 from opl.motion.sampling import fewest, sample_path
 from opl.motion.straight_moves import StraightMoves
 from tests.support.bare_cells import bare_cell, block, with_obstacle

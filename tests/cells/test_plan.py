@@ -9,7 +9,8 @@ import pytest
 
 from opl.cell.robot import forward_kinematics
 from opl.errors import NoPathError
-from opl.motion.collision_check import RESOLUTION, colliding_moves, densify
+from opl.motion.collision_check import colliding_moves
+from opl.motion.joint_lines import RESOLUTION, densify
 from opl.motion.motion import MoveKind
 from opl.motion.timing import Cause, time_motion
 from opl.motion.whole_motion import UnreachableApproachError, whole_motion

@@ -15,10 +15,11 @@ from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.least.least_cost import least_cost
 from opl.least.least_range import NoMotionError, plan_optimal
 from opl.least.weighted import plan_weighted
-from opl.motion.collision_check import RESOLUTION, colliding_moves, densify
+from opl.motion.collision_check import colliding_moves
 from opl.motion.figures import figures_of_path
 from opl.motion.free_leads import FreeLeads
 from opl.motion.free_move_search import FreeMoveSearch
+from opl.motion.joint_lines import RESOLUTION, densify
 from opl.motion.motion import Motion, MoveKind
 from opl.motion.path import PassEnd
 from opl.motion.whole_motion import UnreachableApproachError

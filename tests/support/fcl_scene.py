@@ -11,7 +11,7 @@ from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import transform
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.shapes import Box
-from opl.motion.collision_check import densify
+from opl.motion.joint_lines import densify
 
 
 class FclScene:
