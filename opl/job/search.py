@@ -141,10 +141,11 @@ class SearchSection(Document):
         "smoother path.",
     )
     max_subproblems: Annotated[int, between(1, 10_000_000)] = Field(
-        default=20000,
+        default=16000,
         description="Work that the proof of the least joint range sum may take at the most, in "
-        "units of about a millisecond. It is counted, not measured: numbers in linear programs, "
-        "postures sampled and held against a box, distances, collision queries, motions checked.",
+        "units of one to two milliseconds. It is counted, not measured: numbers in linear "
+        "programs, postures sampled and held against a box, distances, collision queries, motions "
+        "checked.",
     )
     weights: WeightsSection = Field(
         default=WeightsSection(),

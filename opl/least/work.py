@@ -1,6 +1,6 @@
 """How much of the work allowed a proof has done: counted, so that it is the same on any machine.
 
-A unit is what takes about a millisecond.
+A unit is what takes one to two milliseconds.
 """
 
 from __future__ import annotations
