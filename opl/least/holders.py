@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 
 import numpy as np
 
@@ -51,8 +50,10 @@ def holders(
         beside: What may work beside this process, if anything.
     """
     known = None if forbidden is None else _Known(forbidden)
-    least = partial(_least, images=images, cut=cut, value=value, forbidden=known, limits=limits)
-    _, prices = least(walls)
+    proof = BoxProof(images, cut, value * (1.0 + GAP), GAP / 2.0, known, limits)
+    for wall in walls:
+        proof.add(wall)
+    _, prices = _least(proof, value)
     pressing = np.argsort(-prices.sum(axis=1), kind="stable")[:MOST_HOLDERS].tolist()
     held = {}
     for k in pressing:
@@ -61,7 +62,7 @@ def holders(
     pressing = [k for k in pressing if held[k]]
     # what tells what is forbidden asks solids, which are not passed on
     shared = beside if beside is not None and forbidden is None else Beside()
-    bounds = shared.share(_bounding, (walls, least), pressing)
+    bounds = shared.share(_bounding, (proof, value), pressing)
     found = [
         Holder(walls[k].place, walls[k].pass_index, held[k], without)
         for k, without in zip(pressing, bounds, strict=True)
@@ -88,28 +89,16 @@ class _Known:
 
 
 @contextmanager
-def _bounding(
-    walls: Sequence[Wall], least: Callable[[Sequence[Wall]], tuple[float, Array]]
-) -> Iterator[Callable[[int], float]]:
+def _bounding(proof: BoxProof, value: float) -> Iterator[Callable[[int], float]]:
     """Open what tells what no box over all walls but one is smaller than, given its number."""
-    yield lambda k: least([wall for index, wall in enumerate(walls) if index != k])[0]
+    yield lambda k: _least(proof.without(k), value)[0]
 
 
-def _least(
-    walls: Sequence[Wall],
-    images: Callable[[int], Sequence[Image]],
-    cut: Callable[[Piece, int], Sequence[Piece]],
-    value: float,
-    forbidden: Forbidden | None,
-    limits: Sequence[JointBox],
-) -> tuple[float, Array]:
-    """Return what no box over walls is smaller than, and how hard each presses on the least one.
+def _least(proof: BoxProof, value: float) -> tuple[float, Array]:
+    """Return what no box over the walls is smaller than, and how hard each presses on the least.
 
     On the two faces of each joint, shape (n_walls, 6); 0 where the least box was not found.
     """
-    proof = BoxProof(images, cut, value * (1.0 + GAP), GAP / 2.0, forbidden, limits)
-    for wall in walls:
-        proof.add(wall)
     while not proof.closed:
         if proof.subproblems >= MOST_SUBPROBLEMS or proof.work >= MOST_NUMBERS:
             break
@@ -123,4 +112,4 @@ def _least(
             prices[:, ranges < LEAST_SHARE * ranges.sum()] = 0.0  # held by all alike
             return min(max(bound, candidate.bound), value), prices
         proof.split()
-    return min(proof.lower_bound, value), np.zeros((len(walls), 6))
+    return min(proof.lower_bound, value), np.zeros((len(proof.walls), 6))

@@ -8,6 +8,7 @@ row is that of what is left.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -62,3 +63,12 @@ def rows_of(
     rows[:, 24] += np.where(none, 0.0, low * along)
     rows[:, 25] -= np.where(none, 0.0, (1.0 - high) * along)
     return rows
+
+
+def with_room(table: Any, rows: int) -> Any:
+    """Return a table with room for so many rows, twice of what it had at the least."""
+    if rows <= len(table):
+        return table
+    larger = np.empty((max(rows, 2 * len(table)), *table.shape[1:]), table.dtype)
+    larger[: len(table)] = table
+    return larger

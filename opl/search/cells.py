@@ -1,20 +1,19 @@
 """The cells of walls in one table, and the runs of them that a subproblem is about.
 
-A run of cells in one image is a span. Images that only full turns tell apart share rows of the
-table, and each has what its spans are shifted by. Where parts of cells turn out to be
-forbidden, their rows are made shorter, for all subproblems at once.
+A run of cells in one image is a span. Images that only full turns tell apart share rows, each of
+them shifted. What turns out to be forbidden of cells is cut off their rows, for all subproblems.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from copy import copy
 
 import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
-from opl.search.cell_rows import COLUMNS, rows_of
+from opl.search.cell_rows import COLUMNS, rows_of, with_room
 from opl.search.forbidden import Forbidden
 from opl.search.reach import Reach, around_families
 from opl.search.walls import FLIPS, Image, Moves, Piece, Wall
@@ -94,10 +93,10 @@ class Cells:
             moves = self._moves_of(family)
             numbers = self.reach.near(around, family, moves.sign, moves.shift)
             sign, shift = moves.sign[numbers, None], moves.shift[numbers, None]
-            moved = sign * np.array([piece.ends for piece in pieces])[:, None] + shift
-            moved = moved.reshape(-1, 2, 6)
-            low.append(np.repeat(moved.min(axis=1), len(both), axis=0))
-            high.append(np.repeat(moved.max(axis=1), len(both), axis=0))
+            ends = np.array([piece.ends for piece in pieces])[:, None]
+            moved = (sign * ends + shift).reshape(-1, 2, 6)
+            low.append(np.repeat(np.minimum(*moved.swapaxes(0, 1)), len(both), axis=0))
+            high.append(np.repeat(np.maximum(*moved.swapaxes(0, 1)), len(both), axis=0))
             self._note(pieces, np.repeat(numbers, len(both)), np.tile(both, len(numbers)))
         sources = np.arange(first, self._n_sources)
         kinds = self._sources[sources, KIND]
@@ -194,8 +193,24 @@ class Cells:
 
     def reaching(self, reach: float) -> Cells:
         """Return the cells of the same walls for boxes up to another size in [rad]."""
+        return self._anew(self.walls, reach)
+
+    def without(self, wall: int) -> Cells:
+        """Return the cells of all walls but one, for boxes up to the same size."""
+        if wall == 0:  # it tells which images are left out
+            return self._anew(self.walls[1:], self.reach.size)
+        other = copy(self)
+        for name, value in vars(self).items():  # what grows does so apart
+            if isinstance(value, list | dict | np.ndarray):
+                setattr(other, name, copy(value))
+        del other.walls[wall], other._of_wall[wall]
+        other.pass_index = np.delete(self.pass_index, wall)
+        other._finer, other._looks = {}, {}  # of walls by their numbers
+        return other
+
+    def _anew(self, walls: Sequence[Wall], reach: float) -> Cells:
         others = Cells(self._images, self._cut, self._forbidden, self._limits, reach)
-        for wall in self.walls:
+        for wall in walls:
             others.add(wall)
         return others
 
@@ -228,7 +243,7 @@ class Cells:
         first_kind = [self._kinds_of(piece.family, piece.side) for piece in pieces]
         kind = np.repeat(first_kind, len(numbers)) + image
         first, end = self._n_sources, self._n_sources + len(image)
-        self._sources, self.shifts = _with_room(self._sources, end), _with_room(self.shifts, end)
+        self._sources, self.shifts = with_room(self._sources, end), with_room(self.shifts, end)
         self._sources[first:end] = np.stack([image, rows, n_cells, kind], axis=1)
         self.shifts[first:end] = moves.shift[image] - moves.shift[moves.first[moves.flip[image]]]
         self._pieces += pieces
@@ -243,7 +258,7 @@ class Cells:
         for number in new:
             self._first_cell[number] = self._used
             self._used += len(self._piece(number).pad_low)
-        self.table = _with_room(self.table, self._used)
+        self.table = with_room(self.table, self._used)
         self._enter(new)
         self._name(sources[self._key_of_kind[kinds] < 0])
         walls, first = np.full(len(sources), wall), self._first_cell[rows]
@@ -283,12 +298,3 @@ class Cells:
 def _flip_made(rows: int) -> int:
     """Return which flip of a piece the robot makes, given its rows."""
     return (rows // FLIPS ^ rows) % FLIPS
-
-
-def _with_room(table: Any, rows: int) -> Any:
-    """Return a table with room for so many rows, twice of what it had at the least."""
-    if rows <= len(table):
-        return table
-    larger = np.empty((max(rows, 2 * len(table)), *table.shape[1:]), table.dtype)
-    larger[: len(table)] = table
-    return larger

@@ -92,6 +92,13 @@ class BoxProof:
         other._begin(threshold)
         return other
 
+    def without(self, wall: int) -> BoxProof:
+        """Return the proof begun again without one of its walls, by its number."""
+        other = copy(self)
+        other._cells = self._cells.without(wall)
+        other._begin(self.threshold)
+        return other
+
     @property
     def walls(self) -> list[Wall]:
         """All walls so far."""

@@ -46,8 +46,8 @@ class Reach:
             shift: Likewise, in [rad].
         """
         self._first = self._first or around
-        moved = sign[:, None] * around[family] + shift[:, None]
-        low, high = moved.min(axis=1), moved.max(axis=1)
+        one, other = (sign * end + shift for end in around[family])
+        low, high = np.minimum(one, other), np.maximum(one, other)
         least = np.full(len(sign), np.inf)
         for first_low, first_high in self._first.values():
             apart = np.maximum(low - first_high, first_low - high)

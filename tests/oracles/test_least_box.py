@@ -149,3 +149,28 @@ def test_images_out_of_reach_do_not_matter_and_are_there_where_larger_boxes_are_
     small = proof_up_to(0.5 * least)
     assert closed_at(small) >= 0.5 * least * (1.0 - 2.0 * GAP)
     assert closed_at(small.again(2.0 * least)) == pytest.approx(least, rel=2.0 * GAP)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_without_a_wall_the_others_are_proven_as_if_it_had_never_been_there(seed):
+    random = np.random.default_rng(seed)
+    curves = [Bent(random) for _ in range(4)]
+    for curve in curves:
+        curve._q[0, :2] += 2.0 * np.pi * random.integers(-1, 2, size=2)
+    walls, cut = crossing(curves, False)
+
+    def proof_of(own):
+        proof = BoxProof(lambda _: TURNED, cut, 20.0, GAP)
+        for wall in own:
+            proof.add(wall)
+        return proof
+
+    whole = proof_of(walls)
+    least = closed_at(whole)
+    for k in range(len(walls)):
+        found = closed_at(whole.without(k))
+        alone = closed_at(proof_of(walls[:k] + walls[k + 1 :]))
+        assert found == pytest.approx(alone, rel=GAP)
+        assert found <= least * (1.0 + GAP)
+    assert len(whole.walls) == len(walls)
+    assert closed_at(whole.again(20.0)) == pytest.approx(least, rel=GAP)
