@@ -13,6 +13,11 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.geometry.mesh import TriangleMesh, box_corners
 
+# what kernels take of a part: its type in the words of numba
+TREE = (
+    "Tuple((float64[:,:,::1],float64[:,::1],float64[:,::1],float64[:,::1],int64[::1],int64[::1]))"
+)
+
 
 @dataclass(frozen=True)
 class PartTree:
@@ -40,6 +45,11 @@ class PartTree:
     end: np.ndarray
     child: np.ndarray
     looks: np.ndarray
+
+    @property
+    def arrays(self) -> tuple[Array, Array, Array, Array, np.ndarray, np.ndarray]:
+        """What kernels take of it, of the type `TREE`."""
+        return self.triangles, self.spheres, self.slabs, self.boxes, self.first, self.child
 
     @property
     def corners(self) -> Array:

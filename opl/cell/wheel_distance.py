@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from opl.cell.part_tree import PartTree
+from opl.cell.part_tree import TREE, PartTree
 from opl.cell.wheel_triangle import (
     DEEPEST,
     TOLERANCE,
@@ -54,10 +54,31 @@ def signed_wheel_distance(
     distances, looks = np.empty(len(flat)), np.empty(len(flat), dtype=np.int64)
     # to call threads costs as much as dozens of poses, and many times that on a busy machine
     kernel = _distances if len(flat) > FEW and threads_are_allowed() else _few_distances
-    tree = part.triangles, part.spheres, part.slabs, part.boxes, part.first, part.child
-    kernel(flat, tree, wheel.width / 2.0, wheel.radius, needs, stops, distances, looks)
+    kernel(flat, part.arrays, wheel.width / 2.0, wheel.radius, needs, stops, distances, looks)
     part.looks[0] += looks.sum()
     return distances.reshape(shape)
+
+
+@kernel(
+    "float64(float64[:,::1],float64[:,::1],float64[:,::1],float64[:,::1],int64,float64,float64,"
+    "float64)"
+)
+def lowest_along(T, spheres, slabs, boxes, index, nx, ny, nz):  # type: ignore[no-untyped-def]
+    """Lower bound on how far what a sphere, its slab and its box hold is along a direction.
+
+    From the centre of the sphere; the direction, of length 1, is seen from contact frame 0.
+    """
+    u = nx * T[0, 0] + ny * T[1, 0] + nz * T[2, 0]
+    v = nx * T[0, 1] + ny * T[1, 1] + nz * T[2, 1]
+    w = nx * T[0, 2] + ny * T[1, 2] + nz * T[2, 2]
+    # what of it is not along the normal of the slab
+    p, q, r = slabs[index, 0], slabs[index, 1], slabs[index, 2]
+    a, b, c, reach = boxes[index, 0], boxes[index, 1], boxes[index, 2], spheres[index, 3]
+    along = u * p + v * q + w * r
+    nearest = along * (slabs[index, 3] if along > 0.0 else slabs[index, 4])
+    aside = np.sqrt(max(1.0 - along * along, 0.0)) * reach
+    aside = min(aside, abs(u - along * p) * a + abs(v - along * q) * b + abs(w - along * r) * c)
+    return max(nearest - aside, -reach, -(abs(u) * a + abs(v) * b + abs(w) * c))
 
 
 @kernel(
@@ -69,30 +90,15 @@ def _bound(T, spheres, slabs, boxes, index, half_width, radius):  # type: ignore
     The distance is convex: nothing is nearer than the slope at the centre tells. And what is moved
     along that slope until it is beyond the wheel is out of it.
     """
-    p, q, r, reach = spheres[index, 0], spheres[index, 1], spheres[index, 2], spheres[index, 3]
+    p, q, r = spheres[index, 0], spheres[index, 1], spheres[index, 2]
     x = T[0, 0] * p + T[0, 1] * q + T[0, 2] * r + T[0, 3]
     y = T[1, 0] * p + T[1, 1] * q + T[1, 2] * r + T[1, 3]
     z = T[2, 0] * p + T[2, 1] * q + T[2, 2] * r + T[2, 3]
     value, gx, gy, gz = distance_of_point(x, y, z, half_width, radius)
-    # the slope in the workpiece frame, and what of it is not along the normal of the slab
-    u = gx * T[0, 0] + gy * T[1, 0] + gz * T[2, 0]
-    v = gx * T[0, 1] + gy * T[1, 1] + gz * T[2, 1]
-    w = gx * T[0, 2] + gy * T[1, 2] + gz * T[2, 2]
-    p, q, r = slabs[index, 0], slabs[index, 1], slabs[index, 2]
-    a, b, c = boxes[index, 0], boxes[index, 1], boxes[index, 2]
-    along = u * p + v * q + w * r
-    nearest = along * (slabs[index, 3] if along > 0.0 else slabs[index, 4])
-    aside = np.sqrt(max(1.0 - along * along, 0.0)) * reach
-    aside = min(aside, abs(u - along * p) * a + abs(v - along * q) * b + abs(w - along * r) * c)
-    return value + max(nearest - aside, -reach, -(abs(u) * a + abs(v) * b + abs(w) * c))
+    return value + lowest_along(T, spheres, slabs, boxes, index, gx, gy, gz)
 
 
-_TREE = (
-    "Tuple((float64[:,:,::1],float64[:,::1],float64[:,::1],float64[:,::1],int64[::1],int64[::1]))"
-)
-
-
-@kernel(f"Tuple((float64,int64))(float64[:,::1],{_TREE},float64,float64,float64,float64)")
+@kernel(f"Tuple((float64,int64))(float64[:,::1],{TREE},float64,float64,float64,float64)")
 def _part_distance(T, tree, half_width, radius, needed, enough):  # type: ignore[no-untyped-def]
     """Distance of the part in one pose, and how many looks that took."""
     triangles, spheres, slabs, boxes, first, child = tree
@@ -128,7 +134,7 @@ def _part_distance(T, tree, half_width, radius, needed, enough):  # type: ignore
 
 
 _POSES = (
-    f"void(float64[:,:,::1],{_TREE},float64,float64,"
+    f"void(float64[:,:,::1],{TREE},float64,float64,"
     "float64[::1],float64[::1],float64[::1],int64[::1])"
 )
 

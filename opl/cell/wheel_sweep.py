@@ -1,22 +1,23 @@
-"""How the held part moves along the wheel: on which short ways it surely stays out of it.
+"""On which stretches of a move the held part surely stays out of the wheel, or deep in it by less.
 
-One look at a way tells of all places on it. What a sphere, slab or box of the part's tree holds is
-seen from the middle of the way: the plane that touches the wheel below it bounds the distance
-there (`opl.cell.wheel_distance`), and from beginning to end the part comes nearer to that plane
-only by what it moves across it, which is little where it slides along.
+A continuous collision check: one look at a stretch tells of all places on it. What a sphere, slab
+or box of the part's tree holds is seen from the middle of the stretch: the plane that touches the
+wheel below it bounds the distance there (`opl.cell.wheel_distance`), and from beginning to end the
+part comes nearer to that plane only by what it moves across it, which is little where it slides
+along.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from opl.cell.part_tree import PartTree
-from opl.cell.wheel_triangle import distance_of_point, shortest_way_out
+from opl.cell.part_tree import TREE, PartTree
+from opl.cell.wheel_distance import FEW, lowest_along
+from opl.cell.wheel_triangle import distance_of_point, out_along, reach_of_wheel, way_out
 from opl.files.kernels import kernel, prange, threads_are_allowed
 from opl.geometry.frames import Array
 from opl.geometry.wheel import ContactWheel
 
-FEW = 64  # ways that are not worth more than one thread
 MOST_PIECES = 32  # of a triangle that wait at once
 MOST_HALVED = 64  # pieces of a triangle looked at, before it is not sure
 # A triangle is moved out of the wheel along one direction. One that is nowhere deeper than d is
@@ -24,7 +25,7 @@ MOST_HALVED = 64  # pieces of a triangle looked at, before it is not sure
 # x, y, z of that plane the wheel ends d (|x| + root of y^2 + z^2) behind it: root of two times d at
 # the most
 ROOT = np.sqrt(2.0)
-BENT = 2.0  # times what its middle is off the straight way: how far the way may be off
+BENT = 2.0  # times what a point is off the straight line half-way: how far it may be anywhere
 
 
 def surely_out(
@@ -35,14 +36,15 @@ def surely_out(
     end: Array,
     needed: Array,
 ) -> np.ndarray:
-    """Return on which ways the part surely keeps a distance to the wheel, shape (n,).
+    """Return on which stretches the part surely keeps a distance to the wheel, shape (n,).
 
-    A way is taken to be nowhere farther off the straight one than `BENT` times what it is half-way.
+    Points of the part are taken to be nowhere farther off the straight line from beginning to end
+    than `BENT` times what they are half-way, which is not proven.
 
     Args:
         part: The part.
         wheel: The wheel; its pose does not matter here.
-        begin: Poses of the part in contact frame 0 where a way begins, shape (n, 4, 4).
+        begin: Poses of the part in contact frame 0 where a stretch begins, shape (n, 4, 4).
         middle: Half-way between.
         end: Where it ends.
         needed: The distance in [m], less than 0 for how far it may be in the wheel, shape (n,).
@@ -53,17 +55,19 @@ def surely_out(
     bent = np.linalg.norm(corners @ off[..., :3].transpose(0, 2, 1) + off[:, None, :, 3], axis=-1)
     out, looks = np.zeros(len(middle), dtype=bool), np.empty(len(middle), dtype=np.int64)
     made = _all_out if len(middle) > FEW and threads_are_allowed() else _few_out
-    tree = part.triangles, part.spheres, part.slabs, part.boxes, part.first, part.child
     poses = np.ascontiguousarray(middle), np.ascontiguousarray(half)
-    made(*poses, BENT * bent.max(axis=1), tree, wheel.width / 2.0, wheel.radius, needed, out, looks)
+    made(
+        *poses,
+        BENT * bent.max(axis=1),
+        part.arrays,
+        wheel.width / 2.0,
+        wheel.radius,
+        needed,
+        out,
+        looks,
+    )
     part.looks[0] += looks.sum()
     return out
-
-
-@kernel("float64(float64,float64,float64,float64,float64)")
-def _farthest(nx, ny, nz, half_width, radius):  # type: ignore[no-untyped-def]
-    """How far the wheel reaches in a direction of length 1, from contact frame 0."""
-    return half_width * abs(nx) + radius * (np.sqrt(ny * ny + nz * nz) + nz)
 
 
 @kernel(
@@ -72,25 +76,21 @@ def _farthest(nx, ny, nz, half_width, radius):  # type: ignore[no-untyped-def]
 )
 def _beyond(T, half, spheres, slabs, boxes, index, nx, ny, nz, half_width, radius):  # type: ignore[no-untyped-def]
     """Least that a sphere, its slab and its box are beyond the wheel in a direction, all along."""
-    a, b, c = boxes[index, 0], boxes[index, 1], boxes[index, 2]
     p, q, r, reach = spheres[index, 0], spheres[index, 1], spheres[index, 2], spheres[index, 3]
     # how much it moves in that direction: at the centre, and around it
     u = nx * half[0, 0] + ny * half[1, 0] + nz * half[2, 0]
     v = nx * half[0, 1] + ny * half[1, 1] + nz * half[2, 1]
     w = nx * half[0, 2] + ny * half[1, 2] + nz * half[2, 2]
-    way = abs(u * p + v * q + w * r + nx * half[0, 3] + ny * half[1, 3] + nz * half[2, 3])
-    way += min(np.sqrt(u * u + v * v + w * w) * reach, abs(u) * a + abs(v) * b + abs(w) * c)
-    u = nx * T[0, 0] + ny * T[1, 0] + nz * T[2, 0]
-    v = nx * T[0, 1] + ny * T[1, 1] + nz * T[2, 1]
-    w = nx * T[0, 2] + ny * T[1, 2] + nz * T[2, 2]
-    centre = u * p + v * q + w * r + nx * T[0, 3] + ny * T[1, 3] + nz * T[2, 3]
-    p, q, r = slabs[index, 0], slabs[index, 1], slabs[index, 2]
-    along = u * p + v * q + w * r
-    nearest = along * (slabs[index, 3] if along > 0.0 else slabs[index, 4])
-    aside = np.sqrt(max(1.0 - along * along, 0.0)) * reach
-    aside = min(aside, abs(u - along * p) * a + abs(v - along * q) * b + abs(w - along * r) * c)
-    lowest = max(nearest - aside, -reach, -(abs(u) * a + abs(v) * b + abs(w) * c))
-    return centre + lowest - way - _farthest(nx, ny, nz, half_width, radius)
+    moved = abs(u * p + v * q + w * r + nx * half[0, 3] + ny * half[1, 3] + nz * half[2, 3])
+    moved += min(
+        np.sqrt(u * u + v * v + w * w) * reach,
+        abs(u) * boxes[index, 0] + abs(v) * boxes[index, 1] + abs(w) * boxes[index, 2],
+    )
+    x = T[0, 0] * p + T[0, 1] * q + T[0, 2] * r + T[0, 3]
+    y = T[1, 0] * p + T[1, 1] * q + T[1, 2] * r + T[1, 3]
+    z = T[2, 0] * p + T[2, 1] * q + T[2, 2] * r + T[2, 3] - radius  # from the middle of the wheel
+    centre = nx * x + ny * y + nz * z - reach_of_wheel(nx, ny, nz, half_width, radius)
+    return centre + lowest_along(T, spheres, slabs, boxes, index, nx, ny, nz) - moved
 
 
 @kernel(
@@ -159,12 +159,12 @@ def _triangle_out(T, half, triangles, index, half_width, radius, needed, room): 
         lowest = np.inf
         for k in range(3):
             p, q, r = room[n, 3 * k], room[n, 3 * k + 1], room[n, 3 * k + 2]
-            way = 0.0
+            moved = 0.0
             for i in range(3):
                 g = gx if i == 0 else gy if i == 1 else gz
-                way += g * (half[i, 0] * p + half[i, 1] * q + half[i, 2] * r + half[i, 3])
+                moved += g * (half[i, 0] * p + half[i, 1] * q + half[i, 2] * r + half[i, 3])
             slope = gx * (corner[k, 0] - x) + gy * (corner[k, 1] - y) + gz * (corner[k, 2] - z)
-            lowest = min(lowest, slope - abs(way))
+            lowest = min(lowest, slope - abs(moved))
         if value + lowest >= least:
             continue
         least = max(needed, needed / ROOT)
@@ -197,38 +197,26 @@ def _led_out(T, half, triangles, index, half_width, radius, needed):  # type: ig
 
     That of its shortest way out of the wheel half-way.
     """
-    corners = np.empty((3, 3))
+    middle, moved = np.empty((3, 3)), np.empty((3, 3))
     for k in range(3):
         p, q, r = triangles[index, k, 0], triangles[index, k, 1], triangles[index, k, 2]
         for i in range(3):
-            corners[k, i] = T[i, 0] * p + T[i, 1] * q + T[i, 2] * r + T[i, 3]
-    out, nx, ny, nz = shortest_way_out(corners, half_width, radius, 0.0)
-    length = np.sqrt(nx * nx + ny * ny + nz * nz)
-    if out < needed or length == 0.0:
+            middle[k, i] = T[i, 0] * p + T[i, 1] * q + T[i, 2] * r + T[i, 3]
+            moved[k, i] = half[i, 0] * p + half[i, 1] * q + half[i, 2] * r + half[i, 3]
+    out, nx, ny, nz = way_out(middle, half_width, radius, 0.0)
+    if out < needed:
         return False
-    nx, ny, nz = nx / length, ny / length, nz / length
-    lowest = np.inf
-    for k in range(3):
-        p, q, r = triangles[index, k, 0], triangles[index, k, 1], triangles[index, k, 2]
-        way = nx * (half[0, 0] * p + half[0, 1] * q + half[0, 2] * r + half[0, 3])
-        way += ny * (half[1, 0] * p + half[1, 1] * q + half[1, 2] * r + half[1, 3])
-        way += nz * (half[2, 0] * p + half[2, 1] * q + half[2, 2] * r + half[2, 3])
-        lowest = min(
-            lowest, nx * corners[k, 0] + ny * corners[k, 1] + nz * corners[k, 2] - abs(way)
-        )
-    return lowest - _farthest(nx, ny, nz, half_width, radius) >= needed
-
-
-_TREE = (
-    "Tuple((float64[:,:,::1],float64[:,::1],float64[:,::1],float64[:,::1],int64[::1],int64[::1]))"
-)
+    middle[:, 2] -= radius  # from the middle of the wheel
+    # corners move straight: what they are beyond the wheel is least at an end
+    begin = out_along(middle - moved, half_width, radius, nx, ny, nz)
+    return min(begin, out_along(middle + moved, half_width, radius, nx, ny, nz)) >= needed
 
 
 @kernel(
-    f"Tuple((boolean,int64))(float64[:,::1],float64[:,::1],float64,{_TREE},float64,float64,float64)"
+    f"Tuple((boolean,int64))(float64[:,::1],float64[:,::1],float64,{TREE},float64,float64,float64)"
 )
 def _part_out(T, half, bent, tree, half_width, radius, needed):  # type: ignore[no-untyped-def]
-    """Whether the part surely keeps a distance on one way, and how many looks that took."""
+    """Whether the part surely keeps a distance on one stretch, and how many looks that took."""
     triangles, spheres, slabs, boxes, first, child = tree
     room = np.empty((MOST_PIECES, 9))
     waiting = np.empty(64, dtype=np.int64)  # deeper than any halving of an array can go
@@ -251,13 +239,13 @@ def _part_out(T, half, bent, tree, half_width, radius, needed):  # type: ignore[
     return True, looks
 
 
-_WAYS = (
-    f"void(float64[:,:,::1],float64[:,:,::1],float64[::1],{_TREE},float64,float64,float64[::1],"
+_STRETCHES = (
+    f"void(float64[:,:,::1],float64[:,:,::1],float64[::1],{TREE},float64,float64,float64[::1],"
     "boolean[::1],int64[::1])"
 )
 
 
-@kernel(_WAYS, threads=True, early=True)
+@kernel(_STRETCHES, threads=True, early=True)
 def _all_out(middle, half, bent, tree, half_width, radius, needed, out, looks):  # type: ignore[no-untyped-def]
     for k in prange(len(middle)):
         out[k], looks[k] = _part_out(
@@ -265,7 +253,7 @@ def _all_out(middle, half, bent, tree, half_width, radius, needed, out, looks): 
         )
 
 
-@kernel(_WAYS, early=True)
+@kernel(_STRETCHES, early=True)
 def _few_out(middle, half, bent, tree, half_width, radius, needed, out, looks):  # type: ignore[no-untyped-def]
     for k in range(len(middle)):
         out[k], looks[k] = _part_out(

@@ -29,8 +29,14 @@ _CLOSER = 24  # times that the bracket around a shortest one is made smaller, by
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
 
+@kernel("float64(float64,float64,float64,float64,float64)")
+def reach_of_wheel(nx, ny, nz, half_width, radius):  # type: ignore[no-untyped-def]
+    """Return how far the wheel reaches from its middle in a direction, times the length of that."""
+    return half_width * abs(nx) + radius * np.sqrt(ny * ny + nz * nz)
+
+
 @kernel("float64(float64[:,::1],float64,float64,float64,float64,float64)")
-def _out_along(corners, half_width, radius, nx, ny, nz):  # type: ignore[no-untyped-def]
+def out_along(corners, half_width, radius, nx, ny, nz):  # type: ignore[no-untyped-def]
     """Return how far a triangle is beyond all of the wheel in a direction, of any length.
 
     Negative where it has to be moved that far. The corners, shape (3, 3), are seen from the middle
@@ -42,7 +48,7 @@ def _out_along(corners, half_width, radius, nx, ny, nz):  # type: ignore[no-unty
     least = np.inf
     for k in range(3):
         least = min(least, nx * corners[k, 0] + ny * corners[k, 1] + nz * corners[k, 2])
-    return (least - half_width * abs(nx) - radius * np.sqrt(ny * ny + nz * nz)) / length
+    return (least - reach_of_wheel(nx, ny, nz, half_width, radius)) / length
 
 
 @kernel("float64(float64[:,::1],float64,float64,float64[:,::1],float64,float64)")
@@ -51,7 +57,7 @@ def _out_around(corners, half_width, radius, across, c, s):  # type: ignore[no-u
 
     It is at an angle whose cosine and sine are given.
     """
-    return _out_along(
+    return out_along(
         corners,
         half_width,
         radius,
@@ -74,7 +80,7 @@ def _may_cross_rim(a, b, half_width, radius, way):  # type: ignore[no-untyped-de
 
 
 @kernel("UniTuple(float64,4)(float64[:,::1],float64,float64,float64)")
-def shortest_way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-def]
+def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-def]
     """Return minus the length of the shortest way out of a triangle in the wheel, and where to.
 
     Of one that is outside it is some distance that it keeps at least, not less than 0. The corners,
@@ -85,12 +91,12 @@ def shortest_way_out(triangle, half_width, radius, enough):  # type: ignore[no-u
     corners[:, 2] -= radius
     most, x, y, z = -np.inf, 0.0, 0.0, -1.0
     for sign in (-1.0, 1.0):
-        out = _out_along(corners, half_width, radius, sign, 0.0, 0.0)
+        out = out_along(corners, half_width, radius, sign, 0.0, 0.0)
         if out > most:
             most, x, y, z = out, sign, 0.0, 0.0
     for k in range(3):
         cy, cz = corners[k, 1], corners[k, 2]
-        out = _out_along(corners, half_width, radius, 0.0, cy, cz)
+        out = out_along(corners, half_width, radius, 0.0, cy, cz)
         if out > most:
             most, x, y, z = out, 0.0, cy, cz
     if most >= min(enough, 0.0):
@@ -103,13 +109,13 @@ def shortest_way_out(triangle, half_width, radius, enough):  # type: ignore[no-u
     ny = edges[0, 2] * edges[1, 0] - edges[0, 0] * edges[1, 2]
     nz = edges[0, 0] * edges[1, 1] - edges[0, 1] * edges[1, 0]
     for sign in (-1.0, 1.0):
-        out = _out_along(corners, half_width, radius, sign * nx, sign * ny, sign * nz)
+        out = out_along(corners, half_width, radius, sign * nx, sign * ny, sign * nz)
         if out > most:
             most, x, y, z = out, sign * nx, sign * ny, sign * nz
         for k in range(3):
             # square to an edge and to the axle: mostly that is enough
             ey, ez = sign * edges[k, 1], sign * edges[k, 2]
-            out = _out_along(corners, half_width, radius, 0.0, -ez, ey)
+            out = out_along(corners, half_width, radius, 0.0, -ez, ey)
             if out > most:
                 most, x, y, z = out, 0.0, -ez, ey
     across, tried = np.empty((2, 3)), np.empty(DIRECTIONS)
@@ -157,13 +163,6 @@ def shortest_way_out(triangle, half_width, radius, enough):  # type: ignore[no-u
                     most, x = out, c * across[0, 0] + s * across[1, 0]
                     y, z = c * across[0, 1] + s * across[1, 1], c * across[0, 2] + s * across[1, 2]
     return most, x, y, z
-
-
-@kernel("float64(float64[::1],float64,float64,float64)")
-def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-def]
-    """Return minus the length of the shortest way out of a triangle: 9 numbers, see there."""
-    out, _, _, _ = shortest_way_out(triangle.reshape(3, 3), half_width, radius, enough)
-    return out
 
 
 @kernel("UniTuple(float64,4)(float64,float64,float64,float64,float64)")
@@ -263,7 +262,7 @@ def nearest_on_triangle(  # type: ignore[no-untyped-def]
             )
             bound = max(bound, mean - half_width)
             if whole and bound < 0.0:  # it may be in the wheel
-                out = way_out(room[0], half_width, radius, enough)
+                out, _, _, _ = way_out(room[0].reshape(3, 3), half_width, radius, enough)
                 if out < 0.0 or out >= enough:
                     return out if out < enough else best
         if bound >= enough or n + 2 > DEEPEST:

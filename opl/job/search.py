@@ -143,9 +143,9 @@ class SearchSection(Document):
     max_subproblems: Annotated[int, between(1, 10_000_000)] = Field(
         default=16000,
         description="Work that the proof of the least joint range sum may take at the most, in "
-        "units of one to two milliseconds. It is counted, not measured: numbers in linear "
-        "programs, postures sampled and held against a box, distances, collision queries, motions "
-        "checked.",
+        "units of one to three milliseconds on two slow cores. It is counted, not measured: "
+        "numbers in linear programs, postures sampled and held against a box, distances, collision "
+        "queries, motions checked.",
     )
     weights: WeightsSection = Field(
         default=WeightsSection(),

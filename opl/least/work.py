@@ -1,6 +1,6 @@
 """How much of the work allowed a proof has done: counted, so that it is the same on any machine.
 
-A unit is what takes one to two milliseconds.
+A unit is what takes one to three milliseconds on two slow cores.
 """
 
 from __future__ import annotations

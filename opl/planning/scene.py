@@ -33,7 +33,7 @@ class PlanningScene:
 
     @property
     def work(self) -> float:
-        """What was asked so far, in units of work: one to two milliseconds each."""
+        """What was asked so far, in units of work."""
         return self.collision.queries / QUERIES + float(self.part.looks[0]) / LOOKS
 
     @cached_property

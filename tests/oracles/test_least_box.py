@@ -116,6 +116,23 @@ TURNED = tuple(
 )
 
 
+def far_apart(seed):
+    """Return walls so far apart that full turns bring some nearer, and what cuts their cells."""
+    random = np.random.default_rng(seed)
+    curves = [Bent(random) for _ in range(4)]
+    for curve in curves:
+        curve._q[0, :2] += 2.0 * np.pi * random.integers(-1, 2, size=2)
+    return crossing(curves, False)
+
+
+def proof_over(walls, cut, threshold):
+    """Return a proof over walls with full turns, for boxes below a size in [rad]."""
+    proof = BoxProof(lambda _: TURNED, cut, threshold, GAP)
+    for wall in walls:
+        proof.add(wall)
+    return proof
+
+
 def closed_at(proof):
     """Return the least box of a proof in the images of its walls, nothing added on the way."""
     while not proof.closed:
@@ -127,49 +144,26 @@ def closed_at(proof):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_images_out_of_reach_do_not_matter_and_are_there_where_larger_boxes_are_asked_about(seed):
-    random = np.random.default_rng(seed)
-    curves = [Bent(random) for _ in range(4)]
-    # so far apart that full turns bring some of them nearer
-    for curve in curves:
-        curve._q[0, :2] += 2.0 * np.pi * random.integers(-1, 2, size=2)
-    walls, cut = crossing(curves, False)
-
-    def proof_up_to(threshold):
-        proof = BoxProof(lambda _: TURNED, cut, threshold, GAP)
-        for wall in walls:
-            proof.add(wall)
-        return proof
-
-    every = proof_up_to(100.0)
+    walls, cut = far_apart(seed)
+    every = proof_over(walls, cut, 100.0)
     least = closed_at(every)
-    few = proof_up_to(1.01 * least)
+    few = proof_over(walls, cut, 1.01 * least)
     assert few._cells._n_sources < every._cells._n_sources
     assert closed_at(few) == pytest.approx(least, rel=2.0 * GAP)
     # none is so small; begun again for larger ones it has the images that those need
-    small = proof_up_to(0.5 * least)
+    small = proof_over(walls, cut, 0.5 * least)
     assert closed_at(small) >= 0.5 * least * (1.0 - 2.0 * GAP)
     assert closed_at(small.again(2.0 * least)) == pytest.approx(least, rel=2.0 * GAP)
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_without_a_wall_the_others_are_proven_as_if_it_had_never_been_there(seed):
-    random = np.random.default_rng(seed)
-    curves = [Bent(random) for _ in range(4)]
-    for curve in curves:
-        curve._q[0, :2] += 2.0 * np.pi * random.integers(-1, 2, size=2)
-    walls, cut = crossing(curves, False)
-
-    def proof_of(own):
-        proof = BoxProof(lambda _: TURNED, cut, 20.0, GAP)
-        for wall in own:
-            proof.add(wall)
-        return proof
-
-    whole = proof_of(walls)
+    walls, cut = far_apart(seed)
+    whole = proof_over(walls, cut, 20.0)
     least = closed_at(whole)
     for k in range(len(walls)):
         found = closed_at(whole.without(k))
-        alone = closed_at(proof_of(walls[:k] + walls[k + 1 :]))
+        alone = closed_at(proof_over(walls[:k] + walls[k + 1 :], cut, 20.0))
         assert found == pytest.approx(alone, rel=GAP)
         assert found <= least * (1.0 + GAP)
     assert len(whole.walls) == len(walls)

@@ -92,14 +92,17 @@ def samples_of(mesh, n):
     return points, float(edges.max()) / n
 
 
-@settings(max_examples=60, deadline=None)
-@given(
+parts_and_wheels = given(
     st.integers(1, 60),
     st.integers(0, 2**32 - 1),
     st.floats(0.005, 0.3),
     st.floats(0.02, 0.4),
     st.floats(0.01, 0.3),
 )
+
+
+@settings(max_examples=60, deadline=None)
+@parts_and_wheels
 def test_the_distance_is_that_of_the_nearest_point_of_any_triangle(n, seed, width, radius, scale):
     random = np.random.default_rng(seed)
     mesh = random_mesh(random, n, scale)

@@ -1,15 +1,21 @@
-"""Ways on which the part surely stays out of the wheel, against distances all along them."""
+"""Stretches on which the part surely stays out of the wheel, against distances all along."""
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import settings
 from scipy.spatial.transform import Rotation
 
 from opl.cell.part_tree import part_tree
 from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.wheel_sweep import surely_out
 from opl.geometry.frames import pose
-from tests.oracles.test_wheel_distance import EXACT, mesh_of, random_mesh, random_poses, wheel_of
+from tests.oracles.test_wheel_distance import (
+    EXACT,
+    mesh_of,
+    parts_and_wheels,
+    random_mesh,
+    random_poses,
+    wheel_of,
+)
 
 ALONG = np.linspace(-1.0, 1.0, 17)
 
@@ -22,24 +28,18 @@ def screws(Ts, turn, way):
 
 
 def least_of(part, wheel, Ts):
-    """Return the least distance on each way, exact where it was looked at."""
+    """Return the least distance on each stretch, exact where it was looked at, in [m]."""
     return signed_wheel_distance(part, wheel, Ts, EXACT).min(axis=0)
 
 
 def judged(part, wheel, Ts, needed):
-    """Return on which ways the part surely keeps a distance."""
+    """Return on which stretches the part surely keeps a distance."""
     needed = np.broadcast_to(needed, Ts.shape[1]).astype(float)
     return surely_out(part, wheel, Ts[0], Ts[8], Ts[-1], needed)
 
 
 @settings(max_examples=30, deadline=None)
-@given(
-    st.integers(1, 60),
-    st.integers(0, 2**32 - 1),
-    st.floats(0.005, 0.3),
-    st.floats(0.02, 0.4),
-    st.floats(0.01, 0.3),
-)
+@parts_and_wheels
 def test_what_is_surely_out_is_so_all_along(n, seed, width, radius, scale):
     random = np.random.default_rng(seed)
     part, wheel = part_tree(random_mesh(random, n, scale)), wheel_of(width, radius)
@@ -48,7 +48,7 @@ def test_what_is_surely_out_is_so_all_along(n, seed, width, radius, scale):
         random.normal(scale=0.02, size=(8, 3)),
         random.normal(scale=3e-3, size=(8, 3)),
     )
-    # as much as there is, a little more and a little less
+    # a little more than there is
     least = least_of(part, wheel, Ts)
     for more in (1e-6, 1e-4, 1e-2):
         assert not judged(part, wheel, Ts, least + more).any()
@@ -65,7 +65,7 @@ def plate(n, half):
     return mesh_of(corners[np.concatenate([one.T, other.T])])
 
 
-def test_a_plate_that_slides_along_the_wheel_is_surely_out_on_long_ways():
+def test_a_plate_that_slides_along_the_wheel_is_surely_out_on_long_stretches():
     wheel = wheel_of(0.04, 0.1)
     tilted = np.deg2rad([-60.0, -20.0, 0.0, 20.0, 60.0])  # about the rims, and on the flat
     R = Rotation.from_rotvec(np.outer(tilted, [0.0, 1.0, 0.0])).as_matrix()
