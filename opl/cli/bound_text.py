@@ -51,7 +51,12 @@ def _certified(report: opl.Report) -> Iterator[str]:
 def _held(report: opl.Report) -> Iterator[str]:
     """Yield what keeps the joint range sum from being smaller."""
     path = report.path
-    if path is None or not path.held_by:
+    if path is None:
+        return
+    if not path.held_by:
+        proven = path.method == "optimal" and path.objective == "range"
+        if proven and path.lower_bound_rad:  # at rest there is nothing to be held up
+            yield "which cutter points hold the joint range sum up was not found in the work for it"
         return
     places = [
         f"cutter point {one.cutter_point:g} (pass {one.pass_}: {', '.join(one.joints)}) "
