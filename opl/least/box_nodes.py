@@ -5,8 +5,9 @@ What collides between two places rules out more than one edge: all that pass the
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -41,6 +42,7 @@ ROUNDS = 3  # of sampling closer around a track
 MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
 MOST_WORK = 5000.0  # units on them, most of them spent on free moves that are not there
 MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
+LIKE_OTHERS = "passed where another collided"  # the cause of what was not checked itself
 
 Learn = Callable[[Sequence[Bulge]], bool]  # told where places are wanted; whether that is new
 
@@ -58,6 +60,8 @@ class TrackSearch:
         checks: How many motions were checked.
         places_checked: How many places all of them had.
         collided: How many collided, those that sink aside.
+        stopped: What stopped those checked in the last box where none was free, and how often: a
+            place and a cause.
     """
 
     problem: GrindingProblem
@@ -68,6 +72,7 @@ class TrackSearch:
     checks: int = 0
     places_checked: int = 0
     collided: int = 0
+    stopped: Counter[tuple[float, str]] = field(default_factory=Counter)
 
 
 class BoxNodes:
@@ -211,6 +216,7 @@ class BoxNodes:
             search.places_checked += (search.checks - before) * len(places)
             if isinstance(outcome, Found):
                 return outcome.plan.at_places(places), None, False
+            search.stopped = self._stopped()
             sunk = first_sunk(problem, hits)
             shut = too_near
             if sunk is not None:
@@ -231,6 +237,13 @@ class BoxNodes:
             track = following
         return None, None, False
 
+    def _stopped(self) -> Counter[tuple[float, str]]:
+        """Return what stopped motions so far, and how often: a place and a cause."""
+        causes = sum((matrix.causes for matrix in self.matrices), Counter[tuple[int, str]]())
+        places = self._columns.places.tolist()
+        met = {(places[column], why): count for (column, why), count in causes.items()}
+        return Counter({at: count for at, count in met.items() if at[1] != LIKE_OTHERS})
+
     def _bar(self, struck: Iterable[tuple[int, float]], shut: np.ndarray) -> None:
         """Block all edges that pass where motions collided, as of `passed_where_struck`.
 
@@ -244,4 +257,4 @@ class BoxNodes:
             for before, after in ((ends[0] < t, ends[1] > t), (ends[0] > t, ends[1] < t)):
                 rows = np.flatnonzero(before).tolist(), np.flatnonzero(after).tolist()
                 for matrix in self.matrices:
-                    matrix.block_edges(first, *rows, "passed where another collided")
+                    matrix.block_edges(first, *rows, LIKE_OTHERS)

@@ -73,14 +73,19 @@ def plan_optimal(
         robot, least = problem.cell.robot, search.lower_bound
         raise NoMotionError(least, least > float((robot.upper - robot.lower).sum()))
     found = replace(search.plan, lower_bound=search.lower_bound, holders=search.holders(beside))
-    return replace(found, open_because=_open_because(found, settings, search.work_share))
+    return replace(found, open_because=_open_because(found, settings, search))
 
 
-def _open_because(plan: Plan, settings: OptimalSettings, work_share: float) -> str | None:
+def _open_because(plan: Plan, settings: OptimalSettings, search: OptimalSearch) -> str | None:
     """Return why the bound is further off than wanted, None if it is not."""
     assert plan.gap is not None
     if plan.gap <= settings.widen:
         return None
-    if work_share < 1.0:
-        return "no motion was found nearer to the bound"
-    return "the work allowed for the proof was done before it was complete"
+    if search.work_share >= 1.0:
+        return "the work allowed for the proof was done before it was complete"
+    stopped = search.motions.stopped.most_common(1)
+    which = (
+        f"; those tried last were stopped most often at cutter point {place:g}: {cause}"
+        for (place, cause), _ in stopped
+    )
+    return "no motion was found nearer to the bound" + "".join(which)

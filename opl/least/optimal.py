@@ -69,8 +69,8 @@ class OptimalSearch:
         self._walls, self._families = space.walls, space.families
         self._sampler, self._rectangles = space.sampler, space.rectangles
         push_away = PushAway(problem.cell, settings.costs)
-        self._search = TrackSearch(problem, self._sampler, settings.costs, most, push_away)
-        self._tracks = BoxTracks(self._search)
+        self.motions = TrackSearch(problem, self._sampler, settings.costs, most, push_away)
+        self._tracks = BoxTracks(self.motions)
         self.plan, self._largest = fallback, largest
         self._proven = 0.0
         self._given_up = self._in_vain = 0  # boxes without a motion near the bound, or a free one
@@ -80,7 +80,7 @@ class OptimalSearch:
             self._leave_out_collisions()
         self.proof = self._new_proof(largest)
         self._places: set[float] = set()
-        self._work = Work(problem.scene, self._walls, self._families, self._search)
+        self._work = Work(problem.scene, self._walls, self._families, self.motions)
         # boxes grown know nothing of collisions
         self._hope(None if self._sampler.collisions else self._families.smallest_grown())
         hoped = min(self.proof.threshold, self._hoped.guess(0.0, largest))
@@ -132,9 +132,9 @@ class OptimalSearch:
         if not candidate.settled:
             self._go_into(box, placements, missed[:MOST_ADDED])
             return
-        best, collided = self.plan, self._search.collided
+        best, collided = self.plan, self.motions.collided
         learnt = self._learn(box, placements, missed[:MOST_ADDED])
-        in_vain = self.plan is best and self._search.collided > collided
+        in_vain = self.plan is best and self.motions.collided > collided
         if in_vain and not self._sampler.collisions:
             self._mind_collisions()
         elif learnt or self.proof.outdated:
@@ -223,10 +223,10 @@ class OptimalSearch:
                 columns, _, inner = self._space.look(larger, placements, self._settings)
                 if inner is not None:
                     self._hope(inner)
-                    room, collided = self._settings.room(inner.size), self._search.collided
+                    room, collided = self._settings.room(inner.size), self.motions.collided
                     found = self._tracks.plan(columns, NO_PASSAGES, inner, room, lambda _: False)
                     self.keep(found)
-                    self._in_vain += int(found is None and self._search.collided > collided)
+                    self._in_vain += int(found is None and self.motions.collided > collided)
         if self.proof.threshold < threshold:
             self.proof.show_soon()
 

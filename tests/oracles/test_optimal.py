@@ -23,9 +23,11 @@ from opl.motion.joint_lines import RESOLUTION, densify
 from opl.motion.motion import Motion, MoveKind
 from opl.motion.path import PassEnd
 from opl.motion.whole_motion import UnreachableApproachError
+from opl.planning import plan as plan_module
 from opl.planning.cheapest import plan_cheapest
 from opl.planning.multi_start import plan_recursive
 from opl.planning.settings import ObjectiveWeights
+from opl.planning.track_check import NoMotion
 from opl.verification.replay import replay
 from opl.walls.columns import ColumnWalls
 from opl.walls.images import Images, seams_of
@@ -220,6 +222,23 @@ def test_a_motion_that_the_proof_does_not_find_keeps_its_bound():
     assert plan.path is recursive(one_row).path
     assert 0.0 <= plan.lower_bound <= optimal(one_row).path.joint_range_sum
     assert plan.open_because is not None
+
+
+def test_why_nothing_nearer_to_the_bound_was_found_names_what_stopped_most(monkeypatch):
+    def check_track(problem, nodes, rows):
+        column = 0 if len(asked) % 3 == 0 else len(rows) - 1
+        asked.append(column)
+        return NoMotion(UnreachableApproachError(column, "limits of U"))
+
+    asked = []
+    known = recursive(one_row)  # before nothing is free any more
+    monkeypatch.setattr(plan_module, "check_track", check_track)
+    plan = plan_optimal(one_row(), SETTINGS, known)
+    assert plan.path is known.path and asked
+    assert plan.open_because == (
+        "no motion was found nearer to the bound; those tried last were stopped most often at "
+        "cutter point 19: approach: limits of U"
+    )
 
 
 def test_what_is_left_out_of_a_wall_collides_all_over():
