@@ -34,7 +34,7 @@ BETWEEN = 2.5e-4  # [m] the same between two, where places are recognised less w
 LIMITED = 1.3
 FASTER = 1.05
 SLOWER = 1.5
-COARSE = 0.2  # of the time of a move: the last digit of its speed, where that may be to blame
+COARSE = 0.2  # of the time of a move: the last digit of a speed before it that may be to blame
 
 
 def speed_findings(
@@ -89,13 +89,16 @@ def _ahead(
     motion = written.motion
     lead = late = 0.0  # of the ground point in [m], negative if it is too early; of the time in [s]
     saved = 0.0  # [s] by which the moves so far were too fast where not the feed limits them
-    coarsest, because = 0.0, ""  # last digit of a speed so far in [s], and what to say of it
+    coarsest, coarse = 0.0, ""  # last digit of a speed so far in [s], and what to say of it
     for k in moves:
         takes, wanted = float(written.duration[k]), float(requested.timed.duration[k])
         distance = float(requested.surface_distance[k])
         digit = _last_digit(playback.moves[k], takes)
-        if max(COARSE * wanted, coarsest) < digit < np.inf:
-            coarsest, because = digit, _coarse(playback.moves[k], takes, digit)
+        at_slowest = digit == np.inf and takes < wanted / FASTER
+        step = np.inf if at_slowest else _one_more(playback.moves[k], takes)
+        if coarsest <= step:
+            coarsest, coarse = step, _coarse(playback.moves[k], takes, wanted, step)
+        because = coarse if coarsest > COARSE * wanted else ""
         aims = wanted, min(max(wanted - late, wanted / MOST_CORRECTION), wanted * MOST_CORRECTION)
         late += takes - wanted
         place = AT_POINT if motion.kind[k] is MoveKind.GRIND else BETWEEN
@@ -111,7 +114,7 @@ def _ahead(
         if too_fast or too_slow or (early > allowed and wanted > FASTER * takes):
             yield _finding(written, playback, k, wanted, f"the feed that the job asks for{because}")
         elif early > allowed:  # because of the moves before it
-            message = f"{1e3 * early:.2f} mm ahead of the feed that the job asks for"
+            message = f"{1e3 * early:.2f} mm ahead of the feed that the job asks for{because}"
             where = f"{motion.place(k)} ({playback.moves[k].place})"
             yield Finding(Level.ERROR, "speed", where, message)
 
@@ -133,12 +136,26 @@ def _last_digit(move: ReadMove, takes: float, wanted: float | None = None) -> fl
     return time * speed.digit / slower if slower > 0.0 else np.inf
 
 
-def _coarse(move: ReadMove, takes: float, digit: float) -> str:
-    """Return what to say of a speed whose last digit is much of the time of a move."""
-    return (
-        f"; one more in the last digit of its speed changes the {takes:.2g} s of {move.place} by "
-        f"{digit:.2g} s: a higher {keys.PROCESS_FEED}, or {keys.PROGRAM_MOTION}: straight, may help"
+def _one_more(move: ReadMove, takes: float) -> float:
+    """Return by how much in [s] one more in the last digit of its speed changes a move's time."""
+    speed = move.speed
+    if speed.unit is SpeedUnit.SECONDS:
+        return speed.digit
+    return takes * speed.digit / (speed.value + speed.digit)
+
+
+def _coarse(move: ReadMove, takes: float, wanted: float, step: float) -> str:
+    """Return what to say of a speed of few digits, infinitely few where no slower one is left."""
+    why = (
+        f"one more in the last digit of its speed changes the {takes:.2g} s of {move.place} by "
+        f"{step:.2g} s"
     )
+    if step == np.inf:
+        why = (
+            f"{move.place} takes {takes:.2g} s at the slowest speed there is, {wanted:.2g} s were "
+            "wanted"
+        )
+    return f"; {why}: a higher {keys.PROCESS_FEED}, or {keys.PROGRAM_MOTION}: straight, may help"
 
 
 def _pass_time(written: TimedMotion, requested: TimedMotion, moves: list[int]) -> Iterator[Finding]:

@@ -12,11 +12,25 @@ FEED = 0.02  # [m/s]
 NOWHERE = np.full(6, np.nan)
 
 
+SLOWEST = WrittenSpeed(SpeedUnit.TOP_SPEED, 1e-4, "VJ=0.01", 1e-4)
+
+
 def found(wanted, takes, distance, cause=Cause.NEIGHBOUR, digits=None):
     """Return what is told of the moves of a pass that end between two cutter points.
 
     Their speeds are written as times, with last digits in [s].
     """
+    told = of_moves(wanted, takes, distance, times(digits or [0.0] * len(wanted)), cause)
+    return [message for message in told if "times the feed" in message]  # not the pass as a whole
+
+
+def times(digits):
+    """Return speeds that are written as times with last digits in [s]."""
+    return [WrittenSpeed(SpeedUnit.SECONDS, 1.0, "1 s", digit) for digit in digits]
+
+
+def of_moves(wanted, takes, distance, written_speeds, cause=Cause.NEIGHBOUR):
+    """Return all that is told of such moves and their pass, their speeds as written."""
     n = len(wanted) + 2
     kinds = (MoveKind.GRIND, *[MoveKind.BETWEEN] * (n - 1))
     q = np.linspace(0.0, 0.1, n)[:, None] * np.ones(6)
@@ -28,17 +42,13 @@ def found(wanted, takes, distance, cause=Cause.NEIGHBOUR, digits=None):
     timing = Timing(
         asked, np.array([0.0, 1.0 * FEED, *distance]), (cause,) * n, np.full(n, -1), 1.0
     )
-    speeds = [
-        WrittenSpeed(SpeedUnit.SECONDS, 1.0, "1 s", digit)
-        for digit in (0.0, 0.0, *(digits or [0.0] * len(wanted)))
-    ]
+    speeds = [*times([0.0, 0.0]), *written_speeds]
     moves = tuple(
         ReadMove(q[0], False, speed, Corner(1.0, "1"), "", f"line {k}", NOWHERE)
         for k, speed in enumerate(speeds)
     )
     playback = Playback(q, written.duration, np.arange(n), moves, ())
-    told = [one.message for one in speed_findings(written, timing, playback, FEED)]
-    return [message for message in told if "times the feed" in message]  # not the pass as a whole
+    return [one.message for one in speed_findings(written, timing, playback, FEED)]
 
 
 def test_a_move_shorter_than_places_are_known_is_not_too_fast():
@@ -58,6 +68,28 @@ def test_a_speed_of_few_digits_that_others_make_up_for_is_named():
         "changes the 2 s of line 2 by 1 s: a higher process.feed_mm_s, or program.motion: "
         "straight, may help"
     )
+
+
+def test_the_slowest_speed_there_is_is_named_where_that_is_too_fast():
+    speeds = [SLOWEST, *times([0.01])]
+    first, of_the_pass = of_moves([3.0, 0.3], [2.0, 0.3], [6e-2, 6e-3], speeds)
+    assert "ahead of the feed that the job asks for; line 2 takes 2 s at the slowest " in first
+    assert first.endswith(
+        "speed there is, 3 s were wanted: a higher process.feed_mm_s, or program.motion: "
+        "straight, may help"
+    )
+    assert of_the_pass.startswith("takes 3.30 s, 4.30 s at the feed")
+
+
+def test_the_slowest_speed_is_coarse_where_it_is_slow_enough():
+    message, _ = of_moves([3.0, 0.4], [3.2, 0.05], [6e-2, 8e-3], [SLOWEST, *times([0.01])])
+    assert message.startswith("8 times the feed that the job asks for; one more in the last digit ")
+    assert "changes the 3.2 s of line 2 by 1.6 s" in message
+
+
+def test_a_speed_is_not_to_blame_where_its_last_digit_is_little_of_the_move_that_is_off():
+    (message,) = found([3.0, 0.3], [3.0, 0.1], [6e-2, 6e-3], digits=[0.05, 0.01])
+    assert message == "3 times the feed that the job asks for"
 
 
 def test_a_slow_neighbour_excuses_no_more_than_any_other_limit():
