@@ -88,7 +88,7 @@ def smooth_stage(n_columns: int = 1000, n_rows: int = 140, n_branches: int = 2) 
             off_wheel=np.zeros(n_columns - 1, dtype=bool),
             max_contact_step=1.0,
             max_joint_step=np.deg2rad(15.0),
-            max_contact_change=100.0,
+            max_contact_change=10_000.0,
         )
         costs = TrackCost(
             joint_weights=np.ones(6),

@@ -130,10 +130,11 @@ class SearchSection(Document):
         "of it.",
     )
     max_contact_change: _BeltUnits = Field(
-        default=100.0,
+        default=10_000.0,
         description="Largest change of the contact position between neighbouring cutter points; "
         "between places of a path that are nearer to each other, in proportion. The lower bound is "
-        "that of paths without this limit.",
+        "that of paths without this limit, which the default all but is; how long one spot is "
+        "ground is limited by process.max_dwell_s.",
     )
     range_tolerance_percent: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
         default=0.1,
