@@ -133,8 +133,8 @@ class SearchSection(Document):
         default=10_000.0,
         description="Largest change of the contact position between neighbouring cutter points; "
         "between places of a path that are nearer to each other, in proportion. The lower bound is "
-        "that of paths without this limit, which the default all but is; how long one spot is "
-        "ground is limited by process.max_dwell_s.",
+        "that of paths without this limit; the default hardly limits. How long one spot is "
+        "ground, process.max_dwell_s limits.",
     )
     range_tolerance_percent: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
         default=0.1,

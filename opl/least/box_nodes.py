@@ -60,8 +60,8 @@ class TrackSearch:
         checks: How many motions were checked.
         places_checked: How many places all of them had.
         collided: How many collided, those that sink aside.
-        stopped: What stopped those checked in the last box where none was free, and how often: a
-            place and a cause.
+        stopped: What stopped the motions checked last, until one was free: place and cause, and how
+            many nodes and edges were blocked for it.
     """
 
     problem: GrindingProblem
@@ -215,6 +215,7 @@ class BoxNodes:
             search.checks = now.checks
             search.places_checked += (search.checks - before) * len(places)
             if isinstance(outcome, Found):
+                search.stopped = Counter()
                 return outcome.plan.at_places(places), None, False
             search.stopped = self._stopped()
             sunk = first_sunk(problem, hits)
@@ -238,7 +239,7 @@ class BoxNodes:
         return None, None, False
 
     def _stopped(self) -> Counter[tuple[float, str]]:
-        """Return what stopped motions so far, and how often: a place and a cause."""
+        """Return what stopped the motions checked here, as of `TrackSearch.stopped`."""
         causes = sum((matrix.causes for matrix in self.matrices), Counter[tuple[int, str]]())
         places = self._columns.places.tolist()
         met = {(places[column], why): count for (column, why), count in causes.items()}

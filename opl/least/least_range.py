@@ -85,7 +85,7 @@ def _open_because(plan: Plan, settings: OptimalSettings, search: OptimalSearch) 
         return "the work allowed for the proof was done before it was complete"
     stopped = search.motions.stopped.most_common(1)
     which = (
-        f"; those tried last were stopped most often at cutter point {place:g}: {cause}"
+        f"; those tried last were stopped above all at cutter point {place:g}: {cause}"
         for (place, cause), _ in stopped
     )
     return "no motion was found nearer to the bound" + "".join(which)

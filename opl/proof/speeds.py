@@ -145,7 +145,15 @@ def _one_more(move: ReadMove, takes: float) -> float:
 
 
 def _coarse(move: ReadMove, takes: float, wanted: float, step: float) -> str:
-    """Return what to say of a speed of few digits, infinitely few where no slower one is left."""
+    """Return what to say of a speed of few digits.
+
+    Args:
+        move: The move.
+        takes: Its time as written in [s].
+        wanted: That wanted in [s].
+        step: By how much one more in the last digit changes it in [s]; infinite where it should be
+            slower and cannot be.
+    """
     why = (
         f"one more in the last digit of its speed changes the {takes:.2g} s of {move.place} by "
         f"{step:.2g} s"
@@ -155,7 +163,8 @@ def _coarse(move: ReadMove, takes: float, wanted: float, step: float) -> str:
             f"{move.place} takes {takes:.2g} s at the slowest speed there is, {wanted:.2g} s were "
             "wanted"
         )
-    return f"; {why}: a higher {keys.PROCESS_FEED}, or {keys.PROGRAM_MOTION}: straight, may help"
+    straight = "" if move.straight else f", or {keys.PROGRAM_MOTION}: straight,"
+    return f"; {why}: a higher {keys.PROCESS_FEED}{straight} may help"
 
 
 def _pass_time(written: TimedMotion, requested: TimedMotion, moves: list[int]) -> Iterator[Finding]:

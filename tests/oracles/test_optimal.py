@@ -224,7 +224,7 @@ def test_a_motion_that_the_proof_does_not_find_keeps_its_bound():
     assert plan.open_because is not None
 
 
-def test_why_nothing_nearer_to_the_bound_was_found_names_what_stopped_most(monkeypatch):
+def test_why_nothing_nearer_to_the_bound_was_found_names_what_stopped_motions(monkeypatch):
     def check_track(problem, nodes, rows):
         column = 0 if len(asked) % 3 == 0 else len(rows) - 1
         asked.append(column)
@@ -236,7 +236,7 @@ def test_why_nothing_nearer_to_the_bound_was_found_names_what_stopped_most(monke
     plan = plan_optimal(one_row(), SETTINGS, known)
     assert plan.path is known.path and asked
     assert plan.open_because == (
-        "no motion was found nearer to the bound; those tried last were stopped most often at "
+        "no motion was found nearer to the bound; those tried last were stopped above all at "
         "cutter point 19: approach: limits of U"
     )
 

@@ -10,8 +10,6 @@ from opl.proof.speeds import pass_findings, speed_findings
 
 FEED = 0.02  # [m/s]
 NOWHERE = np.full(6, np.nan)
-
-
 SLOWEST = WrittenSpeed(SpeedUnit.TOP_SPEED, 1e-4, "VJ=0.01", 1e-4)
 
 
@@ -29,7 +27,7 @@ def times(digits):
     return [WrittenSpeed(SpeedUnit.SECONDS, 1.0, "1 s", digit) for digit in digits]
 
 
-def of_moves(wanted, takes, distance, written_speeds, cause=Cause.NEIGHBOUR):
+def of_moves(wanted, takes, distance, written_speeds, cause=Cause.NEIGHBOUR, straight=False):
     """Return all that is told of such moves and their pass, their speeds as written."""
     n = len(wanted) + 2
     kinds = (MoveKind.GRIND, *[MoveKind.BETWEEN] * (n - 1))
@@ -44,7 +42,7 @@ def of_moves(wanted, takes, distance, written_speeds, cause=Cause.NEIGHBOUR):
     )
     speeds = [*times([0.0, 0.0]), *written_speeds]
     moves = tuple(
-        ReadMove(q[0], False, speed, Corner(1.0, "1"), "", f"line {k}", NOWHERE)
+        ReadMove(q[0], straight, speed, Corner(1.0, "1"), "", f"line {k}", NOWHERE)
         for k, speed in enumerate(speeds)
     )
     playback = Playback(q, written.duration, np.arange(n), moves, ())
@@ -79,6 +77,11 @@ def test_the_slowest_speed_there_is_is_named_where_that_is_too_fast():
         "straight, may help"
     )
     assert of_the_pass.startswith("takes 3.30 s, 4.30 s at the feed")
+
+
+def test_moves_that_are_straight_are_not_proposed_to_be():
+    first, _ = of_moves([3.0, 0.3], [2.0, 0.3], [6e-2, 6e-3], times([1.0, 0.01]), straight=True)
+    assert first.endswith("by 1 s: a higher process.feed_mm_s may help")
 
 
 def test_the_slowest_speed_is_coarse_where_it_is_slow_enough():
