@@ -42,6 +42,7 @@ ROUNDS = 3  # of sampling closer around a track
 MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
 MOST_WORK = 5000.0  # units on them, most of them spent on free moves that are not there
 MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
+RESERVES = 3e-4, 1e-4, 3e-5  # [m] beyond the clearance needed, left where that can be
 LIKE_OTHERS = "passed where another collided"  # the cause of what was not checked itself
 
 Learn = Callable[[Sequence[Bulge]], bool]  # told where places are wanted; whether that is new
@@ -124,10 +125,23 @@ class BoxNodes:
         for matrix in self.matrices:
             matrix.shut = shut
 
-    def sweep(self) -> None:
-        """Close every node that collides."""
+    def sweep(self) -> Track | None:
+        """Close every node that collides; return the smoothest track that is left.
+
+        As far as a column has others, what hardly does not collide is left out as well: between
+        two of that a motion may collide.
+        """
         self._swept = True
-        close_collisions(self.matrices, self.problem.scene.collision)
+        scene = self.problem.scene.collision
+        close_collisions(self.matrices, scene)
+        left = [matrix.free.copy() for matrix in self.matrices]
+        for reserve in RESERVES:
+            close_collisions(self.matrices, scene.wider(reserve), all_of_them=False)
+        if (track := self.smoothest()) is None:
+            for matrix, free in zip(self.matrices, left, strict=True):
+                matrix.free[:] = free
+            track = self.smoothest()
+        return track
 
     def smoothest(self) -> Track | None:
         """Return the smoothest track in the matrix that is farthest from the limits."""
@@ -172,11 +186,15 @@ class BoxNodes:
         return BoxNodes(search, around, self._rows, self._box, self.spare, spacing)
 
     def closest(self, track: Track) -> tuple[BoxNodes, Track]:
-        """Return samples closer and closer around a track, and the smoothest track in them."""
+        """Return samples closer and closer around a track, and the smoothest track in them.
+
+        They are swept if these are.
+        """
         sampled: BoxNodes = self
         for _ in range(ROUNDS):
             closer = sampled._closer(track)
-            if (finer := closer.smoothest()) is None:
+            finer = closer.sweep() if self._swept else closer.smoothest()
+            if finer is None:
                 break
             sampled, track = closer, finer
         return sampled, track

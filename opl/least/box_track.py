@@ -117,9 +117,10 @@ class BoxTracks:
         wanted = before if sunk is None else sunk
         if wanted is not None and learn(places_for(places, wanted)):
             return None
-        coarse.sweep()
-        around = coarse.smoothest()
-        return None if around is None else coarse.check(around, learn)[0]
+        if (track := coarse.sweep()) is None:
+            return None
+        closest, track = coarse.closest(track)
+        return closest.check(track, learn)[0]
 
     def _sampled(
         self, columns: Columns, passages: Passages, box: JointBox, room: float, spare: Array
@@ -133,10 +134,22 @@ class BoxTracks:
         crossing = crossed(places, passages.crossings, one)
         if len(passages.crossings):
             crossing = nearest_about(sampler, columns, crossing, inner, last)
-        t = np.concatenate([t, level, crossing], axis=1)
+        free = nearest_free(columns, inner) if sampler.collisions else one[:, :0]
+        t = np.concatenate([t, level, crossing, free], axis=1)
         sampler.work += len(t) * t.shape[1] ** 2 / EDGES_OF_WORK
         at = sampler.at(places, columns.points, columns.placements, t)
         return BoxNodes(self._search, at, passages.rows, inner, spare, spacing)
+
+
+def nearest_free(columns: Columns, box: JointBox) -> Array:
+    """Return between which sampled contact positions places are nearest to a box, shape (n, 2).
+
+    In belt units: of what may be used. They do not collide where what does was left out; samples
+    spread over a box seldom are where little of it is free.
+    """
+    _, row = in_box.nearest_points(columns.q, columns.free, box)
+    both = np.stack([np.floor(row), np.ceil(row)], axis=1).astype(int)
+    return np.asarray(np.take_along_axis(columns.t, np.maximum(both, 0), axis=1))
 
 
 def nearest_about(

@@ -52,5 +52,6 @@ class Hope:
         raised = self._raised if self._told else GUESSED
         faster = not found or share < LITTLE
         self._raised = min(self._raised**2, GUESSED) if faster else RAISED
-        self._least = min(best, hoped * raised)
-        return self._least
+        # boxes tell again what does not exist; but what is only guessed, a better box may lower
+        self._least = min(best, hoped * RAISED)
+        return min(best, hoped * raised)

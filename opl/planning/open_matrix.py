@@ -172,8 +172,13 @@ def open_matrices(problem: GrindingProblem) -> list[OpenMatrix]:
     return matrices
 
 
-def close_collisions(matrices: Sequence[OpenMatrix], scene: CollisionScene) -> None:
-    """Close every node that collides in matrices of the same places and contact positions."""
+def close_collisions(
+    matrices: Sequence[OpenMatrix], scene: CollisionScene, all_of_them: bool = True
+) -> None:
+    """Close every node that collides in matrices of the same places and contact positions.
+
+    Or those alone that are not all that is left of a column.
+    """
     hits: dict[bytes, np.ndarray] = {}
     asked: dict[bytes, np.ndarray] = {}
     for matrix in matrices:
@@ -184,4 +189,5 @@ def close_collisions(matrices: Sequence[OpenMatrix], scene: CollisionScene) -> N
         now = matrix.free & ~known
         hit[now] = scene.collides(matrix.nodes.q[now])
         known |= now
-        matrix.free &= ~hit
+        closed = hit if all_of_them else hit & (matrix.free & ~hit).any(axis=1, keepdims=True)
+        matrix.free &= ~closed
