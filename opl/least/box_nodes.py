@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.least.box_columns import ColumnSampler
+from opl.least.box_columns import LESS, ColumnSampler
 from opl.least.postures import Columns
 from opl.least.rows import SMALLEST_EDGE, Bulge, Row, broken_at, bulging, shut_edges
 from opl.least.sinking import (
@@ -36,13 +36,13 @@ from opl.planning.track_check import Collides
 from opl.search import in_box
 from opl.search.box import JointBox
 from opl.search.smooth import Travel, smoothest_within
+from opl.walls.shut_leads import RESERVE
 
 SAMPLES = 17  # contact positions of a place
 ROUNDS = 3  # of sampling closer around a track
 MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
 MOST_WORK = 5000.0  # units on them, most of them spent on free moves that are not there
 MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
-RESERVES = 3e-4, 1e-4, 3e-5  # [m] beyond the clearance needed, left where that can be
 LIKE_OTHERS = "passed where another collided"  # the cause of what was not checked itself
 
 Learn = Callable[[Sequence[Bulge]], bool]  # told where places are wanted; whether that is new
@@ -128,15 +128,15 @@ class BoxNodes:
     def sweep(self) -> Track | None:
         """Close every node that collides; return the smoothest track that is left.
 
-        As far as a column has others, what hardly does not collide is left out as well: between
-        two of that a motion may collide.
+        Nodes that keep less than a reserve of clearance are closed as well where their column has
+        others: between two of them a motion may collide.
         """
         self._swept = True
         scene = self.problem.scene.collision
         close_collisions(self.matrices, scene)
         left = [matrix.free.copy() for matrix in self.matrices]
-        for reserve in RESERVES:
-            close_collisions(self.matrices, scene.wider(reserve), all_of_them=False)
+        for reserve in (RESERVE, *LESS):
+            close_collisions(self.matrices, scene.wider(reserve), leave_some=True)
         if (track := self.smoothest()) is None:
             for matrix, free in zip(self.matrices, left, strict=True):
                 matrix.free[:] = free

@@ -144,8 +144,8 @@ class BoxTracks:
 def nearest_free(columns: Columns, box: JointBox) -> Array:
     """Return between which sampled contact positions places are nearest to a box, shape (n, 2).
 
-    In belt units: of what may be used. They do not collide where what does was left out; samples
-    spread over a box seldom are where little of it is free.
+    Columns sampled with collisions left out do not collide there. Where little of a box is free,
+    samples spread over it would miss that. In belt units.
     """
     _, row = in_box.nearest_points(columns.q, columns.free, box)
     both = np.stack([np.floor(row), np.ceil(row)], axis=1).astype(int)

@@ -52,6 +52,6 @@ class Hope:
         raised = self._raised if self._told else GUESSED
         faster = not found or share < LITTLE
         self._raised = min(self._raised**2, GUESSED) if faster else RAISED
-        # boxes tell again what does not exist; but what is only guessed, a better box may lower
+        # boxes may lower a guess, but not to what does not exist, which they would tell again
         self._least = min(best, hoped * RAISED)
         return min(best, hoped * raised)

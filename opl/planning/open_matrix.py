@@ -173,11 +173,11 @@ def open_matrices(problem: GrindingProblem) -> list[OpenMatrix]:
 
 
 def close_collisions(
-    matrices: Sequence[OpenMatrix], scene: CollisionScene, all_of_them: bool = True
+    matrices: Sequence[OpenMatrix], scene: CollisionScene, leave_some: bool = False
 ) -> None:
     """Close every node that collides in matrices of the same places and contact positions.
 
-    Or those alone that are not all that is left of a column.
+    Where that leaves nothing of a column, ``leave_some`` leaves the column as it is.
     """
     hits: dict[bytes, np.ndarray] = {}
     asked: dict[bytes, np.ndarray] = {}
@@ -189,5 +189,5 @@ def close_collisions(
         now = matrix.free & ~known
         hit[now] = scene.collides(matrix.nodes.q[now])
         known |= now
-        closed = hit if all_of_them else hit & (matrix.free & ~hit).any(axis=1, keepdims=True)
+        closed = hit & (matrix.free & ~hit).any(axis=1, keepdims=True) if leave_some else hit
         matrix.free &= ~closed

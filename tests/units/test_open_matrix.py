@@ -40,7 +40,7 @@ def test_a_column_keeps_what_is_near_to_a_collision_where_that_is_all_it_has():
     matrix = OpenMatrix(nodes, np.ones((2, 3), dtype=bool), None)
     close_collisions([matrix], OneJoint(0.15))
     assert matrix.free.tolist() == [[False, True, True], [False, True, True]]
-    close_collisions([matrix], OneJoint(0.4), all_of_them=False)
+    close_collisions([matrix], OneJoint(0.4), leave_some=True)
     assert matrix.free.tolist() == [[False, True, True], [False, True, True]]
-    close_collisions([matrix], OneJoint(0.7), all_of_them=False)
+    close_collisions([matrix], OneJoint(0.7), leave_some=True)
     assert matrix.free.tolist() == [[False, False, True], [False, True, True]]
