@@ -27,13 +27,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.cell.many_poses import POSES, either, principal_angle, root, solve_poses
+from opl.cell.triangle import STRETCH_TOLERANCE
 from opl.files.kernels import kernel, prange
 from opl.geometry.frames import Array
 
 # Below this sine of theta5, axis 6 is parallel to axes 2, 3 and 4. Taking it for parallel there
-# turns the flange by no more than this in [rad]; above it, round-off leaves the tilt of the wrist
-# uncertain by 1e-7 rad at most, which only an arm in line to less than that would miss.
+# turns the flange by no more than this in [rad].
 _WRIST_TOLERANCE = 1e-9
+# What round-off adds to the pose; above the sine, it leaves the tilt of the wrist uncertain by this
+# over the sine, which an arm in line has to be forgiven.
+_ROUND_OFF = 4.0 * np.finfo(float).eps
 
 
 @dataclass(frozen=True)
@@ -138,7 +141,8 @@ def _solve(  # type: ignore[no-untyped-def]
             # law of cosines; the bend is the angle between the two long links, 0 when in line
             apart = forward * forward + up * up
             cos_bend = (apart - c2 * c2 - c3 * c3) / (2.0 * c2 * c3)
-            sin_bend = root(1.0 - cos_bend * cos_bend, 2.0)
+            uncertain = c4 * (c2 + c3) / (c2 * c3) * _ROUND_OFF / length
+            sin_bend = root(1.0 - cos_bend * cos_bend, 2.0 + 2.0 * uncertain / STRETCH_TOLERANCE)
             bend = np.arctan2(sin_bend, cos_bend)
             to_end = np.arctan2(forward, up)
             subtended = np.arctan2(c3 * sin_bend, c2 + c3 * cos_bend)
