@@ -13,12 +13,11 @@ import numpy as np
 
 from opl.files.beside import Beside
 from opl.least.box_nodes import TrackSearch
-from opl.least.box_track import BoxTracks
 from opl.least.holders import holders
 from opl.least.hope import Hope
-from opl.least.passages import NO_PASSAGES, Passages
+from opl.least.motions import Motions
+from opl.least.passages import Passages
 from opl.least.postures import Columns
-from opl.least.rows import Bulge
 from opl.least.search_space import SearchSpace, seams_in
 from opl.least.work import Work
 from opl.planning.costs import PushAway
@@ -35,7 +34,6 @@ from opl.walls.obstructed import Obstructions
 from opl.walls.placement import Placement
 
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
-CLEARLY_LESS = 0.005  # of the best: what a motion in a box not settled should be better by
 MOST_IN_VAIN = 2  # such boxes in which no motion is free: what collides is left out from then on
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
@@ -69,9 +67,8 @@ class OptimalSearch:
         self._walls, self._families = space.walls, space.families
         self._sampler, self._rectangles = space.sampler, space.rectangles
         push_away = PushAway(problem.cell, settings.costs)
-        self.motions = TrackSearch(problem, self._sampler, settings.costs, most, push_away)
-        self._tracks = BoxTracks(self.motions)
-        self.plan, self._largest = fallback, largest
+        tracks = TrackSearch(problem, self._sampler, settings.costs, most, push_away)
+        self.motions = Motions(space, tracks, settings, fallback, largest)
         self._proven = 0.0
         self._given_up = self._in_vain = 0  # boxes without a motion near the bound, or a free one
         self._hoped = Hope(fallback is not None)
@@ -80,7 +77,7 @@ class OptimalSearch:
             self._leave_out_collisions()
         self.proof = self._new_proof(largest)
         self._places: set[float] = set()
-        self._work = Work(problem.scene, self._walls, self._families, self.motions)
+        self._work = Work(problem.scene, self._walls, self._families, tracks)
         # boxes grown know nothing of collisions
         self._hope(None if self._sampler.collisions else self._families.smallest_grown())
         hoped = min(self.proof.threshold, self._hoped.guess(0.0, largest))
@@ -102,8 +99,13 @@ class OptimalSearch:
         return self._work.done / self._settings.max_subproblems
 
     @property
+    def plan(self) -> Plan | None:
+        """The best motion so far."""
+        return self.motions.best
+
+    @property
     def _value(self) -> float:
-        return self._largest if self.plan is None else self.plan.path.joint_range_sum
+        return self.motions.value
 
     @property
     def lower_bound(self) -> float:
@@ -143,7 +145,8 @@ class OptimalSearch:
             return
         elif not self._sampler.collisions:
             self._mind_collisions()
-        elif self.proof.look_closer():
+        elif self.proof.look_closer() or self.motions.look_about(box, placements):
+            self._lower()
             self.proof.put_back()
         else:
             self._given_up += 1
@@ -183,12 +186,12 @@ class OptimalSearch:
         if not missed and not passages.walls:
             # the box meets the walls that it cannot pass, but perhaps not with these images
             split = not passages.open and self.proof.split_keys()
-            return split or self._try(columns, passages, inner)
+            return split or self._learn_in(columns, passages, inner)
         fits = not missed or (inner is not None and inner.size < most)
         if passages.open and fits and self._work.left_for_early:
             best = self.plan
             with self._work.early():
-                if self._try(columns, passages, inner) or self.plan is not best:
+                if self._learn_in(columns, passages, inner) or self.plan is not best:
                     return True
         if not missed:
             for wall in self._walls.walls(self._rectangles.take_in(passages.walls[:MOST_ADDED])):
@@ -216,17 +219,17 @@ class OptimalSearch:
     def _look_for_more(self, box: JointBox, placements: Sequence[Placement]) -> None:
         """Grow a box that is not settled until it holds all; look for a motion in it, if small."""
         threshold, larger = self.proof.threshold, self._grown(box, placements)
-        if larger is None or larger.size > self._value * (1.0 - CLEARLY_LESS):
+        if larger is None or larger.size > self.motions.worth:
             return
         if self._work.left_for_unsettled(self.plan is not None):
             with self._work.early():
                 columns, _, inner = self._space.look(larger, placements, self._settings)
                 if inner is not None:
                     self._hope(inner)
-                    room, collided = self._settings.room(inner.size), self.motions.collided
-                    found = self._tracks.plan(columns, NO_PASSAGES, inner, room, lambda _: False)
-                    self.keep(found)
-                    self._in_vain += int(found is None and self.motions.collided > collided)
+                    collided = self.motions.collided
+                    found = self.motions.look_in(columns, inner)
+                    self._in_vain += int(not found and self.motions.collided > collided)
+                    self._lower()
         if self.proof.threshold < threshold:
             self.proof.show_soon()
 
@@ -261,7 +264,7 @@ class OptimalSearch:
     def _hope_for_less(self) -> None:
         """Begin the proof again: no motion is as good as was hoped; or end it if there is none."""
         if self.plan is None and not crossed_by_any(self.proof.walls, self.forbidden):
-            self._proven = self._largest
+            self._proven = self._value
             return
         known = self._value, self.plan is not None, self._work.share_of_proof
         self._begin_again(self.proof, self._hoped.more(self.proof.threshold, *known))
@@ -277,24 +280,17 @@ class OptimalSearch:
             self.proof.add(wall)
             self._places.add(wall.place)
 
-    def _try(self, columns: Columns, passages: Passages, box: JointBox | None) -> bool:
+    def _learn_in(self, columns: Columns, passages: Passages, box: JointBox | None) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
-        if box is None or self._tracks.tried(columns, passages, box):
-            return False
-        learnt = False
-
-        def learn(bulges: Sequence[Bulge]) -> bool:
-            nonlocal learnt
-            learnt = self._rectangles.refine(bulges, box)
-            return learnt
-
-        room, worth = self._settings.room(box.size), self._value * (1.0 - CLEARLY_LESS)
-        found = self._tracks.plan(columns, passages, box, room, learn, worth)
-        self.keep(found)
-        return learnt or (found is None and learn(passages.narrow))
+        learnt = self.motions.learn_in(columns, passages, box)
+        self._lower()
+        return learnt
 
     def keep(self, found: Plan | None) -> None:
         """Keep a motion that is better than the best."""
-        if found is not None and found.path.joint_range_sum < self._value:
-            self.plan = found
-            self.proof.threshold = min(self.proof.threshold, self._value)
+        self.motions.keep(found)
+        self._lower()
+
+    def _lower(self) -> None:
+        """Look only for what is better than the best motion."""
+        self.proof.threshold = min(self.proof.threshold, self._value)

@@ -1,0 +1,67 @@
+"""Where a box that holds a posture of every place has no motion, one is found in a larger box."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from opl.least.box_nodes import TrackSearch
+from opl.least.motions import LARGER, Motions
+from opl.least.search_space import SearchSpace, seams_in
+from opl.planning.costs import PushAway
+from opl.search.box import JointBox
+from opl.search.smooth import Travel
+from tests.oracles.test_optimal import SETTINGS, recursive, v_row
+
+
+@cache
+def space():
+    """Return what is looked at of one row of the V part."""
+    return SearchSpace.of(v_row(), seams_in(v_row()), recursive(v_row).path.joint_range_sum)
+
+
+def motions(known):
+    """Return a search for motions in boxes of that row."""
+    problem, costs = v_row(), SETTINGS.costs
+    push_away = PushAway(problem.cell, costs)
+    most = Travel(np.inf, np.inf)
+    tracks = TrackSearch(problem, space().sampler, costs, most, push_away)
+    largest = recursive(v_row).path.joint_range_sum
+    return Motions(space(), tracks, SETTINGS, known, largest)
+
+
+def smaller(share):
+    """Return a box that holds all places, smaller by a share about its middle; and placements."""
+    box = space().families.smallest_grown()
+    spare = share * (box.upper - box.lower) / 2.0
+    box = JointBox(box.lower + spare, box.upper - spare)
+    return box, space().families.hold(box, {}, set(), 0.01)[0]
+
+
+def test_a_motion_is_found_about_a_box_that_is_too_small():
+    search, (box, placements) = motions(None), smaller(0.02)
+    assert search.look_about(box, placements)
+    found = search.best.path
+    assert box.size < found.joint_range_sum
+    assert found.joint_range_sum == pytest.approx(np.ptp(found.q, axis=0).sum(), rel=1e-9)
+    widest = box.widened(LARGER[-1] * box.size).size
+    assert found.joint_range_sum <= widest + SETTINGS.room(widest)
+    assert found.joint_range_sum < recursive(v_row).path.joint_range_sum
+
+
+def test_none_is_kept_that_is_no_better():
+    first = motions(None)
+    box, placements = smaller(0.02)
+    first.look_about(box, placements)
+    again = motions(first.best)
+    assert not again.look_about(box, placements)
+    assert again.best is first.best
+
+
+@pytest.mark.parametrize("share", [0.02, 0.9])
+def test_boxes_as_large_as_the_best_are_not_looked_at(share, monkeypatch):
+    box, placements = smaller(share)
+    search = motions(recursive(v_row))
+    monkeypatch.setattr(type(search), "value", property(lambda _: box.size))
+    monkeypatch.setattr(type(space()), "look", lambda *_: pytest.fail("looked at"))
+    assert not search.look_about(box, placements)
