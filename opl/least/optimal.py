@@ -28,6 +28,7 @@ from opl.search.box import JointBox
 from opl.search.forbidden import Forbidden, crossed_by_any
 from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
+from opl.search.walls import Chain
 from opl.walls.families import few_columns
 from opl.walls.images import Seams
 from opl.walls.obstructed import Obstructions
@@ -88,10 +89,10 @@ class OptimalSearch:
     @property
     def finished(self) -> bool:
         """Whether there is nothing left to do."""
-        closed = self.proof.closed and self.proof.threshold >= self._value
-        done = closed or self._proven >= self._value
+        closed = self.proof.closed and self.proof.threshold >= self.motions.value
+        done = closed or self._proven >= self.motions.value
         ended = self._given_up >= MOST_GIVEN_UP or self.work_share >= 1.0
-        return done or ended or self._value <= AT_REST
+        return done or ended or self.motions.value <= AT_REST
 
     @property
     def work_share(self) -> float:
@@ -104,18 +105,14 @@ class OptimalSearch:
         return self.motions.best
 
     @property
-    def _value(self) -> float:
-        return self.motions.value
-
-    @property
     def lower_bound(self) -> float:
         """No motion has a smaller joint range sum, in [rad]."""
-        return min(max(self._proven, self.proof.lower_bound), self._value)
+        return min(max(self._proven, self.proof.lower_bound), self.motions.value)
 
     def holders(self, beside: Beside | None = None) -> tuple[Holder, ...]:
         """Return what holds the least box over the walls up."""
         walls, images, cut = self.proof.walls, self._walls.images, self._walls.finer
-        given = walls, images.of, cut, self._value, self.forbidden, images.limits
+        given = walls, images.of, cut, self.motions.value, self.forbidden, images.limits
         return holders(*given, beside)
 
     def step(self) -> None:
@@ -145,7 +142,9 @@ class OptimalSearch:
             return
         elif not self._sampler.collisions:
             self._mind_collisions()
-        elif self.proof.look_closer() or self.motions.look_about(box, placements):
+        elif self.proof.look_closer() or (
+            self._given_up + 1 == MOST_GIVEN_UP and self.motions.look_about(box, placements)
+        ):
             self._lower()
             self.proof.put_back()
         else:
@@ -177,6 +176,10 @@ class OptimalSearch:
         if not placements or larger is None or larger.size >= most:
             self._add(missed)
             return bool(missed)
+        barred = [] if missed else self._space.barred(box, placements, self._settings)
+        if barred:
+            self._add([], barred)
+            return True
         columns, passages, inner = self._space.look(box, placements, self._settings)
         self._hope(inner)
         known, new = columns.missed(box, self._places, self._settings.missed(self.proof.threshold))
@@ -193,10 +196,7 @@ class OptimalSearch:
             with self._work.early():
                 if self._learn_in(columns, passages, inner) or self.plan is not best:
                     return True
-        if not missed:
-            for wall in self._walls.walls(self._rectangles.take_in(passages.walls[:MOST_ADDED])):
-                self.proof.add(wall)
-        self._add(missed)
+        self._add(missed, [] if missed else passages.walls)
         return True
 
     def _grown(self, box: JointBox, placements: Sequence[Placement]) -> JointBox | None:
@@ -245,7 +245,7 @@ class OptimalSearch:
         self._places.clear()
         self.proof.put_back()  # before what is proven is noted
         self._hoped = Hope(self.plan is not None)
-        minding = self._new_proof(hoped := self._hoped.guess(self.lower_bound, self._value))
+        minding = self._new_proof(hoped := self._hoped.guess(self.lower_bound, self.motions.value))
         for wall in self.proof.walls:
             minding.add(wall)
         self._begin_again(minding, hoped)
@@ -264,9 +264,9 @@ class OptimalSearch:
     def _hope_for_less(self) -> None:
         """Begin the proof again: no motion is as good as was hoped; or end it if there is none."""
         if self.plan is None and not crossed_by_any(self.proof.walls, self.forbidden):
-            self._proven = self._value
+            self._proven = self.motions.value
             return
-        known = self._value, self.plan is not None, self._work.share_of_proof
+        known = self.motions.value, self.plan is not None, self._work.share_of_proof
         self._begin_again(self.proof, self._hoped.more(self.proof.threshold, *known))
 
     def _begin_again(self, proof: BoxProof, threshold: float) -> None:
@@ -275,7 +275,9 @@ class OptimalSearch:
         self.proof = proof.again(threshold)
         self._work.begin_again(self.proof)
 
-    def _add(self, places: list[float]) -> None:
+    def _add(self, places: list[float], chains: Sequence[Chain] = ()) -> None:
+        for wall in self._walls.walls(self._rectangles.take_in(chains[:MOST_ADDED])):
+            self.proof.add(wall)
         for wall in self._walls.columns(places):
             self.proof.add(wall)
             self._places.add(wall.place)
@@ -293,4 +295,4 @@ class OptimalSearch:
 
     def _lower(self) -> None:
         """Look only for what is better than the best motion."""
-        self.proof.threshold = min(self.proof.threshold, self._value)
+        self.proof.threshold = min(self.proof.threshold, self.motions.value)

@@ -1,15 +1,19 @@
-"""Where a box that holds a posture of every place has no motion, one is found in a larger box."""
+"""Boxes without a motion: one is found in a larger box, or chains stand in the way."""
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.least.box_nodes import TrackSearch
 from opl.least.motions import LARGER, Motions
+from opl.least.rows import Bulge
 from opl.least.search_space import SearchSpace, seams_in
 from opl.planning.costs import PushAway
 from opl.search.box import JointBox
+from opl.search.in_box import missing
 from opl.search.smooth import Travel
 from tests.oracles.test_optimal import SETTINGS, recursive, v_row
 
@@ -65,3 +69,28 @@ def test_boxes_as_large_as_the_best_are_not_looked_at(share, monkeypatch):
     monkeypatch.setattr(type(search), "value", property(lambda _: box.size))
     monkeypatch.setattr(type(space()), "look", lambda *_: pytest.fail("looked at"))
     assert not search.look_about(box, placements)
+
+
+def postures_of(chain):
+    """Return all postures along a chain of places and contact positions in [rad], shape (n, 6)."""
+    problem = v_row()
+    ways = [np.linspace(one, other, 400) for one, other in pairwise(chain)]
+    places, t = np.concatenate(ways).T
+    T = problem.points.frames_at(places)
+    q = inverse_kinematics(problem.cell.robot.arm, problem.cell.Ts_base_flange(t, T))
+    return q[~np.isnan(q).any(axis=-1)]
+
+
+def test_a_box_meets_no_posture_of_the_chains_that_stand_in_its_way():
+    box, placements = smaller(0.3)
+    assert not space().barred(box, placements, SETTINGS)  # nothing is cut between places
+    space().rectangles.refine([Bulge(29.0, 30.0, 8, True)], box)
+    chains = space().barred(box, placements, SETTINGS)
+    assert chains
+    for chain in chains:
+        assert chain[0][1] == -chain[-1][1] == -v_row().cell.wheel.last_position
+        q = postures_of(chain)
+        middle = (box.lower + box.upper) / 2.0
+        q = q + 2.0 * np.pi * np.round((middle - q) / (2.0 * np.pi))
+        assert missing(q, box).min() > SETTINGS.missed(box.size)
+    assert not space().barred(box.widened(10.0), placements, SETTINGS)
