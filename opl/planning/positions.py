@@ -22,10 +22,10 @@ from opl.errors import UnsafeError
 from opl.files.beside import Beside
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
-from opl.geometry.wheel import MM_PER_M, ContactWheel
+from opl.motion.bows import bowed_lines, freedom
 from opl.motion.fewest import ChainRule, Lines
 from opl.motion.gradual import PLANNED_RATIO
-from opl.motion.line_error import LEVER, ROLLS, SLIDES, Run, Screws, line_errors, screws_of
+from opl.motion.line_error import Run, Screws, line_errors, screws_of
 from opl.motion.long_runs import fewest_of_long
 from opl.motion.motion import Motion
 from opl.motion.process_settings import ProcessSettings
@@ -112,7 +112,7 @@ def with_fewest_positions(
     """
     runs = list(on_wheel_runs(scene.cell, points, motion, process, rule))
     chosen = (beside or Beside()).share(
-        _choosing, (scene, motion, rule), runs, length=lambda of_pass: len(of_pass[1].q)
+        _choosing, (scene, points, motion, rule), runs, length=lambda of_pass: len(of_pass[1].q)
     )
     thinned, screws = motion, screws_of(scene.cell.robot)
     for (first, run), (kept, _) in zip(runs, chosen, strict=True):
@@ -122,14 +122,19 @@ def with_fewest_positions(
 
 @contextmanager
 def _choosing(
-    scene: PlanningScene, motion: Motion, rule: PositionRule
+    scene: PlanningScene, points: CutterPoints, motion: Motion, rule: PositionRule
 ) -> Iterator[Callable[[tuple[int, Run]], tuple[NDArray[np.intp], list[Rows]]]]:
     """Open what chooses the positions of a pass, given as `on_wheel_runs` does."""
-    yield lambda of_pass: _chosen(scene, motion, rule, *of_pass)
+    yield lambda of_pass: _chosen(scene, points, motion, rule, *of_pass)
 
 
 def _chosen(
-    scene: PlanningScene, motion: Motion, rule: PositionRule, first: int, run: Run
+    scene: PlanningScene,
+    points: CutterPoints,
+    motion: Motion,
+    rule: PositionRule,
+    first: int,
+    run: Run,
 ) -> tuple[NDArray[np.intp], list[Rows]]:
     """Return which configurations of a run are written, and the corners that are still too wide."""
     screws = screws_of(scene.cell.robot)
@@ -144,11 +149,12 @@ def _chosen(
             raise UnsafeError(f"pass {index}: no positions keep the contact error")
         thinned = _thinned(screws, alone, first - start, run, kept)
         corners = [_moved(turn, start) for turn in rule.too_wide(thinned)]
-        lines_hit = [_moved(line, start) for line in _colliding_lines(scene, thinned)]
+        bowed = bowed_lines(scene.cell, points, thinned, rule.max_contact_error)
+        barred_lines = [_moved(line, start) for line in (*_colliding_lines(scene, thinned), *bowed)]
         # of neighbouring configurations there are none to put in between
         barred = {
             _moved(rows, -first)
-            for rows in (*lines_hit, *corners)
+            for rows in (*barred_lines, *corners)
             if rows[-1] - rows[0] > len(rows) - 1
         }
         if barred <= blocked:
@@ -205,22 +211,12 @@ def on_wheel_runs(
             motion.q[rows],
             cell.T_flange_workpiece @ points.frames_at(place),
             cell.wheel.T_base_contact(t),
-            *_freedom(cell.wheel, t),
+            *freedom(cell.wheel, t),
             rule.allowed(place),
             pace[rows] - pace[rows[0]],
             rule.tool_points(motion.q[rows]),
         )
         yield int(rows[0]), run
-
-
-def _freedom(wheel: ContactWheel, t: Array) -> tuple[NDArray[np.int64], Array]:
-    """Return what the contact may do at contact positions, and how far either way."""
-    flat, last = wheel.flat_end, wheel.last_position
-    rolls = np.abs(t) > flat
-    sliding = np.stack([t - flat, t + flat], axis=1) / MM_PER_M
-    first, beyond = np.where(t > 0.0, flat, -last), np.where(t > 0.0, last, -flat)
-    rolling = np.deg2rad(np.stack([first - t, beyond - t], axis=1)) * LEVER
-    return np.where(rolls, ROLLS, SLIDES), np.where(rolls[:, None], rolling, sliding)
 
 
 def _colliding_lines(scene: PlanningScene, motion: Motion) -> Sequence[tuple[int, int]]:
