@@ -125,7 +125,8 @@ class ContactSegments:
         chosen: NDArray[np.intp] = ground.copy()
         goes_on = [m for m in range(1, len(chosen)) if self._goes_on(chosen, m)]
         self._find((int(chosen[m - 1]), int(chosen[m])) for m in goes_on)
-        for m in range(1, len(chosen)):
+        # there and back: one that is moved on may leave the segment before it too far off
+        for m in (*range(1, len(chosen)), *range(len(chosen) - 1, 0, -1)):
             if not self._goes_on(chosen, m) or self._farthest(chosen, m) <= allowed:
                 continue
             for end in (m, m - 1):
@@ -134,7 +135,41 @@ class ContactSegments:
                     tried[end] = touch
                     if self._around(tried, end) < self._around(chosen, end):
                         chosen = tried
+            for end, way in ((m - 1, -1), (m, 1)):
+                if self._farthest(chosen, m) > allowed:
+                    chosen = self._drawn_on(chosen, end, way, allowed)
         return chosen
+
+    def _drawn_on(
+        self, chosen: NDArray[np.intp], end: int, way: int, allowed: float
+    ) -> NDArray[np.intp]:
+        """Return touches with one end of a segment and those behind it moved towards the other end.
+
+        A flat touches with many points at once, which are ground one by one later, or were before:
+        no one of them alone would fit better. They are moved only where all fit better then.
+
+        Args:
+            chosen: The touches, by their indices.
+            end: Which of them is moved first.
+            way: Which are behind it: -1 for those before it, 1 for those after it.
+            allowed: How far off the contact model the segments should be at the most, in [m].
+        """
+        tried, k = chosen.copy(), end
+        while 0 <= k < len(tried):
+            others = self._alternatives(tried, k)
+            if not len(others) or tried[k] == (nearest := others[-1 if way < 0 else 0]):
+                break
+            tried[k] = nearest
+            k += way
+            behind = k + (way < 0)
+            if not 0 < behind < len(tried) or not self._goes_on(tried, behind):
+                break
+            if self._farthest(tried, behind) <= allowed:
+                break
+        moved = range(max(min(k, end), 1), min(max(k, end) + 2, len(tried)))
+        own = [j for j in moved if self._goes_on(tried, j)]
+        worst, before = (max(self._farthest(one, j) for j in own) for one in (tried, chosen))
+        return tried if worst < before else chosen
 
     def _goes_on(self, chosen: NDArray[np.intp], m: int) -> bool:
         """Return whether a touch is on the same pass as the one before it."""

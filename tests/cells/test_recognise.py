@@ -32,6 +32,7 @@ from tests.support.planned import (
     tiny_motion,
     tiny_problem,
     tiny_timed,
+    v_problem,
 )
 
 RULE = Rule(
@@ -250,6 +251,22 @@ def test_of_several_touches_of_a_flat_the_one_is_taken_that_the_segments_around_
     assert segments.between(at[0], ends[1]).farthest > 1e-4
     settled = segments.settled(np.array([ends[0], at[0], ends[1]]), 1e-4)
     assert found.configuration[settled].tolist() == [0, 4, 6]
+
+
+def test_a_flat_that_lies_on_the_wheel_with_many_points_is_ground_point_by_point_on_the_edge():
+    problem = v_problem()
+    wheel, points = problem.cell.wheel, problem.points
+    # it begins to lie on the wheel's flat with points 4 to 7, but is ground past its edge
+    place = np.arange(4.0, 8.5, 0.5)
+    t = np.where(place == 4.0, -10.0, wheel.flat_end + 2.0)
+    Ts = parts_at(wheel, points, place, t)
+    found = find_touches(wheel, points, Ts, 8e-5)
+    assert found.point[found.configuration == 0].tolist()[-4:] == [4, 5, 6, 7]
+    first = [int(np.flatnonzero(found.point == n)[0]) for n in range(4, 9)]
+    assert found.configuration[first].tolist() == [0, 0, 0, 0, 8]
+    segments = ContactSegments(wheel, points, Ts, np.ones(len(Ts)), found)
+    settled = segments.settled(np.array(first), 1e-4)
+    assert found.configuration[settled].tolist() == [0, 2, 4, 6, 8]
 
 
 def test_only_points_at_their_place_on_the_wheel_touch():
