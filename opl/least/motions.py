@@ -33,7 +33,6 @@ class Motions:
         largest: More than the joint range sum of any motion in [rad], that of the known one.
 
     Attributes:
-        search: By what tracks are sought.
         best: The best motion so far.
     """
 
@@ -45,7 +44,7 @@ class Motions:
         known: Plan | None,
         largest: float,
     ) -> None:
-        self.search, self.best = search, known
+        self._search, self.best = search, known
         self._space, self._settings, self._largest = space, settings, largest
         self._tracks = BoxTracks(search)
 
@@ -57,12 +56,12 @@ class Motions:
     @property
     def collided(self) -> int:
         """How many motions collided, those that sink aside."""
-        return self.search.collided
+        return self._search.collided
 
     @property
     def stopped(self) -> Counter[tuple[float, str]]:
         """What stopped the motions checked last, as of `TrackSearch`."""
-        return self.search.stopped
+        return self._search.stopped
 
     @property
     def worth(self) -> float:
@@ -77,8 +76,7 @@ class Motions:
 
     def look_in(self, columns: Columns, box: JointBox) -> bool:
         """Look for a motion through places in a box that may hold one; return whether one is."""
-        room = self._settings.room(box.size)
-        found = self._tracks.plan(columns, NO_PASSAGES, box, room, lambda _: False)
+        found = self._found(columns, NO_PASSAGES, box)
         self.keep(found)
         return found is not None
 
@@ -108,9 +106,11 @@ class Motions:
             if larger.size >= self.value:
                 break
             columns, passages, inner = self._space.look(larger, placements, self._settings)
-            if inner is not None:
-                room = self._settings.room(inner.size)
-                found = self._tracks.plan(columns, passages, inner, room, lambda _: False)
-                if found is not None:
-                    return self.keep(found)
+            if inner is not None and (found := self._found(columns, passages, inner)) is not None:
+                return self.keep(found)
         return False
+
+    def _found(self, columns: Columns, passages: Passages, box: JointBox) -> Plan | None:
+        """Return the motion through places as they are, cut no finer where a track leaves a box."""
+        room = self._settings.room(box.size)
+        return self._tracks.plan(columns, passages, box, room, lambda _: False)

@@ -18,7 +18,8 @@ from opl.motion.line_error import LEVER, ROLLS, SLIDES
 from opl.motion.motion import Motion
 
 BETWEEN = np.array([0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875])  # of the way, looked at
-# of the error allowed: what a bow is that is not looked at; both ends leave more than that
+# of the error allowed: lines that can bow no more are not looked at; where lines are chosen, as
+# much is left at both ends
 NO_BOW = 0.02
 
 
@@ -27,7 +28,8 @@ def bowed_lines(
 ) -> list[tuple[int, int]]:
     """Return the lines on the wheel that are farther off between places than is allowed.
 
-    Places and contact positions between two configurations are taken to change evenly.
+    Places and contact positions between two configurations are taken to change evenly, and lines
+    that can bow by no more than `NO_BOW` of what is allowed are not looked at.
 
     Args:
         cell: The cell.
