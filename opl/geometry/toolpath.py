@@ -72,3 +72,9 @@ class CutterPoints:
         after = np.minimum(before + 1, len(self) - 1)
         Ts = self.Ts_workpiece_cutter
         return interpolate(Ts[before], Ts[after], place - before)
+
+    def at_places(self, place: Array) -> CutterPoints:
+        """Return fractional cutter points of some passes, shape (n,), as points of their own."""
+        index = self.pass_index[place.astype(int)]
+        arc_length = np.interp(place, np.arange(len(self)), self.arc_length)
+        return CutterPoints(self.frames_at(place), index - index[0], arc_length)

@@ -81,7 +81,7 @@ class ColumnSampler:
         there = self.there(places)
         positions = problem.field.contact_positions
         grid = np.broadcast_to(positions, (len(places), len(positions)))
-        cuts = self._cuts(places, there, grid)
+        cuts = problem.cuts_at(places, there, grid)
         cuts |= self._spends(there, grid, ~cuts, spare)
         t = np.empty((len(places), FINE))
         for block in blocks_of(*grid.shape):
@@ -198,7 +198,7 @@ class ColumnSampler:
                 own = np.flatnonzero(there.pass_index[block] == index)
                 angles = solutions[own][:, :, placement.family]
                 q[block][own] = self._placed(angles, placement)
-        free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
+        free = ~np.isnan(q[..., 0]) & ~problem.cuts_at(places, there, t)
         free &= _allowed(places, there.pass_index, placements, t)
         free[free] = image_within_limits(problem.cell.robot, self.flips, q[free])
         if self.collisions:
@@ -231,13 +231,7 @@ class ColumnSampler:
 
     def there(self, places: Array) -> CutterPoints:
         """Return fractional cutter points of some passes, shape (n,), as points of their own."""
-        points = self._problem.points
-        index = points.pass_index[places.astype(int)]
-        return CutterPoints(
-            points.frames_at(places),
-            index - index[0],
-            np.interp(places, np.arange(len(points)), points.arc_length),
-        )
+        return self._problem.points.at_places(places)
 
     def collides(self, q: Array) -> np.ndarray:
         """Return which postures collide, or mirrored do, with a little to spare for the way on.
@@ -261,20 +255,6 @@ class ColumnSampler:
             asked = (edge for edge, one in zip(edges, new, strict=True) if one)
             self._shut.update(zip(asked, found.tolist(), strict=True))
         return np.array([self._shut[edge] for edge in edges], dtype=bool)
-
-    def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
-        """Return where the part would sink too deep into the wheel, shape (n, m).
-
-        Where all nodes of the field around a place and contact position agree, so does what lies
-        between them: a motion that is not free for all that is refused when it is checked.
-        """
-        field, cuts = self._problem.field.contact_positions, self._problem.cuts
-        after = np.clip(np.searchsorted(field, t), 1, len(field) - 1)
-        near = np.zeros(t.shape, dtype=int)
-        for column in (np.floor(places).astype(int), np.ceil(places).astype(int)):
-            near += cuts[column[:, None], after - 1].astype(int) + cuts[column[:, None], after]
-        unsure = (near > 0) & (near < 4)
-        return np.asarray(nearer_nodes(self._problem.scene, there, t, unsure) | (near == 4))
 
     def _placed(self, angles: Array, placement: Placement) -> Array:
         """Return postures as placed, of principal angles of their family, shape (n, m, 6)."""

@@ -1,12 +1,14 @@
 """What travel and time on the wheel cost at the least, at any contact positions.
 
 Some cutter points of each pass are known as cells of the contact position, with the postures over
-each enclosed. A motion passes a cell of each in order, so it costs no less than the cheapest way
-through them; the cells that matter are cut finer until that no longer rises.
+each enclosed, but for those in which the robot surely collides. A motion passes a cell of each in
+order, so it costs no less than the cheapest way through them; the cells that matter are cut finer,
+and more cutter points taken in, until that no longer rises.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,18 +16,19 @@ import numpy as np
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.geometry.frames import Array
 from opl.planning.problem import GrindingProblem
-from opl.search.shortest_way import Cells, WayPrices, cheapest_over_ends, cheapest_ways
+from opl.search.shortest_way import cheapest_over_ends, cheapest_ways
 from opl.search.walls import UNKNOWN, Wall
+from opl.search.way_cells import Cells, WayPrices
 from opl.walls.columns import ColumnWalls
 from opl.walls.enclosed import ROUND_OFF
 from opl.walls.images import Images, seams_of
 
-PLACES = 16  # cutter points of a pass that are looked at first
-FEWEST = 4  # that are looked at
+FEWEST = 5  # cutter points of a pass that are looked at first
 PARTS = 2  # that a cell is cut into
-ROUNDS = 8  # of cutting cells or leaving out cutter points
-MOST_EDGES = 400_000  # between cells of a pass and posture; more are not looked at
-CLOSE = 0.01  # fraction of it by which a bound may stay below ways over postures
+MOST_WORK = 4e7  # ways from cell to cell that are looked at, of all passes and rounds
+CLOSE = 0.01  # fraction of it by which a bound may stay below what is known to be attained
+ROUNDS = 8  # of cutting cells, before more cutter points are taken in
+SETTLED = 0.005  # by which it may stay below ways over postures: then no more is cut either
 SLACK = 1e-9  # rounding of the sums that make a bound, as a fraction of it
 
 
@@ -68,41 +71,155 @@ class _Cells:
             self.pad_low[kept], self.pad_high[kept],
         )  # fmt: skip
 
-    def renumbered(self, columns: np.ndarray) -> _Cells:
-        """Return the cells of some columns, these counted anew."""
-        return replace(self, column=np.searchsorted(columns, self.column))
 
-
-def least_cost(problem: GrindingProblem, travel: float, time: float) -> float:
+def least_cost(
+    problem: GrindingProblem, travel: float, time: float, worth: Array | None = None
+) -> float:
     """Return what no motion along the passes costs less than, whatever its contact positions.
 
-    Each pass lies on one IK branch; moves between passes are not charged for.
+    Of those that keep the clearances of the plan. Each pass lies on one IK branch; moves between
+    passes are not charged for.
 
     Args:
         problem: What is to be planned.
         travel: Price of a radian of joint travel on the wheel.
         time: Price of a second on the wheel.
+        worth: What is about attained of each pass, shape (n_passes,); no bound is sought beyond.
     """
     seams = seams_of(problem.solutions(np.arange(len(problem.points))))
     images = Images(problem.cell.robot, seams, 0.0)
     walls = ColumnWalls(problem.cell, problem.scene.part, problem.points, images)
-    total = 0.0
-    for index in range(problem.points.n_passes):
-        columns = np.flatnonzero(problem.points.pass_index == index)
-        share = np.linspace(0, len(columns) - 1, min(PLACES, len(columns)))
-        places = columns[np.unique(share.astype(int))]
+    wanted = np.full(problem.points.n_passes, np.inf) if worth is None else worth
+    total = sum(
+        _PassBound(problem, walls, travel, time, index).least(most)
+        for index, most in enumerate(wanted.tolist())
+    )
+    return total * (1.0 - SLACK)
+
+
+class _PassBound:
+    """What a pass costs at the least.
+
+    Args:
+        problem: What is to be planned.
+        walls: Encloses its cutter points.
+        travel: Price of a radian of joint travel.
+        time: Price of a second.
+        index: The pass.
+    """
+
+    def __init__(
+        self, problem: GrindingProblem, walls: ColumnWalls, travel: float, time: float, index: int
+    ) -> None:
+        self._problem, self._walls = problem, walls
+        self._travel, self._time = travel, time
+        self._columns = np.flatnonzero(problem.points.pass_index == index)
+        self._left = MOST_WORK / problem.points.n_passes  # ways that may be looked at
+
+    def least(self, worth: float) -> float:
+        """Return the bound, no greater than what is worth knowing."""
+        places, proven, ceiling = self._columns[:0], 0.0, worth
+        families = [_cells([], family) for family in self._walls.images.families]
+        for count in self._counts():
+            places, families = self._with_more(places, families, count)
+            for _ in range(ROUNDS):
+                families = [one for one in families if len(np.unique(one.column)) == len(places)]
+                cells = [one.in_columns(len(places)) for one in families]
+                self._left -= sum(one.edges for one in cells)
+                if self._left < 0.0:
+                    return proven
+                bounds, attained = self._ways(places, cells)
+                proven = max(proven, min(ceiling, *(float(way.min()) for way in bounds), np.inf))
+                if proven >= ceiling * (1.0 - CLOSE):
+                    return proven
+                families, bounds = _below(families, bounds, ceiling)
+                if proven >= attained * (1.0 - SETTLED):
+                    break
+                # no bound over these cutter points is larger than what is attained there
+                families = [
+                    self._without_collisions(_cut(self._problem, places, one, way < attained))
+                    for one, way in zip(families, bounds, strict=True)
+                ]
+        return proven
+
+    def _without_collisions(self, cells: _Cells) -> _Cells:
+        """Return cells but for those in which the robot surely collides all over."""
+        middle, pads = cells.q.mean(axis=1), np.maximum(cells.pad_high, -cells.pad_low)
+        turned = np.abs(np.diff(cells.q, axis=1)[:, 0]) / 2.0 + pads
+        struck = np.asarray((pads < UNKNOWN).all(axis=1))
+        scene = self._problem.scene.collision
+        for sign, shift in self._walls.images.flips:
+            at = np.flatnonzero(struck)
+            q = middle[at] * sign + shift
+            struck[at] = scene.collides(q)
+            at, q = at[struck[at]], q[struck[at]]
+            struck[at] = scene.collides_throughout(q, turned[at])
+        return cells.chosen(~struck)
+
+    def _counts(self) -> Iterator[int]:
+        """Yield how many cutter points are looked at, more and more, all at last."""
+        count = FEWEST
+        while count < len(self._columns):
+            yield count
+            count = 2 * count - 1
+        yield len(self._columns)
+
+    def _with_more(
+        self, places: np.ndarray, families: list[_Cells], count: int
+    ) -> tuple[np.ndarray, list[_Cells]]:
+        """Return more cutter points, and the cells of these."""
+        share = np.linspace(0, len(self._columns) - 1, count)
+        new = np.setdiff1d(self._columns[share.astype(int)], places)
+        made = self._walls.columns(new.astype(float).tolist())
+        every = np.union1d(places, new)
+        at = np.searchsorted(every, places), np.searchsorted(every, new)
+        merged = [_merged(one, _cells(made, one.family), *at) for one in families]
+        return every, merged
+
+    def _ways(self, places: np.ndarray, families: list[Cells]) -> tuple[list[Array], float]:
+        """Return what ways through cells cost at the least, and what the cheapest over postures."""
+        problem = self._problem
         arc = np.abs(np.diff(problem.points.arc_length[places]))
         prices = WayPrices(
-            travel,
-            time,
+            self._travel,
+            self._time,
             arc / problem.process.feed,
             problem.cell.robot.max_speed,
             problem.process.contact_speed,
         )
-        made = walls.columns(places.astype(float).tolist())
-        families = [_cells(made, family) for family in images.families]
-        total += _least_of_pass(problem, places, families, prices)
-    return total * (1.0 - SLACK)
+        ways, attained = [], np.inf
+        for cells in families:
+            potential = cheapest_over_ends(cells, replace(prices, time=0.0))
+            ways.append(cheapest_ways(cells, prices, potential))
+            # what a way over postures costs: no bound, but beyond it little is to be gained
+            over = cheapest_over_ends(cells, prices) if prices.time else potential
+            attained = min(attained, float(over[cells.ends.first[-2] :].min()))
+        return ways, attained
+
+
+def _below(
+    families: list[_Cells], bounds: list[Array], ceiling: float
+) -> tuple[list[_Cells], list[Array]]:
+    """Return the cells through which a way may cost less than so much, and what it costs then."""
+    kept = [way < ceiling for way in bounds]
+    return (
+        [one.chosen(chosen) for one, chosen in zip(families, kept, strict=True)],
+        [way[chosen] for way, chosen in zip(bounds, kept, strict=True)],
+    )
+
+
+def _merged(old: _Cells, new: _Cells, at_old: np.ndarray, at_new: np.ndarray) -> _Cells:
+    """Return the cells of two sets of columns, which have these numbers then."""
+    column = np.concatenate([at_old[old.column], at_new[new.column]])
+    both = _Cells(
+        old.family,
+        column,
+        np.concatenate([old.t, new.t]),
+        np.concatenate([old.q, new.q]),
+        np.concatenate([old.pad_low, new.pad_low]),
+        np.concatenate([old.pad_high, new.pad_high]),
+    )
+    return both.chosen(np.argsort(column, kind="stable"))
 
 
 def _cells(walls: list[Wall], family: int) -> _Cells:
@@ -127,48 +244,13 @@ def _cells(walls: list[Wall], family: int) -> _Cells:
     )
 
 
-def _least_of_pass(
-    problem: GrindingProblem, places: np.ndarray, families: list[_Cells], prices: WayPrices
-) -> float:
-    """Return what a pass costs at the least; the bound rises no further than what is attained."""
-    proven, ceiling = 0.0, np.inf
-    for _ in range(ROUNDS):
-        n = len(places)
-        families = [one for one in families if len(np.unique(one.column)) == n]
-        ways, attained = [], np.inf
-        for one in families:
-            cells = one.in_columns(n)
-            potential = cheapest_over_ends(cells, replace(prices, time=0.0))
-            ways.append(cheapest_ways(cells, prices, potential))
-            # what a way over postures costs: no bound, but beyond it little is to be gained
-            over = cheapest_over_ends(cells, prices) if prices.time else potential
-            attained = min(attained, float(over[cells.ends.first[-2] :].min()))
-        ceiling = min(ceiling, attained)
-        proven = max(proven, min(ceiling, *(float(way.min()) for way in ways), np.inf))
-        if proven >= ceiling * (1.0 - CLOSE):
-            break
-        families = [one.chosen(way < ceiling) for one, way in zip(families, ways, strict=True)]
-        edges = max((one.in_columns(n).edges for one in families), default=0)
-        if edges * PARTS**2 <= MOST_EDGES:
-            families = [_cut(problem, places, one) for one in families]
-            continue
-        # fewer columns lose less where the cells are long
-        if n <= FEWEST:
-            break
-        left = np.unique(np.append(np.arange(0, n, 2), n - 1))
-        families = [one.chosen(np.isin(one.column, left)).renumbered(left) for one in families]
-        seconds = np.add.reduceat(prices.seconds, left[:-1])
-        places, prices = places[left], replace(prices, seconds=seconds)
-    return proven
-
-
-def _cut(problem: GrindingProblem, places: np.ndarray, cells: _Cells) -> _Cells:
-    """Return the cells cut into parts.
+def _cut(problem: GrindingProblem, places: np.ndarray, cells: _Cells, chosen: np.ndarray) -> _Cells:
+    """Return the cells, some of them cut into parts.
 
     The second derivative over a part lies within that over the whole, and pads fall with the
     square of the length. Cells whose pads are not known stay as they are.
     """
-    known = np.asarray((cells.pad_high < UNKNOWN).all(axis=1))
+    known = np.asarray((cells.pad_high < UNKNOWN).all(axis=1) & chosen)
     parts = np.where(known, PARTS, 1)
     source = np.repeat(np.arange(len(parts)), parts)
     number = np.arange(len(source)) - np.repeat(np.cumsum(parts) - parts, parts)

@@ -1,117 +1,164 @@
-"""The least weighted sum of joint range sum, joint travel and time.
+"""The least weighted sum of joint range sum, joint travel and time; travel or time alone.
 
 Travel and time add up along a track, the joint range sum does not. But no track in a box has a
-larger one than the box, and dynamic programming finds the least of the rest in it: so the least box
-is widened step by step up to the whole field, and the best trade between the two is kept. It is the
+larger one than the box, and the cheapest tracks of the passes are sought in it: so the least box is
+widened step by step up to the whole field, and the best trade between the two is kept. It is the
 best of these, not proven to be the best of all; the lower bound is that of the joint range sum and
 that of travel and time, added up.
 """
 
 from __future__ import annotations
 
-import heapq
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from opl.least.least_cost import least_cost
-from opl.least.least_range import plan_optimal
+from opl.least.own_track import OwnTrack, joined, tracks_of
+from opl.least.pass_tracks import FEW, FEWEST, PassTracks
+from opl.least.track_motion import motion_of_track
 from opl.motion.figures import figures_of_path
-from opl.planning.costs import track_cost
-from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
-from opl.planning.plan import Found, ObjectiveValue, Plan, propose_and_check
+from opl.planning.plan import ObjectiveValue, Plan
 from opl.planning.problem import GrindingProblem
-from opl.planning.settings import CostWeights, ObjectiveWeights, OptimalSettings
-from opl.planning.symmetry import twins
+from opl.planning.settings import CostWeights, ObjectiveWeights
 from opl.search.box import JointBox
-from opl.search.smooth import TrackCost, smoothest
 
 # by which fraction of its size the least box is widened; at last not bounded at all
-WIDENINGS = (1e-6, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, np.inf)
-MOST_CHECKS = 40  # of motions: what is still blocked then leaves the fallback
-
-Entry = tuple[float, int, int, tuple[int, ...]]  # weighted sum, matrix, widening, rows of a track
+WIDENINGS = (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0)
+MOST_BRANCHES = 2  # on which all passes are ground: those cheapest over few cutter points
+WORTH_CHANGING = 0.01  # of the sum: what is gained where passes lie on several IK branches
+ALIKE = 1e-4  # by which fraction the sums of images may differ
+MOST_TRIED = 6  # proposals of which motions are made
+TIES = 1e-3  # times the costs that decide between tracks of equal weighted sum
 
 
 def plan_weighted(
-    problem: GrindingProblem,
-    weights: ObjectiveWeights,
-    settings: OptimalSettings,
-    fallback: Plan,
-    report: Callable[[float], None] = lambda _: None,
+    problem: GrindingProblem, weights: ObjectiveWeights, costs: CostWeights, known: Sequence[Plan]
 ) -> Plan:
     """Find a collision-free motion with a small weighted sum, and a bound on the least one.
 
     Args:
         problem: What is to be planned.
         weights: What is charged for.
-        settings: What is wanted of the least joint range sum.
-        fallback: A motion that is known; returned if none better is found.
-        report: As of `plan_optimal`.
+        costs: What decides between tracks of equal weighted sum.
+        known: Motions that are known, the best of which is returned if none better is found. If the
+            joint range sum is charged for, the first has the least, with its bound.
 
     Returns:
         The plan with its weighted sum and what that can be at the least.
     """
-    prices = CostWeights(np.full(6, weights.travel), 0.0, weights.time, 0.0, 0.0, 0.0, 0.0)
-    matrices = open_matrices(problem)
-    smallest = fallback
+    lower_bound = 0.0
     if weights.joint_range > 0.0:
-        smallest = plan_optimal(problem, settings, fallback, report)
-    least_range = smallest.lower_bound or 0.0
-    box = JointBox(smallest.path.q.min(axis=0), smallest.path.q.max(axis=0))
-    lower_bound = weights.joint_range * least_range
+        lower_bound = weights.joint_range * (known[0].lower_bound or 0.0)
+    values = [_value(problem, plan, weights) for plan in known]
+    value = min(values)
+    best = known[values.index(value)]
     if weights.travel > 0.0 or weights.time > 0.0:
-        lower_bound += least_cost(problem, weights.travel, weights.time)
-    queue: list[Entry] = []
-    sweeps = {}
-    for index, matrix in enumerate(matrices):
-        cost = track_cost(problem, matrix.nodes, prices, np.zeros_like(matrix.free))
-        sweeps[index] = sweep = _Sweep(index, matrix, box, cost, weights)
-        queue += sweep.entries(range(len(WIDENINGS)))
-    heapq.heapify(queue)
-    best, value = fallback, _value(problem, fallback, weights)
-    checks = 0
-    # what a track costs at its nodes bounds from below what its path does
-    while queue and queue[0][0] < value and checks < MOST_CHECKS:
-        _, index, widening, rows = heapq.heappop(queue)
-        proposals = twins(matrices, Track(index, np.array(rows)), problem.cell.robot)
-        outcome = propose_and_check(problem, matrices, proposals, checks)
-        if isinstance(outcome, Found):
-            checks = outcome.plan.checks
-            found = _value(problem, outcome.plan, weights)
-            if found < value:
-                best, value = outcome.plan, found
-        else:
-            checks = outcome.checks
-            for entry in sweeps[index].entries([widening]):
-                heapq.heappush(queue, entry)
-    known = ObjectiveValue(value, min(lower_bound, value))
-    return replace(best, lower_bound=None, objective=known, holders=())
+        prices = _prices(weights, costs)
+        tracks = PassTracks(problem, prices)
+        proposals = list(_proposals(tracks, weights, known))
+        told = [[track.cost for track in one.passes] for one in proposals]
+        worth = np.min(told, axis=0) if told else np.full(problem.points.n_passes, np.inf)
+        lower_bound += least_cost(problem, weights.travel, weights.time, worth)
+        for one in _different(proposals):
+            # a motion costs hardly less than its track does at the cutter points
+            if one.least >= value:
+                break
+            track = joined([tracks.through_places(track, one.box) for track in one.passes])
+            found = motion_of_track(problem, prices, track)
+            if found is not None and (now := _value(problem, found, weights)) < value:
+                best, value = found, now
+    objective = ObjectiveValue(value, min(lower_bound, value))
+    return replace(best, lower_bound=None, open_because=None, objective=objective, holders=())
 
 
 @dataclass(frozen=True)
-class _Sweep:
-    """The boxes of one matrix."""
+class _Proposal:
+    """Tracks of all passes.
 
-    index: int
-    matrix: OpenMatrix
-    box: JointBox
-    cost: TrackCost
-    weights: ObjectiveWeights
+    Attributes:
+        least: Their weighted sum, told larger where passes lie on several IK branches.
+        passes: The tracks.
+        box: Where they stay, if anywhere.
+    """
 
-    def entries(self, widenings: Iterable[int]) -> Iterator[Entry]:
-        """Yield the best track in each box."""
-        matrix = self.matrix
-        for widening in widenings:
-            amount, inside = WIDENINGS[widening], matrix.free
-            if np.isfinite(amount):
-                inside = matrix.free_inside(self.box.widened(amount * self.box.size))
-            track = smoothest(matrix.ladder, matrix.blocked_edges, inside, self.cost)
-            if track is not None:
-                range_sum = matrix.nodes.range_sum(track.rows)
-                total = self.weights.joint_range * range_sum + track.cost
-                yield total, self.index, widening, tuple(track.rows.tolist())
+    least: float
+    passes: list[OwnTrack]
+    box: JointBox | None
+
+
+def _different(proposals: Iterable[_Proposal]) -> list[_Proposal]:
+    """Return the best proposals, of images one."""
+    found: list[_Proposal] = []
+    for one in sorted(proposals, key=lambda one: one.least):
+        if not found or one.least - found[-1].least > ALIKE * one.least:
+            found.append(one)
+    return found[:MOST_TRIED]
+
+
+def _proposals(
+    tracks: PassTracks, weights: ObjectiveWeights, known: Sequence[Plan]
+) -> Iterator[_Proposal]:
+    """Yield cheap tracks of all passes in boxes about the first of some plans.
+
+    In each box, those near to the plans, the cheapest on one IK branch, and those on several.
+    """
+    boxes: list[JointBox | None] = [None]
+    if weights.joint_range > 0.0:
+        q = known[0].path.q
+        least = JointBox(q.min(axis=0), q.max(axis=0))
+        boxes[:0] = [least.widened(amount * least.size) for amount in WIDENINGS]
+    begun = [tracks_of(plan.path) for plan in known]
+    for box in boxes:
+        # a larger box holds what this one does
+        near = [[tracks.about(track, box) for track in one] for one in begun]
+        for passes in (*near, *_on_branches(tracks, len(begun[0]), box)):
+            found = [track for track in passes if track is not None]
+            if len(found) == len(passes):
+                whole = joined(found)
+                range_sum = float(np.ptp(whole.q, axis=0).sum())
+                total = weights.joint_range * range_sum + whole.cost
+                changes = bool((whole.ik_branch != whole.ik_branch[0]).any())
+                yield _Proposal(total * (1.0 + WORTH_CHANGING * changes), found, box)
+
+
+def _on_branches(
+    tracks: PassTracks, n_passes: int, box: JointBox | None
+) -> list[list[OwnTrack | None]]:
+    """Return tracks of all passes: cheap ones on one IK branch, and the cheapest on several."""
+    passes = range(n_passes)
+    few = [tracks.over_few(index, FEW, box) for index in passes]
+    if not all(few):
+        return []
+    common = set(few[0]).intersection(*few)
+    costs = {branch: sum(one[branch].cost for one in few) for branch in common}
+    cheapest = sorted(costs, key=costs.__getitem__)[:MOST_BRANCHES]
+    chosen = [[branch] * n_passes for branch in cheapest]
+    chosen.append([min(one, key=lambda branch: one[branch].cost) for one in few])
+    begun = [few]
+    if box is None:  # in boxes, tracks of smaller ones are known
+        begun.append([tracks.over_few(index, FEWEST) for index in passes])
+    found: dict[tuple[int, int], OwnTrack | None] = {}
+    for index, branch in dict.fromkeys(pair for one in chosen for pair in enumerate(one)):
+        starts = [one[index][branch] for one in begun if branch in one[index]]
+        ends = filter(None, [tracks.over_all(start, box) for start in starts])
+        found[index, branch] = min(ends, key=lambda track: track.cost, default=None)
+    return [[found[pair] for pair in enumerate(one)] for one in chosen]
+
+
+def _prices(weights: ObjectiveWeights, costs: CostWeights) -> CostWeights:
+    """Return what adds up along a track, costs where it leaves a choice hardly charged for."""
+    share = TIES * max(weights.travel, weights.time)
+    return CostWeights(
+        joint_weights=weights.travel + share * costs.joint_weights,
+        contact_weight=share * costs.contact_weight,
+        time_weight=weights.time,
+        limit_weight=share * costs.limit_weight,
+        singularity_weight=share * costs.singularity_weight,
+        push_away=0.0,
+        push_weight=0.0,
+    )
 
 
 def _value(problem: GrindingProblem, plan: Plan, weights: ObjectiveWeights) -> float:

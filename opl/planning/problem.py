@@ -90,6 +90,25 @@ class GrindingProblem:
         """Where the part would sink too deep into the wheel, shape (N, M)."""
         return np.asarray(self.wheel_distance < -self.cell.planned_penetration)
 
+    def cuts_at(self, places: Array, points: CutterPoints, t: Array) -> np.ndarray:
+        """Return where the part would sink too deep into the wheel, shape (n, m).
+
+        Where all nodes of the field around a place and contact position agree, so does what lies
+        between them: a motion that is not free for all that is refused when it is checked.
+
+        Args:
+            places: Fractional cutter points, shape (n,).
+            points: The same as points of their own.
+            t: Contact positions in belt units, shape (n, m).
+        """
+        field, cuts = self.field.contact_positions, self.cuts
+        after = np.clip(np.searchsorted(field, t), 1, len(field) - 1)
+        near = np.zeros(t.shape, dtype=int)
+        for column in (np.floor(places).astype(int), np.ceil(places).astype(int)):
+            near += cuts[column[:, None], after - 1].astype(int) + cuts[column[:, None], after]
+        unsure = (near > 0) & (near < 4)
+        return np.asarray(nearer_nodes(self.scene, points, t, unsure) | (near == 4))
+
     def solutions(self, columns: np.ndarray) -> Array:
         """Solve all IK branches at some cutter points, at the contact positions of the field.
 

@@ -11,12 +11,10 @@ from opl.job import keys
 from opl.job.methods import Method, Objective, Search
 from opl.least.borders import Nameable, clear_of_borders
 from opl.least.equals import quickest_of_equals
-from opl.least.least_cost import least_cost
 from opl.least.least_range import NoMotionError, plan_optimal
 from opl.least.weighted import plan_weighted
 from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.motion.short_ways import shortened
-from opl.planning.cheapest import plan_cheapest
 from opl.planning.multi_start import (
     RecursiveSearch,
     held_back,
@@ -24,7 +22,7 @@ from opl.planning.multi_start import (
     plan_recursive,
     try_recursive,
 )
-from opl.planning.plan import Exhausted, Found, ObjectiveValue, Plan
+from opl.planning.plan import Exhausted, Found, Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import explain, no_path
 from opl.planning.settings import ObjectiveWeights, Start
@@ -76,10 +74,10 @@ def search_path(
     """
     if proves_range(search):
         plan, recursive = _search_range(search, problem, report, seams, beside)
+    elif search.method is Method.OPTIMAL:
+        plan, recursive = _search_best(search, problem, report, seams, beside)
     else:
         plan = recursive = plan_recursive(problem, search.start)
-        if search.method is Method.OPTIMAL:
-            plan = _search_best(search, problem, recursive, report)
     return FoundPaths(_finished(search, problem, plan, nameable), recursive)
 
 
@@ -158,22 +156,27 @@ def _finished(
 
 
 def _search_best(
-    search: Search, problem: GrindingProblem, recursive: Plan, report: Callable[[float], None]
-) -> Plan:
-    settings = search.optimal
-    if search.objective is Objective.WEIGHTED:
-        weights = search.objective_weights
-        return plan_weighted(problem, weights, settings, recursive, report)
-    travel, time = (0.0, 1.0) if search.objective is Objective.TIME else (1.0, 0.0)
-    joint_weights = travel * settings.costs.joint_weights
-    costs = replace(settings.costs, joint_weights=joint_weights, time_weight=time)
-    # the cheapest at the cutter points need not be so between them
-    alone = ObjectiveWeights(0.0, travel, time)
-    plans = (plan_cheapest(problem, costs), recursive)
-    values = [alone.value(_figures(problem, plan)) for plan in plans]
-    value = min(values)
-    known = ObjectiveValue(value, min(least_cost(problem, travel, time), value))
-    return replace(plans[values.index(value)], objective=known)
+    search: Search,
+    problem: GrindingProblem,
+    report: Callable[[float], None],
+    seams: Later[Seams] | None,
+    beside: Beside | None,
+) -> tuple[Plan, Plan | None]:
+    """Return the plan of another objective, and the recursive one where there is one."""
+    weights = search.objective_weights
+    if search.objective is not Objective.WEIGHTED:
+        travel, time = (0.0, 1.0) if search.objective is Objective.TIME else (1.0, 0.0)
+        weights = ObjectiveWeights(0.0, travel, time)
+    known, recursive = list[Plan](), None
+    if weights.joint_range == 0.0:
+        first = RecursiveSearch(problem, search.start)
+        found = first.go_on(MOST_FIRST_CHECKS, MOST_FIRST_WORK)
+        recursive = found.plan if isinstance(found, Found) else None
+    if recursive is None:
+        smallest, recursive = _search_range(search, problem, report, seams, beside)
+        known.append(smallest)
+    known += [] if recursive is None else [recursive]
+    return plan_weighted(problem, weights, search.optimal.costs, known), recursive
 
 
 def from_paper_start(problem: GrindingProblem) -> Figures | None:

@@ -24,7 +24,6 @@ from opl.motion.motion import Motion, MoveKind
 from opl.motion.path import PassEnd
 from opl.motion.whole_motion import UnreachableApproachError
 from opl.planning import plan as plan_module
-from opl.planning.cheapest import plan_cheapest
 from opl.planning.multi_start import plan_recursive
 from opl.planning.settings import ObjectiveWeights
 from opl.planning.track_check import NoMotion
@@ -39,10 +38,8 @@ from tests.support.jobs import opl, write_job
 from tests.support.planned import problem_of, small_job, timed, v_job, with_positions, with_scene
 
 SETTINGS = v_job().search.optimal
-ONLY_TRAVEL = replace(
-    SETTINGS.costs, contact_weight=0.0, limit_weight=0.0, singularity_weight=0.0, push_weight=0.0
-)
-ONLY_TIME = replace(ONLY_TRAVEL, joint_weights=np.zeros(6), time_weight=1.0)
+ONLY_TRAVEL = ObjectiveWeights(joint_range=0.0, travel=1.0, time=0.0)
+ONLY_TIME = ObjectiveWeights(joint_range=0.0, travel=0.0, time=1.0)
 
 
 def one_row_job():
@@ -419,19 +416,27 @@ def at_cutter_points(path):
     return path.q[whole], path.contact_position[whole]
 
 
-def test_the_least_travel_is_a_shortest_path_of_scipy():
+def weighted(problem, weights, fallback):
+    known = [fallback]
+    if weights.joint_range:
+        known.insert(0, plan_optimal(problem, SETTINGS, fallback))
+    return plan_weighted(problem, weights, SETTINGS.costs, known)
+
+
+def test_travel_is_less_than_on_any_track_over_the_contact_positions_of_the_field():
     problem = one_row()
-    plan = plan_cheapest(problem, ONLY_TRAVEL)
+    plan = weighted(problem, ONLY_TRAVEL, recursive(one_row))
     q, _ = at_cutter_points(plan.path)
-    least = shortest(problem, lambda a, b, *_: np.abs(b - a).sum(axis=1))
+    on_field = shortest(problem, lambda a, b, *_: np.abs(b - a).sum(axis=1))
     assert plan.checks == 1  # nothing was in the way, so the field is scipy's
-    assert np.abs(np.diff(q, axis=0)).sum() == pytest.approx(least, abs=1e-9)
-    assert plan.path.joint_travel >= least - 1e-9
+    assert np.abs(np.diff(q, axis=0)).sum() < 0.999 * on_field
+    assert plan.objective.value == pytest.approx(plan.path.joint_travel, abs=1e-12)
+    assert 0.8 * plan.path.joint_travel < plan.objective.lower_bound <= plan.path.joint_travel
 
 
-def test_the_least_time_is_a_shortest_path_of_scipy():
+def test_time_is_no_more_than_on_any_track_over_the_contact_positions_of_the_field():
     problem = one_row()
-    slow = replace(problem.cell.robot, max_speed=problem.cell.robot.max_speed / 40.0)
+    slow = replace(problem.cell.robot, max_speed=problem.cell.robot.max_speed / 200.0)
     problem = with_scene(problem, cell=replace(problem.cell, robot=slow))
     arc = np.abs(np.diff(problem.points.arc_length)) / problem.process.feed
 
@@ -440,22 +445,18 @@ def test_the_least_time_is_a_shortest_path_of_scipy():
         sliding = np.abs(t_b - t_a) / problem.process.contact_speed
         return np.maximum(np.maximum(turning, sliding), arc[column])
 
-    plan = plan_cheapest(problem, ONLY_TIME)
+    plan = weighted(problem, ONLY_TIME, recursive(one_row))
     q, t = at_cutter_points(plan.path)
     steps = range(len(q) - 1)
     spent = sum(float(seconds(q[[k]], q[[k + 1]], t[[k]], t[[k + 1]], k)[0]) for k in steps)
-    assert plan.checks == 1
-    assert spent == pytest.approx(shortest(problem, seconds), abs=1e-9)
-    assert spent > arc.sum() * 1.05  # the feed alone does not decide here
+    assert spent <= shortest(problem, seconds) * 1.0001
+    assert spent > arc.sum() * 1.01  # the feed alone does not decide here
+    assert plan.objective.lower_bound <= plan.objective.value
 
 
 # a weighted sum
 
 WEIGHTS = ObjectiveWeights(joint_range=1.0, travel=0.5, time=0.05)
-
-
-def weighted(problem, weights, fallback):
-    return plan_weighted(problem, weights, SETTINGS, fallback)
 
 
 def sum_of(problem, plan, weights):
@@ -473,7 +474,7 @@ def test_a_weighted_sum_is_what_the_motion_has_and_no_more_than_other_methods_ha
     plan = weighted(problem, WEIGHTS, recursive(one_row))
     assert plan.objective.value == pytest.approx(sum_of(problem, plan, WEIGHTS), abs=1e-12)
     assert 0.0 < plan.objective.lower_bound <= plan.objective.value
-    travel = plan_cheapest(problem, ONLY_TRAVEL)
+    travel = weighted(problem, ONLY_TRAVEL, recursive(one_row))
     for other in (recursive(one_row), travel):
         assert plan.objective.value <= sum_of(problem, other, WEIGHTS) + 1e-12
     again = weighted(problem, WEIGHTS, recursive(one_row))
@@ -481,7 +482,7 @@ def test_a_weighted_sum_is_what_the_motion_has_and_no_more_than_other_methods_ha
 
 
 @pytest.mark.parametrize("first", [22, 36, 57])
-def test_no_track_of_a_tiny_field_has_less_than_the_bound_of_the_weighted_sum(first):
+def test_no_track_of_a_tiny_field_has_a_weighted_sum_below_that_of_the_motion(first):
     problem = problem_of(with_positions(small_job(), 7), slice(first, first + 4))
     plan = weighted(problem, WEIGHTS, plan_recursive(problem))
     robot, process, points = problem.cell.robot, problem.process, problem.points
@@ -494,16 +495,13 @@ def test_no_track_of_a_tiny_field_has_less_than_the_bound_of_the_weighted_sum(fi
         seconds = np.maximum(np.maximum(arc, sliding), (turned / robot.max_speed).max(axis=1))
         total = np.ptp(q, axis=0).sum() + 0.5 * turned[on].sum() + 0.05 * seconds[on].sum()
         least = min(least, total)
-    assert plan.objective.lower_bound <= least + 1e-9
-    assert plan.objective.value >= least - 1e-9
+    assert plan.objective.lower_bound <= plan.objective.value <= least + 1e-9
 
 
-def test_one_part_alone_has_the_bound_of_that_part():
+def test_the_joint_range_sum_alone_has_its_own_bound():
     problem = one_row()
     only_range = weighted(problem, ObjectiveWeights(1.0, 0.0, 0.0), recursive(one_row))
     assert only_range.objective.lower_bound == optimal(one_row).lower_bound
-    only_travel = weighted(problem, ObjectiveWeights(0.0, 1.0, 0.0), recursive(one_row))
-    assert only_travel.objective.lower_bound == least_cost(problem, 1.0, 0.0)
 
 
 # travel and time at any contact positions
@@ -523,7 +521,7 @@ def test_least_time_is_that_of_the_feed_or_of_slow_joints():
     slow = replace(problem.cell.robot, max_speed=problem.cell.robot.max_speed / 200.0)
     slowed = with_scene(problem, cell=replace(problem.cell, robot=slow))
     assert least_cost(slowed, 0.0, 1.0) > 1.05 * arc
-    plan = plan_cheapest(slowed, ONLY_TIME)
+    plan = weighted(slowed, ONLY_TIME, recursive(one_row))
     figures = figures_of_path(plan.path, plan.motion, slowed.points, slowed.process, slow)
     assert least_cost(slowed, 0.0, 1.0) <= figures.seconds
 
@@ -532,7 +530,7 @@ def test_prices_scale_and_are_added_up():
     problem = two_rows()
     travel = least_cost(problem, 1.0, 0.0)
     assert least_cost(problem, 3.0, 0.0) == pytest.approx(3.0 * travel)
-    plan = plan_cheapest(problem, ONLY_TRAVEL)
+    plan = weighted(problem, ONLY_TRAVEL, plan_recursive(problem))
     assert travel <= plan.path.joint_travel
     both = sum_of(problem, plan, ObjectiveWeights(0.0, 1.0, 1.0))
     assert 0.0 < least_cost(problem, 1.0, 1.0) <= both

@@ -1,0 +1,169 @@
+"""The cheapest tracks of passes, at contact positions between those of the field as well.
+
+Joint travel and time add up along a track. Over the contact positions of the field the cheapest is
+a staircase, and however fine they are, what it costs stays above what a slanted way does. So the
+cheapest is sought over few cutter points first, which are far apart beside the contact positions;
+more and more are put in between, each with contact positions of its own about the track, until all
+are there. It is the best of what was looked at, not proven to be the best of all.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from opl.geometry.frames import Array
+from opl.least.own_track import OwnTrack, nodes_about, over_nodes
+from opl.planning.costs import track_cost
+from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.nodes import NodeMatrix
+from opl.planning.open_matrix import open_matrices
+from opl.planning.problem import GrindingProblem
+from opl.planning.settings import CostWeights
+from opl.planning.turned import Kept
+from opl.search.box import JointBox
+from opl.search.smooth import smoothest
+from opl.walls.shut_leads import RESERVE
+
+# cutter points of a pass that are looked at first: the more, the more of a staircase the first
+# track is; the fewer, the less it knows of what lies between
+FEW, FEWEST = 17, 5
+ABOUT = 2.0  # spacings of the field that contact positions lie to either side of a track, at first
+CLOSER = 0.25  # times as far next, where the track hardly gets cheaper
+HARDLY = 0.0005  # of its cost
+# spacings of the field: no closer than that before more cutter points are put in, and at last
+CLOSEST_BETWEEN, CLOSEST = 0.25, 0.005
+ALIKE = 1e-6  # tracks whose costs differ by less are images of one another
+LONGER = 0.02  # of the mean way from place to place: what a way may be longer than it is told
+MOST_HALVINGS = 4  # of ways that are
+
+
+class PassTracks:
+    """Finds cheap tracks of passes, free of collision at their nodes.
+
+    Args:
+        problem: What is to be planned.
+        prices: What a track is charged for.
+    """
+
+    def __init__(self, problem: GrindingProblem, prices: CostWeights) -> None:
+        self._problem, self._prices = problem, prices
+        self._scene = problem.scene.collision.wider(RESERVE)
+        self._spacing = float(np.diff(problem.field.contact_positions).mean())
+
+    def about(
+        self, track: OwnTrack, box: JointBox | None = None, closest: float = CLOSEST
+    ) -> OwnTrack | None:
+        """Return the cheapest track that is found about another of one pass.
+
+        Contact positions are sampled closer and closer around the cheapest so far.
+
+        Args:
+            track: The other.
+            box: Where it stays, if anywhere.
+            closest: How close samples lie at last, in spacings of the field.
+        """
+        about, cost = ABOUT, np.inf
+        while about > closest:
+            nodes = nodes_about(self._problem, track, about * self._spacing)
+            found = self._cheapest(track.places, int(track.ik_branch[0]), *nodes, box)
+            if found is None:
+                return None
+            if found.cost >= cost * (1.0 - HARDLY) - ALIKE:
+                about *= CLOSER
+            track, cost = found, found.cost
+        return track
+
+    def over_few(
+        self, index: int, count: int = FEW, box: JointBox | None = None
+    ) -> dict[int, OwnTrack]:
+        """Return the cheapest tracks over so many cutter points of a pass, by IK branch.
+
+        At contact positions of the field, each in the first matrix of the branch that has one.
+        """
+        problem, found = self._problem, dict[int, OwnTrack]()
+        few = _spread(np.flatnonzero(problem.points.pass_index == index), count)
+        for nodes in problem.field.matrices:
+            q = nodes.at(few[:, None], np.arange(len(nodes.position_index)))
+            q[problem.cuts[few][:, nodes.position_index]] = np.nan
+            t, branch = nodes.contact_position[few], int(nodes.ik_branch[few[0]])
+            track = self._cheapest(few.astype(float), branch, t, q, box)
+            if track is not None and (
+                branch not in found or track.cost < found[branch].cost - ALIKE
+            ):
+                found[branch] = track
+        return found
+
+    def over_all(self, begun: OwnTrack, box: JointBox | None = None) -> OwnTrack | None:
+        """Return the track over all cutter points that one over few of a pass leads to."""
+        index = self._problem.points.pass_index
+        columns = np.flatnonzero(index == index[int(begun.places[0])])
+        while len(begun.places) < len(columns):
+            closer = self.about(begun, box, CLOSEST_BETWEEN)
+            if closer is None:
+                return None
+            begun = closer.at(_spread(columns, 2 * len(begun.places) - 1).astype(float))
+        return self.about(begun, box)
+
+    def through_places(self, track: OwnTrack, box: JointBox | None = None) -> OwnTrack:
+        """Return a track of one pass through places between its own, where it is longer than told.
+
+        Between two places the contact position changes evenly, and joints may turn farther than
+        from one posture to the other.
+        """
+        for _ in range(MOST_HALVINGS):
+            longer = self._longer(track)
+            halves = (track.places[longer] + track.places[longer + 1]) / 2.0
+            finer = self.about(track.at(np.sort(np.append(track.places, halves))), box)
+            if not len(longer) or finer is None:
+                break
+            track = finer
+        return track
+
+    def _longer(self, track: OwnTrack) -> np.ndarray:
+        """Return after which places of a track joints turn farther than from place to place."""
+        problem, nodes = self._over(
+            track.places, track.ik_branch, track.t[:, None], track.q[:, None]
+        )
+        rows = np.zeros(len(track.places), dtype=int)
+        try:
+            path = fill_in(problem.cell, problem.points, nodes, rows, problem.interpolation)
+        except BrokenEdgeError as broken:
+            return np.array([broken.column])
+        turned = np.abs(np.diff(path.q, axis=0)).sum(axis=1)
+        between = np.bincount(path.cutter_point[:-1].astype(int), turned, len(track.places) - 1)
+        told = np.abs(np.diff(track.q, axis=0)).sum(axis=1)
+        return np.flatnonzero(between - told > LONGER * told.sum() / len(told))
+
+    def _over(
+        self, places: Array, ik_branch: np.ndarray, t: Array, q: Array
+    ) -> tuple[GrindingProblem, NodeMatrix]:
+        """Return the problem of places over some nodes, and these as a matrix."""
+        nodes = NodeMatrix(ik_branch, Kept(q), t, np.arange(t.shape[1]))
+        return over_nodes(self._problem, places, [nodes]), nodes
+
+    def _cheapest(
+        self, places: Array, ik_branch: int, t: Array, q: Array, box: JointBox | None
+    ) -> OwnTrack | None:
+        """Return the cheapest track over some nodes of one pass that is free at all of its own."""
+        branches = np.full(len(places), ik_branch)
+        problem, nodes = self._over(places, branches, t, q)
+        (matrix,) = open_matrices(problem)
+        if box is not None:
+            matrix.free &= matrix.free_inside(box)
+        cost = track_cost(problem, nodes, self._prices, matrix.free)
+        while True:
+            found = smoothest(matrix.ladder, matrix.blocked_edges, matrix.free, cost)
+            if found is None:
+                return None
+            along = nodes.along(found.rows)
+            struck = np.flatnonzero(self._scene.collides(along)).tolist()
+            if not struck:
+                return OwnTrack(places, branches, nodes.t_along(found.rows), along, found.cost)
+            for column in struck:
+                matrix.sweep(self._scene, column, "collides")
+
+
+def _spread(columns: np.ndarray, most: int) -> np.ndarray:
+    """Return at most so many of some columns, the first and the last among them."""
+    share = np.linspace(0, len(columns) - 1, min(most, len(columns)))
+    return np.asarray(columns[share.astype(int)])

@@ -1,0 +1,75 @@
+"""Lower bounds of ways through cells, against ways drawn in them and all ways over points."""
+
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+
+from opl.search.shortest_way import cheapest_over_ends, cheapest_ways
+from opl.search.way_cells import Cells, WayPrices
+
+SEEDS = pytest.mark.parametrize("seed", range(12))
+PRICES = pytest.mark.parametrize(("travel", "time"), [(1.0, 0.0), (0.0, 1.0), (0.7, 0.4)])
+
+
+def prices_of(travel, time, n_columns):
+    seconds = np.full(n_columns - 1, 0.05)
+    return WayPrices(travel, time, seconds, np.linspace(1.0, 3.0, 6), 400.0)
+
+
+def drawn(seed, n_columns=4, n_cells=21, long=1.0):
+    """Return cells side by side in each column, as those of a curve that is cut, and their pads."""
+    random = np.random.default_rng(seed)
+    first = n_cells * np.arange(n_columns + 1)
+    corners = np.cumsum(random.normal(0.0, 0.05, (n_columns, n_cells + 1, 6)), axis=1)
+    corners += random.normal(0.0, 0.3, (n_columns, 1, 6))
+    t = np.linspace(-30.0, 30.0, n_cells + 1)
+    start = corners[:, :-1].reshape(-1, 6)
+    along = long * np.diff(corners, axis=1).reshape(-1, 6)
+    pad = long * random.uniform(0.0, 0.01, (2, len(start), 6))
+    low, high = np.tile(t[:-1], n_columns), np.tile(t[1:], n_columns)
+    return Cells(start, along, -pad[0], pad[1], low, high if long else low, first)
+
+
+def cost(prices, q, t):
+    """Return what a way over postures is charged, q of shape (n, 6) and t of shape (n,)."""
+    turned = np.abs(np.diff(q, axis=0))
+    seconds = np.maximum((turned / prices.max_speed).max(axis=1), prices.seconds)
+    seconds = np.maximum(seconds, np.abs(np.diff(t)) / prices.contact_speed)
+    return prices.travel * turned.sum() + prices.time * seconds.sum()
+
+
+@SEEDS
+@PRICES
+def test_no_way_that_is_drawn_costs_less_than_what_is_told_of_any_cell_it_passes(
+    seed, travel, time
+):
+    cells, random = drawn(seed), np.random.default_rng(seed + 1000)
+    n_columns = len(cells.first) - 1
+    prices = prices_of(travel, time, n_columns)
+    potential = cheapest_over_ends(cells, prices_of(travel, 0.0, n_columns))
+    told = cheapest_ways(cells, prices, potential)
+    begun = np.array(cells.first[:-1])
+    for _ in range(300):
+        # ways between cells near to each other, of which some are cheap
+        row = np.clip(random.integers(21) + random.integers(-2, 3, n_columns), 0, 20)
+        at, share = begun + row, random.random(n_columns)[:, None]
+        pad = random.choice([0.0, 0.5, 1.0], (n_columns, 6))
+        pads = pad * cells.pad_high[at] + (1.0 - pad) * cells.pad_low[at]
+        q = cells.start[at] + share * cells.along[at] + pads
+        t = cells.t_low[at] + share[:, 0] * (cells.t_high[at] - cells.t_low[at])
+        assert (told[at] <= cost(prices, q, t) + 1e-9).all()
+
+
+@SEEDS
+@PRICES
+def test_of_cells_without_length_the_cheapest_way_is_that_of_all_there_are(seed, travel, time):
+    cells = drawn(seed, n_columns=3, n_cells=17, long=0.0)
+    prices = prices_of(travel, time, 3)
+    told = cheapest_ways(cells, prices, cheapest_over_ends(cells, prices_of(travel, 0.0, 3)))
+    columns = [range(first, end) for first, end in pairwise(cells.first)]
+    least = np.full(len(cells.start), np.inf)
+    for way in product(*columns):
+        at = np.array(way)
+        least[at] = np.minimum(least[at], cost(prices, cells.start[at], cells.t_low[at]))
+    assert told == pytest.approx(least, abs=1e-9)
