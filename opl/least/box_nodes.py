@@ -26,7 +26,6 @@ from opl.least.sinking import (
 )
 from opl.planning.costs import PushAway, track_cost
 from opl.planning.filling import BrokenEdgeError, fill_in
-from opl.planning.nodes import NodeField
 from opl.planning.open_matrix import Track, close_collisions, open_matrices
 from opl.planning.plan import Found, Plan, Same, propose_and_check
 from opl.planning.problem import GrindingProblem
@@ -111,14 +110,8 @@ class BoxNodes:
             if not sampler.collisions or flip == sampler.mirrored:
                 flips.append((slots[pass_index], *move))
         matrices = everywhere(problem.cell, columns.t, columns.q, near, flips)
-        self.problem = replace(
-            problem,
-            points=columns.points,
-            field=NodeField(columns.t[0], problem.field.reached[:0], {}, tuple(matrices)),
-            wheel_distance=np.zeros(columns.t.shape),
-            known_sides=problem.sides_at(columns.places, columns.t),
-            spacing=np.diff(columns.places),
-        )
+        places, points, t = columns.places, columns.points, columns.t
+        self.problem = problem.over_nodes(places, points, t, matrices)
         self.matrices = open_matrices(self.problem)
         self._swept = False
         shut = shut_edges(columns.places, columns.t, rows, box)

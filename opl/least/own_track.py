@@ -6,17 +6,18 @@ And through places between cutter points, where a way is longer than from postur
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from opl.cell.full_turns import nearest_turn
 from opl.geometry.frames import Array
 from opl.motion.path import GrindingPath
-from opl.planning.nodes import NodeField, NodeMatrix, inverse_solutions
+from opl.planning.nodes import inverse_solutions
 from opl.planning.problem import GrindingProblem
 
 SAMPLES = 17  # contact positions about each of a track
+ABOUT = 2.0  # spacings of the field to either side, where nothing nearer is wanted
 
 
 @dataclass(frozen=True)
@@ -65,19 +66,22 @@ def joined(tracks: Sequence[OwnTrack]) -> OwnTrack:
     )
 
 
-def nodes_about(problem: GrindingProblem, track: OwnTrack, apart: float) -> tuple[Array, Array]:
+def nodes_about(
+    problem: GrindingProblem, track: OwnTrack, about: float = ABOUT
+) -> tuple[Array, Array]:
     """Sample contact positions about those of a track, its own in the middle.
 
     Args:
         problem: What is to be planned.
         track: The track.
-        apart: How far they lie to either side in belt units.
+        about: How far they lie to either side, in spacings of the field.
 
     Returns:
         Contact positions, shape (n, `SAMPLES`); joint positions in [rad], NaN out of reach, beyond
         the limits and where the part cuts into the wheel, shape (n, `SAMPLES`, 6).
     """
-    last = problem.field.contact_positions[-1]
+    positions = problem.field.contact_positions
+    last, apart = positions[-1], about * np.diff(positions).mean()
     t = np.clip(track.t[:, None] + apart * np.linspace(-1.0, 1.0, SAMPLES), -last, last)
     points = problem.points.at_places(track.places)
     solutions = inverse_solutions(problem.cell, points.Ts_workpiece_cutter[:, None], t)
@@ -87,28 +91,3 @@ def nodes_about(problem: GrindingProblem, track: OwnTrack, apart: float) -> tupl
     exists &= ~problem.cuts_at(track.places, points, t)
     q[~exists] = np.nan
     return t, q
-
-
-def over_nodes(
-    problem: GrindingProblem, places: Array, matrices: Sequence[NodeMatrix]
-) -> GrindingProblem:
-    """Return the problem of some places over nodes of their own, none of which cuts in.
-
-    Args:
-        problem: The problem of all cutter points.
-        places: Fractional cutter points, shape (n,).
-        matrices: Of the same contact positions, one in each row.
-    """
-    t, rule = matrices[0].contact_position, problem.interpolation
-    if (np.diff(places) > 1.0).any():
-        # places far apart: joints may turn as far between them as they like
-        rule = replace(rule, max_joint_step=np.inf)
-    return replace(
-        problem,
-        points=problem.points.at_places(places),
-        field=NodeField(t[0], problem.field.reached[:0], {}, tuple(matrices)),
-        wheel_distance=np.zeros(t.shape),
-        known_sides=problem.sides_at(places, t),
-        interpolation=rule,
-        spacing=np.diff(places),
-    )

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.least.own_track import OwnTrack, nodes_about, over_nodes
+from opl.least.own_track import ABOUT, OwnTrack, nodes_about
 from opl.planning.costs import track_cost
 from opl.planning.filling import BrokenEdgeError, fill_in
 from opl.planning.nodes import NodeMatrix
@@ -27,8 +27,7 @@ from opl.walls.shut_leads import RESERVE
 # cutter points of a pass that are looked at first: the more, the more of a staircase the first
 # track is; the fewer, the less it knows of what lies between
 FEW, FEWEST = 17, 5
-ABOUT = 2.0  # spacings of the field that contact positions lie to either side of a track, at first
-CLOSER = 0.25  # times as far next, where the track hardly gets cheaper
+CLOSER = 0.25  # times as far to either side next, where the track hardly gets cheaper
 HARDLY = 0.0005  # of its cost
 # spacings of the field: no closer than that before more cutter points are put in, and at last
 CLOSEST_BETWEEN, CLOSEST = 0.25, 0.005
@@ -48,7 +47,6 @@ class PassTracks:
     def __init__(self, problem: GrindingProblem, prices: CostWeights) -> None:
         self._problem, self._prices = problem, prices
         self._scene = problem.scene.collision.wider(RESERVE)
-        self._spacing = float(np.diff(problem.field.contact_positions).mean())
 
     def about(
         self, track: OwnTrack, box: JointBox | None = None, closest: float = CLOSEST
@@ -64,7 +62,7 @@ class PassTracks:
         """
         about, cost = ABOUT, np.inf
         while about > closest:
-            nodes = nodes_about(self._problem, track, about * self._spacing)
+            nodes = nodes_about(self._problem, track, about)
             found = self._cheapest(track.places, int(track.ik_branch[0]), *nodes, box)
             if found is None:
                 return None
@@ -112,9 +110,11 @@ class PassTracks:
         """
         for _ in range(MOST_HALVINGS):
             longer = self._longer(track)
+            if not len(longer):
+                break
             halves = (track.places[longer] + track.places[longer + 1]) / 2.0
             finer = self.about(track.at(np.sort(np.append(track.places, halves))), box)
-            if not len(longer) or finer is None:
+            if finer is None:
                 break
             track = finer
         return track
@@ -139,7 +139,8 @@ class PassTracks:
     ) -> tuple[GrindingProblem, NodeMatrix]:
         """Return the problem of places over some nodes, and these as a matrix."""
         nodes = NodeMatrix(ik_branch, Kept(q), t, np.arange(t.shape[1]))
-        return over_nodes(self._problem, places, [nodes]), nodes
+        points = self._problem.points.at_places(places)
+        return self._problem.over_nodes(places, points, t, [nodes]), nodes
 
     def _cheapest(
         self, places: Array, ik_branch: int, t: Array, q: Array, box: JointBox | None

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from opl.least.own_track import SAMPLES, OwnTrack, nodes_about, over_nodes
+from opl.least.own_track import SAMPLES, OwnTrack, nodes_about
 from opl.planning.costs import track_cost
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
 from opl.planning.plan import Found, Plan, propose_and_check
@@ -16,7 +16,6 @@ from opl.planning.symmetry import everywhere, twins
 from opl.search.smooth import smoothest
 from opl.walls.images import wrist_flips
 
-ABOUT = 2.0  # spacings of the field to either side of the track
 MOST_CHECKS = 12
 MOST_WORK = 4000.0  # units
 
@@ -34,14 +33,14 @@ def motion_of_track(problem: GrindingProblem, prices: CostWeights, track: OwnTra
     Returns:
         The plan; None if none is found.
     """
-    spacing = float(np.diff(problem.field.contact_positions).mean())
-    t, q = nodes_about(problem, track, ABOUT * spacing)
+    t, q = nodes_about(problem, track)
     flips = enumerate(wrist_flips(problem.cell.robot.arm))
     moves = [(track.ik_branch ^ (4 * number), *flip) for number, flip in flips]
     nodes = everywhere(problem.cell, t, q, ~np.isnan(q[..., 0]), moves)
     if not nodes:
         return None
-    near = over_nodes(problem, track.places, nodes)
+    points = problem.points.at_places(track.places)
+    near = problem.over_nodes(track.places, points, t, nodes)
     matrices = open_matrices(near)
     proposals = _cheapest_first(near, matrices, prices)
     outcome = propose_and_check(near, matrices, proposals, 0, MOST_CHECKS, MOST_WORK)

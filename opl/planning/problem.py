@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -130,6 +130,31 @@ class GrindingProblem:
     def free_nodes(self, nodes: NodeMatrix) -> np.ndarray:
         """Return which nodes exist and do not cut into the wheel, shape (N, n_rows)."""
         return np.ascontiguousarray(nodes.exists & ~self.cuts[:, nodes.position_index])
+
+    def over_nodes(
+        self, places: Array, points: CutterPoints, t: Array, matrices: Sequence[NodeMatrix]
+    ) -> GrindingProblem:
+        """Return the problem of some places over nodes of their own, none of which cuts in.
+
+        Args:
+            places: Fractional cutter points, shape (n,).
+            points: The same as points of their own.
+            t: Contact positions in belt units, shape (n, m).
+            matrices: Of these contact positions, one in each row.
+        """
+        rule = self.interpolation
+        if (np.diff(places) > 1.0).any():
+            # places far apart: joints may turn as far between them as they like
+            rule = replace(rule, max_joint_step=np.inf)
+        return replace(
+            self,
+            points=points,
+            field=NodeField(t[0], self.field.reached[:0], {}, tuple(matrices)),
+            wheel_distance=np.zeros(t.shape),
+            known_sides=self.sides_at(places, t),
+            interpolation=rule,
+            spacing=np.diff(places),
+        )
 
     def ladder(self, nodes: NodeMatrix, free: np.ndarray) -> Ladder:
         """Return a node matrix as the search sees it."""

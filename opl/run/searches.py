@@ -175,7 +175,8 @@ def _search_best(
     if recursive is None:
         smallest, recursive = _search_range(search, problem, report, seams, beside)
         known.append(smallest)
-    known += [] if recursive is None else [recursive]
+    if recursive is not None:
+        known.append(recursive)
     return plan_weighted(problem, weights, search.optimal.costs, known), recursive
 
 
