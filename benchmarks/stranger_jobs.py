@@ -57,7 +57,9 @@ class _Placed:
     home: Array
 
 
-def draw_job(seed: int, index: int, attempt: int, folder: Path) -> Stranger | None:
+def draw_job(
+    seed: int, index: int, attempt: int, folder: Path, objective: str = "range"
+) -> Stranger | None:
     """Draw a job and write its files.
 
     Args:
@@ -65,6 +67,7 @@ def draw_job(seed: int, index: int, attempt: int, folder: Path) -> Stranger | No
         index: Which job.
         attempt: Which draw of it; each is another.
         folder: Where its files are written, empty.
+        objective: What the search keeps small.
 
     Returns:
         The job; None if the arm did not reach the part however both were placed.
@@ -91,6 +94,8 @@ def draw_job(seed: int, index: int, attempt: int, folder: Path) -> Stranger | No
     job = _document(random, robot, part, placed, normal, points, roll)
     job["name"] = f"S{seed}_{index}"
     job["workpiece"]["surface"] = surface
+    if objective != "range":  # which is the default
+        job["search"]["objective"] = objective
     if surface.endswith(".step"):
         job["workpiece"]["faces"] = _box_faces(folder / surface)
     path = folder / "job.yaml"

@@ -11,12 +11,21 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
+
 import opl
 from opl.planning.plan import AT_REST
 
 CLOSED = 0.002  # gap that counts as closed
 QUICK = 10.0  # [s] that a search should take at the most
 LIBRARIES = ("numpy", "scipy", "numba", "pin", "pybullet")
+# of each objective, what is found
+UNITS = {
+    "range": "joint range sum in rad",
+    "travel": "joint travel on the wheel in rad",
+    "time": "time on the wheel in s",
+    "weighted": "the weighted sum, at the weights a job has by default",
+}
 # what counts; the others are drawn again
 SEARCHED = ("ok", "unsafe", "not found", "timed out", "error")
 
@@ -35,8 +44,8 @@ class Outcome:
         axle: How the axle of its wheel lies.
         points: Number of cutter points, 0 if they are not known.
         passes: Number of passes.
-        sum_rad: Joint range sum found in [rad]; None if there is none.
-        bound_rad: Its lower bound in [rad].
+        found: Value of the objective of the path found; None if there is none.
+        bound: Its lower bound.
         search_s: Wall-clock time of search and clearance in [s].
         processor_s: Processor time of both.
         total_s: Wall-clock time from the job file on in [s].
@@ -51,8 +60,8 @@ class Outcome:
     axle: str
     points: int = 0
     passes: int = 0
-    sum_rad: float | None = None
-    bound_rad: float | None = None
+    found: float | None = None
+    bound: float | None = None
     search_s: float = 0.0
     processor_s: float = 0.0
     total_s: float = 0.0
@@ -60,10 +69,10 @@ class Outcome:
 
     @property
     def gap(self) -> float | None:
-        """Fraction by which the sum may exceed the least there is; None if nothing is proven."""
-        if self.sum_rad is None or self.bound_rad is None:
+        """Fraction by which the path may miss the least; None if nothing is proven."""
+        if self.found is None or self.bound is None:
             return None
-        return 0.0 if self.sum_rad <= AT_REST else 1.0 - self.bound_rad / self.sum_rad
+        return 0.0 if self.found <= AT_REST else 1.0 - self.bound / self.found
 
     @property
     def closed(self) -> bool:
@@ -74,7 +83,7 @@ class Outcome:
 def row(outcome: Outcome) -> str:
     """Return a line of the table."""
     gap = "-" if outcome.gap is None else f"{100.0 * outcome.gap:.3f} %"
-    found = "-" if outcome.sum_rad is None else f"{outcome.sum_rad:.4f}"
+    found = "-" if outcome.found is None else f"{outcome.found:.4f}"
     cause = outcome.cause.split("\n")[0].replace("|", "/")[:160]
     cells = (
         f"{outcome.index}.{outcome.attempt}",
@@ -95,7 +104,7 @@ def row(outcome: Outcome) -> str:
 
 
 HEAD = (
-    "| job | part | arm | axle | points, passes | status | closed | gap | sum, rad | search, s "
+    "| job | part | arm | axle | points, passes | status | closed | gap | found | search, s "
     "| processor, s | total, s | cause |\n|" + "---|" * 13
 )
 
@@ -108,13 +117,16 @@ def revision() -> str:
     ).stdout.strip()  # fmt: skip
 
 
-def page(seed: int, outcomes: Sequence[Outcome]) -> str:
-    """Return the results of a seed as a page of Markdown."""
+def page(seed: int, outcomes: Sequence[Outcome], objective: str = "range") -> str:
+    """Return the results of a seed and an objective as a page of Markdown."""
     searched = [one for one in outcomes if one.status in SEARCHED]
     closed = [one for one in searched if one.closed]
     quick = [one for one in closed if one.search_s <= QUICK]
-    without_path = [one for one in searched if one.sum_rad is None]
-    unproven = [one for one in searched if one.bound_rad is None]
+    without_path = [one for one in searched if one.found is None]
+    unproven = [one for one in searched if one.bound is None]
+    gaps = [100.0 * one.gap for one in searched if one.gap is not None]
+    half, most = np.quantile(gaps, (0.5, 0.95)).tolist() if gaps else (np.nan, np.nan)
+    chosen = "" if objective == "range" else f" --objective {objective}"
     again = Counter(one.status for one in outcomes if one.status not in SEARCHED)
     slowest = max((one.search_s for one in outcomes), default=0.0)
     versions = ", ".join(f"{name} {version(name)}" for name in LIBRARIES)
@@ -124,17 +136,20 @@ def page(seed: int, outcomes: Sequence[Outcome]) -> str:
             f"# Strangers, seed {seed}",
             "",
             "Random jobs that nothing was tuned to, written by "
-            f"`python -m benchmarks.strangers --seed {seed}`. Each line is a draw, which the seed "
-            "and its numbers draw again.",
+            f"`python -m benchmarks.strangers --seed {seed}{chosen}`. Each line is a draw, which "
+            "the seed and its numbers draw again.",
             "",
             f"{len(searched)} jobs searched: {len(closed)} with a gap of at most "
-            f"{100.0 * CLOSED:g} %, {len(quick)} of them within {QUICK:g} s; "
+            f"{100.0 * CLOSED:g} %, {len(quick)} of them within {QUICK:g} s; half of the gaps are "
+            f"below {half:.2f} %, 95 of 100 below {most:.2f} %, all below "
+            f"{max(gaps, default=np.nan):.2f} %; "
             f"{len(without_path)} without a path, {len(unproven)} without a bound; slowest "
             f"{slowest:.1f} s of all drawn. Drawn again: {drawn_again or 'none'}.",
             "",
             f"opl {opl.__version__} at {revision()}, Python {platform.python_version()}, "
             f"{versions}; {os.cpu_count()} processors. Search: wall clock of search and clearance; "
-            "processor: that of both; total: wall clock from the job file on.",
+            "processor: that of both; total: wall clock from the job file on. "
+            f"Found: {UNITS[objective]}.",
             "",
             HEAD,
             *map(row, outcomes),

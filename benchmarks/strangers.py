@@ -4,8 +4,8 @@ Each job is drawn, written as files into a folder of its own, and run as `opl ru
 path, or to its program with --whole, in a process that is ended when it takes too long; as many
 side by side as --workers says, which share the cores. A job that is refused before its search, or
 has no path, counts with its cause and is drawn again, until as many as asked for were searched. The
-same seed draws the same jobs, which --cases picks from: `--cases 3.0 17.2`. With --write the table
-goes into STRANGERS.md.
+same seed draws the same jobs, which --cases picks from: `--cases 3.0 17.2`; they are searched for
+the least of --objective. With --write the table goes into STRANGERS.md.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ import numpy as np
 
 import opl
 from benchmarks.stranger_jobs import Stranger, draw_job
-from benchmarks.stranger_table import HEAD, SEARCHED, Outcome, page, row
+from benchmarks.stranger_table import HEAD, SEARCHED, UNITS, Outcome, page, row
 from opl.files.kernels import use_threads
 from opl.geometry.frames import Array
 from opl.run.preparing import prepare
-from opl.run.searches import search_path
+from opl.run.searches import proves_range, search_path
 
 LONGEST = 120.0  # [s] that a job may take as a whole
 MOST_DRAWS = 12  # of one job until one can be searched
@@ -79,8 +79,11 @@ def _path(job: opl.Job, watch: opl.Watch) -> Facts:
     except opl.NoPathError as error:
         shut = error.message.startswith("no path:") or error.message.startswith("no path beyond")
         status = "no_path" if shut else "not found"
-        return {**facts, "status": status, "cause": str(error), "bound_rad": error.lower_bound}
-    facts.update(sum_rad=plan.path.joint_range_sum, bound_rad=plan.lower_bound)
+        bound = error.lower_bound if proves_range(job.search) else None
+        return {**facts, "status": status, "cause": str(error), "bound": bound}
+    facts.update(found=plan.path.joint_range_sum, bound=plan.lower_bound)
+    if plan.objective is not None:
+        facts.update(found=plan.objective.value, bound=plan.objective.lower_bound)
     return {**facts, "status": "ok", "cause": plan.open_because or ""}
 
 
@@ -96,8 +99,10 @@ def _program(job: opl.Job, out: Path, watch: opl.Watch) -> Facts:
         "cause": "; ".join(report.reasons),
     }
     if report.path is not None:
-        facts["sum_rad"] = report.path.joint_range_sum_rad
-        facts["bound_rad"] = report.path.lower_bound_rad
+        path, value = report.path, report.path.objective_value
+        facts.update(found=path.joint_range_sum_rad, bound=path.lower_bound_rad)
+        if value is not None:
+            facts.update(found=value.value, bound=value.lower_bound)
     return facts
 
 
@@ -171,6 +176,7 @@ def run_strangers(
     whole: bool,
     done: Callable[[Outcome], None],
     begin: Callable[[], None] | None = None,
+    objective: str = "range",
 ) -> None:
     """Draw jobs and run them side by side.
 
@@ -182,6 +188,7 @@ def run_strangers(
         whole: Whether jobs are run to their end, not only to their path.
         done: Called with each draw as it ends, never twice at once.
         begin: Called in each worker before any job, if given.
+        objective: What the searches keep small.
     """
     idle: SimpleQueue[Worker] = SimpleQueue()
     for _ in range(workers):
@@ -194,7 +201,7 @@ def run_strangers(
             own = folder / f"{seed}_{index}_{attempt}"
             shutil.rmtree(own, ignore_errors=True)
             own.mkdir(parents=True)
-            drawn = draw_job(seed, index, attempt, own)
+            drawn = draw_job(seed, index, attempt, own, objective)
             outcome = _outcome(index, attempt, drawn, worker)
             if drawn is None:
                 own.rmdir()
@@ -225,13 +232,15 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="index of the first job")
     parser.add_argument("--cases", nargs="+", help="draws to be run alone, such as 3.0")
     parser.add_argument("--workers", type=int, default=1, help="jobs run at once")
+    parser.add_argument("--objective", choices=UNITS, default="range", help="kept small")
     parser.add_argument("--folder", type=Path, default=Path("strangers"), help="of the jobs")
     parser.add_argument("--whole", action="store_true", help="replay, program and files as well")
     parser.add_argument("--write", action="store_true", help=f"the table into {TABLE.name}")
     arguments = parser.parse_args()
     folder, seed = arguments.folder, arguments.seed
     folder.mkdir(parents=True, exist_ok=True)
-    log = folder / f"{seed}.jsonl"
+    name = f"{seed}" if arguments.objective == "range" else f"{seed}_{arguments.objective}"
+    log = folder / f"{name}.jsonl"
 
     def done(outcome: Outcome) -> None:
         print(row(outcome), flush=True)
@@ -244,12 +253,15 @@ def main() -> None:
     if arguments.cases:
         pairs = [case.split(".") for case in arguments.cases]
         draws = [[(int(index), int(attempt))] for index, attempt in pairs]
-    run_strangers(seed, draws, folder, arguments.workers, arguments.whole, done)
+    objective = arguments.objective
+    run_strangers(
+        seed, draws, folder, arguments.workers, arguments.whole, done, objective=objective
+    )
     # what earlier runs of the same seed found counts too, the last of each draw
     lines = log.read_text(encoding="utf-8").splitlines()
     known = {(one.index, one.attempt): one for one in (Outcome(**json.loads(x)) for x in lines)}
-    text = page(seed, [known[key] for key in sorted(known)])
-    for path in [folder / f"{seed}.md", *([TABLE] if arguments.write else [])]:
+    text = page(seed, [known[key] for key in sorted(known)], arguments.objective)
+    for path in [folder / f"{name}.md", *([TABLE] if arguments.write else [])]:
         path.write_text(text, encoding="utf-8")
     print(text.split("\n")[4])
 

@@ -115,7 +115,7 @@ def line(name: str, lines: int, outcomes: Mapping[Draw, Outcome], among: set[Dra
     """Return a line of the table: what became of the jobs that are closed with everything."""
     still = [key for key in among if outcomes[key].closed]
     left = [outcomes[key] for key in sorted(among) if not outcomes[key].closed]
-    without_path = [one for one in left if one.sum_rad is None]
+    without_path = [one for one in left if one.found is None]
     gaps = [one.gap for one in left if one.gap is not None]
     jobs = ", ".join(f"{one.index}.{one.attempt}" for one in left)
     seconds = sum(outcomes[key].processor_s for key in among)

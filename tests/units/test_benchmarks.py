@@ -50,17 +50,18 @@ def stranger(index, status, **facts):
 
 def test_a_page_of_strangers_counts_what_is_closed_and_what_has_no_bound():
     outcomes = [
-        stranger(0, "ok", sum_rad=1.0, bound_rad=0.999, search_s=3.0),
-        stranger(1, "ok", sum_rad=1.0, bound_rad=0.999, search_s=12.0),
-        stranger(2, "ok", sum_rad=1.0, bound_rad=0.99, search_s=2.0, cause="a wall | too few"),
+        stranger(0, "ok", found=1.0, bound=0.999, search_s=3.0),
+        stranger(1, "ok", found=1.0, bound=0.999, search_s=12.0),
+        stranger(2, "ok", found=1.0, bound=0.99, search_s=2.0, cause="a wall | too few"),
         stranger(3, "not found", search_s=25.0, cause="no path found"),
-        stranger(
-            5, "not found", search_s=9.0, bound_rad=0.5, cause="no path found, none below 0.5"
-        ),
+        stranger(5, "not found", search_s=9.0, bound=0.5, cause="no path found, none below 0.5"),
         stranger(4, "no_path", search_s=31.0, cause="no path: shut\nat cutter point 3"),
     ]
     text = page(7, outcomes)
     assert "5 jobs searched: 2 with a gap of at most 0.2 %, 1 of them within 10 s" in text
+    assert "half of the gaps are below 0.10 %, 95 of 100 below 0.91 %, all below 1.00 %" in text
+    assert "Found: joint travel on the wheel in rad." in page(7, outcomes, "travel")
+    assert "--seed 7 --objective travel`" in page(7, outcomes, "travel")
     assert (
         "2 without a path, 1 without a bound; slowest 31.0 s of all drawn. Drawn again: 1 no_path."
         in text
@@ -78,7 +79,7 @@ def test_what_is_left_out_of_the_proof_is_there():
 
 def test_a_page_without_a_part_counts_what_was_closed_with_everything():
     def outcomes(*gaps):
-        facts = [{} if gap is None else {"sum_rad": 1.0, "bound_rad": 1.0 - gap} for gap in gaps]
+        facts = [{} if gap is None else {"found": 1.0, "bound": 1.0 - gap} for gap in gaps]
         status = ["not found" if gap is None else "ok" for gap in gaps]
         found = [stranger(k, status[k], processor_s=2.0, **facts[k]) for k in range(len(gaps))]
         return {(one.index, one.attempt): one for one in found}
