@@ -37,7 +37,8 @@ Runs
     `plan_path`         `Surfaced` -> `Planned`; `Prepared` is what its search is given
     `verify_motion`     `Planned` -> `Proven`
     `write_program`     `Proven` -> `Written`: the program as texts, read back and proven
-    `Watch`             reports each `Stage` of a run while it goes on, and cancels it
+    `Watch`             reports each `Stage` of a run while it goes on, ends its search with the
+                        best so far (`SoFar` says what is known of it), and cancels it
 
 Many jobs
     `run_batch`         job files -> a `BatchRow` each, run in processes as `BatchSettings` say;
@@ -131,6 +132,7 @@ if TYPE_CHECKING:
     from opl.job.reference import keys_page as keys_page
     from opl.job.values import Cell as Cell
     from opl.job.values import Job as Job
+    from opl.planning.so_far import SoFar as SoFar
     from opl.program.posts import find_post as find_post
     from opl.program.posts import known_posts as known_posts
     from opl.program.ratios import import_pulse_ratios as import_pulse_ratios
@@ -230,6 +232,7 @@ _HOMES = {
     "opl.run.surfacing": "cut_surface",
     "opl.run.values": "Planned Prepared Proven Refused Run Surfaced Written",
     "opl.run.viewing": "find_page",
+    "opl.planning.so_far": "SoFar",
     "opl.run.watch": "Stage Watch",
     "opl.service.serving": "ServiceSettings serve",
     "opl.store.jobs": "Store",

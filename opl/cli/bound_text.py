@@ -36,16 +36,19 @@ def _certified(report: opl.Report) -> Iterator[str]:
         yield (
             f"no motion along these passes has a {name} below {form.format(known.lower_bound)}, "
             f"{COVERED}: the one found has {form.format(known.value)}, at most "
-            f"{100.0 * known.gap:.1f} % of it too much"
+            f"{100.0 * known.gap:.1f} % of it too much{_why(path.open_because)}"
         )
     bound, gap = path.lower_bound_rad, path.gap
     if bound is None or gap is None:
         return
-    why = "" if path.open_because is None else f"; more than wanted: {path.open_because}"
     yield (
         f"no motion along these passes has a joint range sum below {bound:.4f} rad, {COVERED}: "
-        f"the one found is within {100.0 * gap:.3f} % of the least{why}"
+        f"the one found is within {100.0 * gap:.3f} % of the least{_why(path.open_because)}"
     )
+
+
+def _why(open_because: str | None) -> str:
+    return "" if open_because is None else f"; more than wanted: {open_because}"
 
 
 def _held(report: opl.Report) -> Iterator[str]:

@@ -33,7 +33,7 @@ def progress_bar(quiet: bool) -> Iterator[opl.Watch]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description:30}"), BarColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description:36}"), BarColumn(), TimeElapsedColumn())
     # no thread that draws it: the pictures are drawn in a copy of a process that has none
     quiet_bar = Progress(*columns, console=Console(stderr=True), transient=True, auto_refresh=False)
     with quiet_bar as bar:
@@ -45,9 +45,19 @@ def progress_bar(quiet: bool) -> Iterator[opl.Watch]:
         def show(stage: opl.Stage, fraction: float) -> None:
             nonlocal furthest
             furthest = max(furthest, order.index(stage.value) + fraction)
-            bar.update(task, description=STAGES[stage.value], completed=furthest)
+            told = STAGES[stage.value]
+            if stage is opl.Stage.SEARCH and watch.so_far is not None:
+                told = f"{told}, {_known(watch.so_far)}"
+            bar.update(task, description=told, completed=furthest)
             if time.monotonic() - drawn[0] > REDRAWN or fraction == 0.0:
                 drawn[0] = time.monotonic()
                 bar.refresh()
 
-        yield opl.Watch(show)
+        watch = opl.Watch(show)
+        yield watch
+
+
+def _known(so_far: opl.SoFar) -> str:
+    """Return what a search knows, in the unit of what it keeps small."""
+    bound = f"bound {so_far.lower_bound:.3f}"
+    return bound if so_far.value is None else f"found {so_far.value:.3f}, {bound}"

@@ -8,7 +8,7 @@ and more cutter points taken in, until that no longer rises.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,7 +73,11 @@ class _Cells:
 
 
 def least_cost(
-    problem: GrindingProblem, travel: float, time: float, worth: Array | None = None
+    problem: GrindingProblem,
+    travel: float,
+    time: float,
+    worth: Array | None = None,
+    goes_on: Callable[[float], bool] = lambda _: True,
 ) -> float:
     """Return what no motion along the passes costs less than, whatever its contact positions.
 
@@ -85,15 +89,22 @@ def least_cost(
         travel: Price of a radian of joint travel on the wheel.
         time: Price of a second on the wheel.
         worth: What is about attained of each pass, shape (n_passes,); no bound is sought beyond.
+        goes_on: Given the bound so far, often; says whether to raise it further.
     """
     seams = seams_of(problem.solutions(np.arange(len(problem.points))))
     images = Images(problem.cell.robot, seams, 0.0)
     walls = ColumnWalls(problem.cell, problem.scene.part, problem.points, images)
     wanted = np.full(problem.points.n_passes, np.inf) if worth is None else worth
-    total = sum(
-        _PassBound(problem, walls, travel, time, index).least(most)
-        for index, most in enumerate(wanted.tolist())
-    )
+    total = 0.0
+    for index, most in enumerate(wanted.tolist()):
+        ended, bound = False, 0.0
+        for bound in _PassBound(problem, walls, travel, time, index).rising(most):
+            ended = not goes_on((total + bound) * (1.0 - SLACK))
+            if ended:
+                break
+        total += bound
+        if ended:
+            break
     return total * (1.0 - SLACK)
 
 
@@ -116,8 +127,8 @@ class _PassBound:
         self._columns = np.flatnonzero(problem.points.pass_index == index)
         self._left = MOST_WORK / problem.points.n_passes  # ways that may be looked at
 
-    def least(self, worth: float) -> float:
-        """Return the bound, no greater than what is worth knowing."""
+    def rising(self, worth: float) -> Iterator[float]:
+        """Yield the bound as it rises, up to what is worth knowing."""
         places, proven, ceiling = self._columns[:0], 0.0, worth
         families = [_cells([], family) for family in self._walls.images.families]
         for count in self._counts():
@@ -127,11 +138,12 @@ class _PassBound:
                 cells = [one.in_columns(len(places)) for one in families]
                 self._left -= sum(one.edges for one in cells)
                 if self._left < 0.0:
-                    return proven
+                    return
                 bounds, attained = self._ways(places, cells)
                 proven = max(proven, min(ceiling, *(float(way.min()) for way in bounds), np.inf))
+                yield proven
                 if proven >= ceiling * (1.0 - CLOSE):
-                    return proven
+                    return
                 families, bounds = _below(families, bounds, ceiling)
                 if proven >= attained * (1.0 - SETTLED):
                     break
@@ -140,7 +152,6 @@ class _PassBound:
                     self._without_collisions(_cut(self._problem, places, one, way < attained))
                     for one, way in zip(families, bounds, strict=True)
                 ]
-        return proven
 
     def _without_collisions(self, cells: _Cells) -> _Cells:
         """Return cells but for those in which the robot surely collides all over."""

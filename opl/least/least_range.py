@@ -10,6 +10,7 @@ from opl.least.optimal import OptimalSearch
 from opl.planning.plan import Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.settings import OptimalSettings
+from opl.planning.so_far import ENDED, Follow, SoFar, to_the_end
 from opl.walls.images import Seams
 
 # of the work at the least: a motion sought in another way, where the proof found none
@@ -33,7 +34,7 @@ def plan_optimal(
     problem: GrindingProblem,
     settings: OptimalSettings,
     fallback: Plan | None,
-    report: Callable[[float], None] = lambda _: None,
+    follow: Follow = to_the_end,
     otherwise: Callable[[float], Plan | None] | None = None,
     seams: Seams | None = None,
     beside: Beside | None = None,
@@ -44,7 +45,7 @@ def plan_optimal(
         problem: What is to be planned.
         settings: What is wanted.
         fallback: A motion that is known, if one is: joints and contact should travel no further.
-        report: Given how much of the work allowed is done, after every step; may raise.
+        follow: Given the joint range sum of the best motion and its lower bound after every step.
         otherwise: Looks for a motion in another way, where the proof finds none, given how many
             units of work are left for that.
         seams: Where full turns are counted from, where that is known.
@@ -59,28 +60,39 @@ def plan_optimal(
     search = OptimalSearch(problem, settings, fallback, seams)
     share = 1.0 if otherwise is None else 1.0 - OTHERWISE_SHARE
 
-    def go_on(share: float) -> None:
+    def goes_on() -> bool:
+        value = None if search.plan is None else search.motions.value
+        return follow(SoFar(min(search.work_share, 1.0), value, search.lower_bound))
+
+    def go_on(share: float) -> bool:
+        """Work up to a share of the work allowed; return whether that was ended before."""
         while not search.finished and (search.plan is not None or search.work_share < share):
             search.step()
-            report(min(search.work_share, 1.0))
+            if not goes_on() and search.plan is not None:
+                return True
+        return False
 
-    go_on(share)
+    ended = go_on(share)
     if search.plan is None and otherwise is not None:
         left = max(OTHERWISE_SHARE, 1.0 - search.work_share)  # a step may take more than was left
         search.keep(otherwise(left * settings.max_subproblems))
-        go_on(1.0)
+        ended = go_on(1.0)
     if search.plan is None:
         robot, least = problem.cell.robot, search.lower_bound
         raise NoMotionError(least, least > float((robot.upper - robot.lower).sum()))
     found = replace(search.plan, lower_bound=search.lower_bound, holders=search.holders(beside))
-    return replace(found, open_because=_open_because(found, settings, search))
+    return replace(found, open_because=_open_because(found, settings, search, ended))
 
 
-def _open_because(plan: Plan, settings: OptimalSettings, search: OptimalSearch) -> str | None:
+def _open_because(
+    plan: Plan, settings: OptimalSettings, search: OptimalSearch, ended: bool
+) -> str | None:
     """Return why the bound is further off than wanted, None if it is not."""
     assert plan.gap is not None
     if plan.gap <= settings.widen:
         return None
+    if ended:
+        return ENDED
     if search.work_share >= 1.0:
         return "the work allowed for the proof was done before it was complete"
     stopped = search.motions.stopped.most_common(1)

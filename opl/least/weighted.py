@@ -22,6 +22,7 @@ from opl.motion.figures import figures_of_path
 from opl.planning.plan import ObjectiveValue, Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.settings import CostWeights, ObjectiveWeights
+from opl.planning.so_far import ENDED, Follow, SoFar, to_the_end
 from opl.search.box import JointBox
 
 # by which fraction of its size the least box is widened; at last not bounded at all
@@ -30,11 +31,16 @@ MOST_BRANCHES = 2  # on which all passes are ground: those cheapest over few cut
 WORTH_CHANGING = 0.01  # of the sum: what is gained where passes lie on several IK branches
 ALIKE = 1e-4  # by which fraction the sums of images may differ
 MOST_TRIED = 6  # proposals of which motions are made
+BOUND_BEGINS, MOTIONS_BEGIN = 0.4, 0.7  # of the work; tracks before
 TIES = 1e-3  # times the costs that decide between tracks of equal weighted sum
 
 
 def plan_weighted(
-    problem: GrindingProblem, weights: ObjectiveWeights, costs: CostWeights, known: Sequence[Plan]
+    problem: GrindingProblem,
+    weights: ObjectiveWeights,
+    costs: CostWeights,
+    known: Sequence[Plan],
+    follow: Follow = to_the_end,
 ) -> Plan:
     """Find a collision-free motion with a small weighted sum, and a bound on the least one.
 
@@ -44,6 +50,7 @@ def plan_weighted(
         costs: What decides between tracks of equal weighted sum.
         known: Motions that are known, the best of which is returned if none better is found. If the
             joint range sum is charged for, the first has the least, with its bound.
+        follow: Given the value of the best motion and its lower bound, often.
 
     Returns:
         The plan with its weighted sum and what that can be at the least.
@@ -53,24 +60,45 @@ def plan_weighted(
         lower_bound = weights.joint_range * (known[0].lower_bound or 0.0)
     values = [_value(problem, plan, weights) for plan in known]
     value = min(values)
-    best = known[values.index(value)]
+    best, ended = known[values.index(value)], False
+
+    def goes_on(done: float, least: float) -> bool:
+        nonlocal ended
+        ended = not follow(SoFar(min(done, 1.0), value, min(least, value)))
+        return not ended
+
     if weights.travel > 0.0 or weights.time > 0.0:
         prices = _prices(weights, costs)
         tracks = PassTracks(problem, prices)
-        proposals = list(_proposals(tracks, weights, known))
+        proposals = []
+        for one in _proposals(tracks, weights, known):
+            proposals.append(one)
+            if not goes_on(0.0, lower_bound):
+                break
         told = [[track.cost for track in one.passes] for one in proposals]
         worth = np.min(told, axis=0) if told else np.full(problem.points.n_passes, np.inf)
-        lower_bound += least_cost(problem, weights.travel, weights.time, worth)
+        of_ranges, attained = lower_bound, float(worth.sum())
+
+        def rises(cost: float) -> bool:
+            done = cost / attained if attained > 0.0 else 1.0
+            return goes_on(BOUND_BEGINS + (MOTIONS_BEGIN - BOUND_BEGINS) * done, of_ranges + cost)
+
+        if not ended:
+            lower_bound += least_cost(problem, weights.travel, weights.time, worth, rises)
         for one in _different(proposals):
             # a motion costs hardly less than its track does at the cutter points
-            if one.least >= value:
+            if ended or one.least >= value:
                 break
             track = joined([tracks.through_places(track, one.box) for track in one.passes])
             found = motion_of_track(problem, prices, track)
             if found is not None and (now := _value(problem, found, weights)) < value:
                 best, value = found, now
+            goes_on(MOTIONS_BEGIN, lower_bound)
     objective = ObjectiveValue(value, min(lower_bound, value))
-    return replace(best, lower_bound=None, open_because=None, objective=objective, holders=())
+    open_because = ENDED if ended and objective.gap > 0.0 else None
+    return replace(
+        best, lower_bound=None, open_because=open_because, objective=objective, holders=()
+    )
 
 
 @dataclass(frozen=True)

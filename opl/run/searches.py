@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from opl.errors import NoPathError
@@ -26,6 +26,7 @@ from opl.planning.plan import Exhausted, Found, Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import explain, no_path
 from opl.planning.settings import ObjectiveWeights, Start
+from opl.planning.so_far import Follow, SoFar, to_the_end
 from opl.run.values import Prepared
 from opl.walls.images import Seams
 
@@ -34,6 +35,7 @@ MOST_CHECKS = 20
 # of motions of the recursive search, before the proof begins without it, and units of work on them
 MOST_FIRST_CHECKS = 40
 MOST_FIRST_WORK = 3000.0
+BEGINNING = 0.3  # of the search for another objective: the least joint range sum
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ def search_path(
     search: Search,
     problem: GrindingProblem,
     nameable: Nameable | None = None,
-    report: Callable[[float], None] = lambda _: None,
+    follow: Follow = to_the_end,
     seams: Later[Seams] | None = None,
     beside: Beside | None = None,
 ) -> FoundPaths:
@@ -65,7 +67,7 @@ def search_path(
         search: What the job wants.
         problem: What is to be planned.
         nameable: Which configurations the program names without doubt; None for all.
-        report: Given how much of the work allowed is done, often; may raise.
+        follow: Given what is known of the path, often; may end the search with its best.
         seams: Where full turns are counted from, where that is worked out beside.
         beside: What may work beside this process, if anything.
 
@@ -73,9 +75,9 @@ def search_path(
         NoPathError: If there is none.
     """
     if proves_range(search):
-        plan, recursive = _search_range(search, problem, report, seams, beside)
+        plan, recursive = _search_range(search, problem, follow, seams, beside)
     elif search.method is Method.OPTIMAL:
-        plan, recursive = _search_best(search, problem, report, seams, beside)
+        plan, recursive = _search_best(search, problem, follow, seams, beside)
     else:
         plan = recursive = plan_recursive(problem, search.start)
     return FoundPaths(_finished(search, problem, plan, nameable), recursive)
@@ -89,7 +91,7 @@ def proves_range(search: Search) -> bool:
 def _search_range(
     search: Search,
     problem: GrindingProblem,
-    report: Callable[[float], None],
+    follow: Follow,
     seams: Later[Seams] | None,
     beside: Beside | None,
 ) -> tuple[Plan, Plan | None]:
@@ -112,7 +114,7 @@ def _search_range(
     others = None if isinstance(last, Exhausted) else otherwise
     try:
         counted_from = None if seams is None else seams.value()
-        best = plan_optimal(problem, search.optimal, known, report, others, counted_from, beside)
+        best = plan_optimal(problem, search.optimal, known, follow, others, counted_from, beside)
     except NoMotionError as error:
         least, proven = error.lower_bound, error.proven
     else:
@@ -158,7 +160,7 @@ def _finished(
 def _search_best(
     search: Search,
     problem: GrindingProblem,
-    report: Callable[[float], None],
+    follow: Follow,
     seams: Later[Seams] | None,
     beside: Beside | None,
 ) -> tuple[Plan, Plan | None]:
@@ -173,11 +175,20 @@ def _search_best(
         found = first.go_on(MOST_FIRST_CHECKS, MOST_FIRST_WORK)
         recursive = found.plan if isinstance(found, Found) else None
     if recursive is None:
-        smallest, recursive = _search_range(search, problem, report, seams, beside)
+
+        def begin(so_far: SoFar) -> bool:
+            least = weights.joint_range * so_far.lower_bound
+            return follow(SoFar(BEGINNING * so_far.done, None, least))
+
+        smallest, recursive = _search_range(search, problem, begin, seams, beside)
         known.append(smallest)
     if recursive is not None:
         known.append(recursive)
-    return plan_weighted(problem, weights, search.optimal.costs, known), recursive
+
+    def go_on(so_far: SoFar) -> bool:
+        return follow(replace(so_far, done=BEGINNING + (1.0 - BEGINNING) * so_far.done))
+
+    return plan_weighted(problem, weights, search.optimal.costs, known, go_on), recursive
 
 
 def from_paper_start(problem: GrindingProblem) -> Figures | None:

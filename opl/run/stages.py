@@ -120,8 +120,8 @@ def _plan(surfaced: Surfaced, watch: Watch, beside: Beside) -> Planned | Refused
     for later in (*comparison, Later(load_pictures)):
         beside.begin(later)
     try:
-        with watch.stage(Stage.SEARCH) as report:
-            found = search_path(job.search, problem, _nameable(job), report, seams, beside)
+        with watch.search() as follow:
+            found = search_path(job.search, problem, _nameable(job), follow, seams, beside)
     except NoPathError as error:
         return _without_path(prepared, error, watch)
     charted = Later(_charted, prepared, found.plan)

@@ -72,6 +72,24 @@ def test_a_run_is_cancelled_from_another_thread(job):
     other.join()
 
 
+def test_a_search_ends_with_the_best_so_far_and_the_run_goes_on_with_it(tmp_path):
+    def stop(stage, fraction):
+        if stage is opl.Stage.SEARCH and watch.so_far is not None:
+            seen.append(watch.so_far)
+            watch.take_best()
+
+    job = opl.load_job(write_job(tmp_path, {"search.method": "optimal"}))
+    seen, watch = [], opl.Watch(lambda *given: stop(*given))
+    assert watch.so_far is None
+    run = opl.run_job(job, watch)
+    path = opl.make_report(run).path
+    last = watch.so_far
+    assert run.status == "ok" and last.value is not None and len(seen) >= 1
+    assert path.joint_range_sum_rad == pytest.approx(last.value, abs=1e-6)
+    assert path.lower_bound_rad == pytest.approx(last.lower_bound, abs=1e-6)
+    assert path.open_because.startswith("the search was ended")
+
+
 def test_what_the_progress_function_raises_ends_the_run(job):
     def stumble(stage, fraction):
         raise KeyError("of the caller")

@@ -26,6 +26,7 @@ from opl.motion.whole_motion import UnreachableApproachError
 from opl.planning import plan as plan_module
 from opl.planning.multi_start import plan_recursive
 from opl.planning.settings import ObjectiveWeights
+from opl.planning.so_far import ENDED
 from opl.planning.track_check import NoMotion
 from opl.verification.replay import replay
 from opl.walls.columns import ColumnWalls
@@ -189,16 +190,61 @@ def test_an_interrupted_search_returns_what_there_was_and_a_bound_that_holds():
 
 
 def test_a_search_can_be_stopped_after_every_step():
-    def report(share):
-        assert 0.0 <= share <= 1.0
-        seen.append(share)
+    def follow(so_far):
+        assert 0.0 <= so_far.done <= 1.0
+        assert so_far.lower_bound <= optimal(one_row).path.joint_range_sum <= so_far.value
+        seen.append(so_far)
         if len(seen) == 3:
             raise InterruptedError
+        return True
 
     seen = []
     with pytest.raises(InterruptedError):
-        plan_optimal(one_row(), SETTINGS, recursive(one_row), report)
-    assert seen == sorted(seen)
+        plan_optimal(one_row(), SETTINGS, recursive(one_row), follow)
+    for name in ("done", "lower_bound"):
+        values = [getattr(one, name) for one in seen]
+        assert values == sorted(values)
+
+
+def test_a_search_that_is_ended_has_its_best_motion_and_the_bound_of_that_moment():
+    def follow(so_far):
+        seen.append(so_far)
+        return len(seen) < 3
+
+    seen = []
+    plan = plan_optimal(one_row(), SETTINGS, recursive(one_row), follow)
+    assert len(seen) == 3
+    assert plan.path.joint_range_sum == seen[-1].value
+    assert plan.lower_bound == seen[-1].lower_bound <= optimal(one_row).path.joint_range_sum
+    assert plan.open_because == ENDED
+
+
+def test_a_search_without_a_motion_is_not_ended_before_it_has_one():
+    seen = []
+    plan = plan_optimal(one_row(), SETTINGS, None, lambda so_far: seen.append(so_far))
+    assert [one.value for one in seen[:-1]] == [None] * (len(seen) - 1)
+    assert plan.path.joint_range_sum == seen[-1].value
+
+
+@pytest.mark.parametrize("weights", [ONLY_TRAVEL, ObjectiveWeights(1.0, 0.3, 0.01)])
+def test_what_is_known_of_another_objective_is_true_at_any_moment(weights):
+    def follow(so_far):
+        seen.append(so_far)
+        return len(seen) < most
+
+    known, seen, most = [optimal(one_row), recursive(one_row)], [], np.inf
+    best = plan_weighted(one_row(), weights, SETTINGS.costs, known, follow).objective
+    for name, sign in (("done", 1.0), ("lower_bound", 1.0), ("value", -1.0)):
+        values = [sign * getattr(one, name) for one in seen]
+        assert values == sorted(values)
+    assert all(one.lower_bound <= best.value for one in seen)
+    assert seen[-1].value == best.value and len(seen) > 4
+    for most in (1, len(seen) // 2):
+        seen = []
+        plan = plan_weighted(one_row(), weights, SETTINGS.costs, known, follow)
+        assert plan.objective.value == seen[-1].value and len(seen) == most
+        assert plan.objective.lower_bound == pytest.approx(seen[-1].lower_bound)
+        assert plan.open_because == ENDED
 
 
 def test_without_a_motion_that_is_known_the_proof_finds_one():
