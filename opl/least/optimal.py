@@ -116,16 +116,19 @@ class OptimalSearch:
         return holders(*given, beside)
 
     def step(self) -> None:
-        """Work on one subproblem."""
+        """Work on one subproblem; what was proven stays so, though the proof may tell less then."""
+        self._work_on_one()
+        self._proven = self.lower_bound
+
+    def _work_on_one(self) -> None:
         if self.proof.closed:
             self._hope_for_less()
             return
         candidate = self.proof.take_next()
         if candidate is None:
             return
-        box = JointBox(candidate.low, candidate.high)
+        box, most = JointBox(candidate.low, candidate.high), self.proof.threshold
         self._sampler.mirrored = candidate.mirrored
-        most = self.proof.threshold
         allowed = self._settings.missed(most) if candidate.settled else CLEARLY_MISSED * most
         placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
         if not candidate.settled:
@@ -133,8 +136,7 @@ class OptimalSearch:
             return
         best, collided = self.plan, self.motions.collided
         learnt = self._learn(box, placements, missed[:MOST_ADDED])
-        in_vain = self.plan is best and self.motions.collided > collided
-        if in_vain and not self._sampler.collisions:
+        if self.plan is best and self.motions.collided > collided and not self._sampler.collisions:
             self._mind_collisions()
         elif learnt or self.proof.outdated:
             self.proof.put_back()
@@ -272,7 +274,6 @@ class OptimalSearch:
 
     def _begin_again(self, proof: BoxProof, threshold: float) -> None:
         """Begin a proof again: boxes up to another size are of interest."""
-        self._proven = self.lower_bound
         self.proof = proof.again(threshold)
         self._work.begin_again(self.proof)
 

@@ -219,6 +219,16 @@ def test_a_search_that_is_ended_has_its_best_motion_and_the_bound_of_that_moment
     assert plan.open_because == ENDED
 
 
+def test_what_was_proven_at_any_moment_is_in_the_bound():
+    seen = []
+    plan = plan_optimal(
+        one_row(), SETTINGS, recursive(one_row), lambda one: seen.append(one) or True
+    )
+    bounds = [one.lower_bound for one in seen]
+    assert bounds == sorted(bounds) and plan.lower_bound == bounds[-1]
+    assert bounds[-1] > plan.path.joint_range_sum * (1.0 - SETTINGS.gap)  # it was looked for less
+
+
 def test_a_search_without_a_motion_is_not_ended_before_it_has_one():
     seen = []
     plan = plan_optimal(one_row(), SETTINGS, None, lambda so_far: seen.append(so_far))
