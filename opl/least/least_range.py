@@ -18,16 +18,17 @@ OTHERWISE_SHARE = 0.3
 
 
 class NoMotionError(Exception):
-    """No motion was found in the work allowed.
+    """No motion was found.
 
     Args:
         lower_bound: No motion has a smaller joint range sum, in [rad].
         proven: Whether it is proven that there is none.
+        spent: Whether all of the work allowed was done.
     """
 
-    def __init__(self, lower_bound: float, proven: bool) -> None:
+    def __init__(self, lower_bound: float, proven: bool, spent: bool) -> None:
         super().__init__(f"no motion found; none is below {lower_bound:.4f} rad")
-        self.lower_bound, self.proven = lower_bound, proven
+        self.lower_bound, self.proven, self.spent = lower_bound, proven, spent
 
 
 def plan_optimal(
@@ -79,7 +80,8 @@ def plan_optimal(
         ended = go_on(1.0)
     if search.plan is None:
         robot, least = problem.cell.robot, search.lower_bound
-        raise NoMotionError(least, least > float((robot.upper - robot.lower).sum()))
+        proven = least > float((robot.upper - robot.lower).sum())
+        raise NoMotionError(least, proven, search.work_share >= 1.0)
     found = replace(search.plan, lower_bound=search.lower_bound, holders=search.holders(beside))
     return replace(found, open_because=_open_because(found, settings, search, ended))
 

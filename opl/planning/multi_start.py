@@ -5,7 +5,6 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -74,21 +73,6 @@ class RecursiveSearch:
 def try_recursive(problem: GrindingProblem, start: Start, most_checks: int) -> SearchOutcome:
     """Return what the recursive search finds within a number of checked motions."""
     return RecursiveSearch(problem, start).go_on(most_checks)
-
-
-def only_apart(problem: GrindingProblem, matrices: list[OpenMatrix]) -> bool:
-    """Return whether each pass can be ground in some matrix, but no matrix grinds all of them."""
-    starts = np.flatnonzero(np.diff(problem.points.pass_index, prepend=-1, append=-1)).tolist()
-    passes = [(first, end - 1) for first, end in pairwise(starts)]
-    ground = np.array(
-        [
-            passable(matrix.ladder, matrix.blocked_edges, *ends)
-            for matrix in matrices
-            for ends in passes
-        ],
-        dtype=bool,
-    ).reshape(len(matrices), len(passes))
-    return bool(ground.any(axis=0).all() and not ground.all(axis=1).any())
 
 
 def held_back(problem: GrindingProblem, matrices: list[OpenMatrix]) -> bool:

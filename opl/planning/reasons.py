@@ -28,9 +28,15 @@ def unreachable_points(problem: GrindingProblem) -> np.ndarray:
     return np.flatnonzero(~problem.field.reached.any(axis=1))
 
 
-def no_path(problem: GrindingProblem, matrices: list[OpenMatrix]) -> NoPathError:
-    """Return the error with how far the searches came and what stopped them."""
-    cut_off = sum((matrix.cut_off for matrix in matrices), Counter())
+def no_path(problem: GrindingProblem, matrices: list[OpenMatrix], scope: str = "") -> NoPathError:
+    """Return the error with how far the searches came and what stopped them.
+
+    Args:
+        problem: What was planned.
+        matrices: What is blocked.
+        scope: For what that holds, where it is not for the contact positions of the field alone.
+    """
+    cut_off = cut_off_in(matrices)
     if cut_off:
         where = (
             "no path: the passes can be ground, but no collision-free move to, from or between "
@@ -44,7 +50,14 @@ def no_path(problem: GrindingProblem, matrices: list[OpenMatrix]) -> NoPathError
         where = f"no path: every track through the {n} cutter points collides"
     else:
         where = f"no path beyond cutter point {reached - 1} ({reached} of {n} reached)"
-    return NoPathError(where, explain(problem, matrices))
+    positions = len(problem.field.contact_positions)
+    scope = scope or f"looked for at {positions} contact positions, not between them"
+    return NoPathError(where, [*explain(problem, matrices), scope])
+
+
+def cut_off_in(matrices: list[OpenMatrix]) -> Counter[tuple[FreeMove, Blocker]]:
+    """Return the free moves that alone stopped motions, what blocked them, and how often."""
+    return sum((matrix.cut_off for matrix in matrices), Counter())
 
 
 def explain(problem: GrindingProblem, matrices: list[OpenMatrix]) -> list[str]:

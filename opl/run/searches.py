@@ -18,13 +18,12 @@ from opl.motion.short_ways import shortened
 from opl.planning.multi_start import (
     RecursiveSearch,
     held_back,
-    only_apart,
     plan_recursive,
     try_recursive,
 )
 from opl.planning.plan import Exhausted, Found, Plan
 from opl.planning.problem import GrindingProblem
-from opl.planning.reasons import explain, no_path
+from opl.planning.reasons import cut_off_in, explain, no_path
 from opl.planning.settings import ObjectiveWeights, Start
 from opl.planning.so_far import Follow, SoFar, to_the_end
 from opl.run.values import Prepared
@@ -35,6 +34,11 @@ MOST_CHECKS = 20
 # of motions of the recursive search, before the proof begins without it, and units of work on them
 MOST_FIRST_CHECKS = 40
 MOST_FIRST_WORK = 3000.0
+NONE_IS_FREE = (
+    "no motion along these passes, at any contact positions, on along each pass and never back, "
+    "each on an IK branch and count of full turns of its own, keeps reach, limits and the plan's "
+    "clearances, with leads as the job sets them"
+)
 BEGINNING = 0.3  # of the search for another objective: the least joint range sum
 
 
@@ -99,9 +103,7 @@ def _search_range(
     in_turns = RecursiveSearch(problem, search.start)
     last = in_turns.go_on(MOST_FIRST_CHECKS, MOST_FIRST_WORK)
     known = last.plan if isinstance(last, Found) else None
-    if isinstance(last, Exhausted) and not (
-        only_apart(problem, last.matrices) or held_back(problem, last.matrices)
-    ):
+    if isinstance(last, Exhausted) and cut_off_in(last.matrices):
         raise no_path(problem, last.matrices)
 
     def otherwise(work: float) -> Plan | None:
@@ -109,39 +111,38 @@ def _search_range(
         last = in_turns.go_on(None, work)
         return last.plan if isinstance(last, Found) else None
 
-    # where all that is proposed collides, the proof knows better where not to look; where passes
-    # cannot be ground on one IK branch, it gives each its own; and it knows more contact positions
+    # where all that is proposed collides, the proof knows better where not to look; it knows all
+    # contact positions, and gives each pass its own IK branch; so only it can say that none is free
     others = None if isinstance(last, Exhausted) else otherwise
     try:
         counted_from = None if seams is None else seams.value()
         best = plan_optimal(problem, search.optimal, known, follow, others, counted_from, beside)
     except NoMotionError as error:
-        least, proven = error.lower_bound, error.proven
+        least, proven, spent = error.lower_bound, error.proven, error.spent
     else:
         return best, last.plan if isinstance(last, Found) else None
-    held = isinstance(last, Exhausted) and held_back(problem, last.matrices)
-    if isinstance(last, Exhausted) and not held:
-        raise no_path(problem, last.matrices)
     assert not isinstance(last, Found), "what was found is a plan"
+    if proven and isinstance(last, Exhausted):
+        raise no_path(problem, last.matrices, f"proven: {NONE_IS_FREE}")
     if proven:
-        raise NoPathError(
-            "no path: it is proven that no motion along these passes, at any contact positions, on "
-            "along each pass and never back, each on an IK branch and count of full turns of its "
-            "own, keeps reach, limits and the plan's clearances, with leads as the job sets them",
-            explain(problem, in_turns.matrices),
-        )
+        reasons = explain(problem, in_turns.matrices)
+        raise NoPathError(f"no path: it is proven that {NONE_IS_FREE}", reasons)
+    reasons = list[str]()
     tried = f"the {last.checks} best motions of the recursive search are not free"
-    if held:
-        tried = (
-            f"at {len(problem.field.contact_positions)} contact positions none is free that keeps "
-            f"{keys.SEARCH_CONTACT_CHANGE}"
-        )
+    if isinstance(last, Exhausted):
+        tried = f"at {len(problem.field.contact_positions)} contact positions none is free"
+        if held_back(problem, last.matrices):
+            tried += f" that keeps {keys.SEARCH_CONTACT_CHANGE}"
+        else:
+            reasons = explain(problem, last.matrices)
     elif last.checks == 0:
         tried = "the recursive search came to no motion in the work allowed"
+    in_work, more = (" in the work allowed", "more work") if spent else ("", "more positions")
     raise NoPathError(
-        f"no path found: {tried}, and "
-        "the proof found none in the work allowed, only that none along these passes has a joint "
-        f"range sum below {least:.4f} rad; more work, or more room around the robot, may help",
+        f"no path found: {tried}, and the proof found none{in_work}, only that none along these "
+        f"passes has a joint range sum below {least:.4f} rad; {more}, or more room around the "
+        "robot, may help",
+        reasons,
         lower_bound=least,
     )
 

@@ -15,8 +15,7 @@ from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.job.load import load_job
 from opl.least.least_range import plan_optimal
-from opl.planning.multi_start import only_apart, plan_recursive
-from opl.planning.open_matrix import open_matrices
+from opl.planning.multi_start import plan_recursive
 from opl.planning.survey import survey_nodes
 from opl.run.searches import search_path
 from tests.support.jobs import opl, write_ball, write_robot
@@ -96,20 +95,6 @@ def test_passes_that_no_branch_grinds_together_have_a_path(tmp_path):
     assert "recursive" not in result["compared"]
     recursive = opl("run", job, "--method", "recursive", "--out", tmp_path / "other")
     assert "no path" in recursive.err
-
-
-def test_a_pass_that_no_branch_grinds_has_none():
-    problem = ball()
-    matrices = open_matrices(problem)
-    assert not only_apart(problem, matrices)  # one grinds both
-    for matrix in matrices:
-        matrix.free[16:] &= matrix.nodes.q[16:, :, B] > 0.0
-        matrix.free[:16] &= matrix.nodes.q[:16, :, B] < 0.0
-    assert only_apart(problem, matrices)
-    for matrix in matrices:
-        matrix.free[20] = False
-    assert not only_apart(problem, matrices)
-    assert not only_apart(problem, [])
 
 
 def test_the_survey_is_of_the_branch_of_each_pass():
