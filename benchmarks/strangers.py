@@ -83,7 +83,8 @@ def _path(job: opl.Job, watch: opl.Watch) -> Facts:
         return {**facts, "status": status, "cause": str(error), "bound": bound}
     facts.update(found=plan.path.joint_range_sum, bound=plan.lower_bound)
     if plan.objective is not None:
-        facts.update(found=plan.objective.value, bound=plan.objective.lower_bound)
+        value = plan.objective.value
+        facts.update(found=value, bound=value * (1.0 - plan.objective.gap))
     return {**facts, "status": "ok", "cause": plan.open_because or ""}
 
 
@@ -102,7 +103,7 @@ def _program(job: opl.Job, out: Path, watch: opl.Watch) -> Facts:
         path, value = report.path, report.path.objective_value
         facts.update(found=path.joint_range_sum_rad, bound=path.lower_bound_rad)
         if value is not None:
-            facts.update(found=value.value, bound=value.lower_bound)
+            facts.update(found=value.value, bound=value.value * (1.0 - value.gap))
     return facts
 
 

@@ -27,6 +27,7 @@ from opl.walls.shut_leads import RESERVE
 # cutter points of a pass that are looked at first: the more, the more of a staircase the first
 # track is; the fewer, the less it knows of what lies between
 FEW, FEWEST = 17, 5
+WIDER = 1.0, 4.0, 16.0  # times as far to either side, where nothing nearer is free
 CLOSER = 0.25  # times as far to either side next, where the track hardly gets cheaper
 HARDLY = 0.0005  # of its cost
 # spacings of the field: no closer than that before more cutter points are put in, and at last
@@ -42,14 +43,21 @@ class PassTracks:
     Args:
         problem: What is to be planned.
         prices: What a track is charged for.
+
+    Attributes:
+        prices: The same.
     """
 
     def __init__(self, problem: GrindingProblem, prices: CostWeights) -> None:
-        self._problem, self._prices = problem, prices
+        self._problem, self.prices = problem, prices
         self._scene = problem.scene.collision.wider(RESERVE)
 
     def about(
-        self, track: OwnTrack, box: JointBox | None = None, closest: float = CLOSEST
+        self,
+        track: OwnTrack,
+        box: JointBox | None = None,
+        closest: float = CLOSEST,
+        widest: float = ABOUT,
     ) -> OwnTrack | None:
         """Return the cheapest track that is found about another of one pass.
 
@@ -59,8 +67,9 @@ class PassTracks:
             track: The other.
             box: Where it stays, if anywhere.
             closest: How close samples lie at last, in spacings of the field.
+            widest: How far to either side they lie at first.
         """
-        about, cost = ABOUT, np.inf
+        about, cost = widest, np.inf
         while about > closest:
             nodes = nodes_about(self._problem, track, about)
             found = self._cheapest(track.places, int(track.ik_branch[0]), *nodes, box)
@@ -119,6 +128,14 @@ class PassTracks:
             track = finer
         return track
 
+    def with_places(
+        self, track: OwnTrack, places: Array, box: JointBox | None = None
+    ) -> OwnTrack | None:
+        """Return the cheapest track found about one of a pass, through other places of it."""
+        track = track.at(places[(places >= track.places[0]) & (places <= track.places[-1])])
+        found = (self.about(track, box, widest=times * ABOUT) for times in WIDER)
+        return next(filter(None, found), None)
+
     def _longer(self, track: OwnTrack) -> np.ndarray:
         """Return after which places of a track joints turn farther than from place to place."""
         problem, nodes = self._over(
@@ -151,7 +168,7 @@ class PassTracks:
         (matrix,) = open_matrices(problem)
         if box is not None:
             matrix.free &= matrix.free_inside(box)
-        cost = track_cost(problem, nodes, self._prices, matrix.free)
+        cost = track_cost(problem, nodes, self.prices, matrix.free)
         while True:
             found = smoothest(matrix.ladder, matrix.blocked_edges, matrix.free, cost)
             if found is None:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
+from opl.geometry.frames import Array
 from opl.least.own_track import SAMPLES, OwnTrack, nodes_about
+from opl.least.sinking import first_sunk, places_for
 from opl.planning.costs import track_cost
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
-from opl.planning.plan import Found, Plan, propose_and_check
+from opl.planning.plan import Found, Plan, Same, propose_and_check
 from opl.planning.problem import GrindingProblem
 from opl.planning.settings import CostWeights
 from opl.planning.symmetry import everywhere, twins
+from opl.planning.track_check import Collides
 from opl.search.smooth import smoothest
 from opl.walls.images import wrist_flips
 
@@ -20,7 +24,20 @@ MOST_CHECKS = 12
 MOST_WORK = 4000.0  # units
 
 
-def motion_of_track(problem: GrindingProblem, prices: CostWeights, track: OwnTrack) -> Plan | None:
+@dataclass(frozen=True)
+class TooDeep:
+    """The part sinks too deep into the wheel between places of a track, not at them.
+
+    Attributes:
+        places: Those of the track, and others there that are wanted.
+    """
+
+    places: Array
+
+
+def motion_of_track(
+    problem: GrindingProblem, prices: CostWeights, track: OwnTrack
+) -> Plan | TooDeep | None:
     """Return the motion of a track, or where that is not free, of the cheapest near to it that is.
 
     Any image of it: full turns and flips of the wrist that the whole motion has.
@@ -31,7 +48,7 @@ def motion_of_track(problem: GrindingProblem, prices: CostWeights, track: OwnTra
         track: Through all cutter points.
 
     Returns:
-        The plan; None if none is found.
+        The plan, or what stopped it; None if none is found for another reason.
     """
     t, q = nodes_about(problem, track)
     flips = enumerate(wrist_flips(problem.cell.robot.arm))
@@ -43,8 +60,17 @@ def motion_of_track(problem: GrindingProblem, prices: CostWeights, track: OwnTra
     near = problem.over_nodes(track.places, points, t, nodes)
     matrices = open_matrices(near)
     proposals = _cheapest_first(near, matrices, prices)
-    outcome = propose_and_check(near, matrices, proposals, 0, MOST_CHECKS, MOST_WORK)
-    return outcome.plan.at_places(track.places) if isinstance(outcome, Found) else None
+    collided: dict[Same, Collides] = {}
+    outcome = propose_and_check(near, matrices, proposals, 0, MOST_CHECKS, MOST_WORK, collided)
+    if isinstance(outcome, Found):
+        return outcome.plan.at_places(track.places)
+    sunk = first_sunk(near, collided)
+    if sunk is None:
+        return None
+    wanted = [
+        np.linspace(one.first, one.last, one.parts + 1) for one in places_for(track.places, sunk)
+    ]
+    return TooDeep(np.unique(np.concatenate([track.places, *wanted])))
 
 
 def _cheapest_first(

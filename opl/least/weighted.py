@@ -9,7 +9,7 @@ that of travel and time, added up.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from opl.least.least_cost import least_cost
 from opl.least.own_track import OwnTrack, joined, tracks_of
 from opl.least.pass_tracks import FEW, FEWEST, PassTracks
-from opl.least.track_motion import motion_of_track
+from opl.least.track_motion import TooDeep, motion_of_track
 from opl.motion.figures import figures_of_path
 from opl.planning.plan import ObjectiveValue, Plan
 from opl.planning.problem import GrindingProblem
@@ -30,6 +30,7 @@ WIDENINGS = (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0)
 MOST_BRANCHES = 2  # on which all passes are ground: those cheapest over few cutter points
 WORTH_CHANGING = 0.01  # of the sum: what is gained where passes lie on several IK branches
 ALIKE = 1e-4  # by which fraction the sums of images may differ
+MOST_DEEPER = 5  # times that a proposal gets more places
 MOST_TRIED = 6  # proposals of which motions are made
 BOUND_BEGINS, MOTIONS_BEGIN = 0.4, 0.7  # of the work; tracks before
 TIES = 1e-3  # times the costs that decide between tracks of equal weighted sum
@@ -89,8 +90,7 @@ def plan_weighted(
             # a motion costs hardly less than its track does at the cutter points
             if ended or one.least >= value:
                 break
-            track = joined([tracks.through_places(track, one.box) for track in one.passes])
-            found = motion_of_track(problem, prices, track)
+            found = _motion(problem, tracks, one)
             if found is not None and (now := _value(problem, found, weights)) < value:
                 best, value = found, now
             goes_on(MOTIONS_BEGIN, lower_bound)
@@ -114,6 +114,20 @@ class _Proposal:
     least: float
     passes: list[OwnTrack]
     box: JointBox | None
+
+
+def _motion(problem: GrindingProblem, tracks: PassTracks, proposal: _Proposal) -> Plan | None:
+    """Return the motion of a proposal, through more places where the part sinks between them."""
+    passes = [tracks.through_places(track, proposal.box) for track in proposal.passes]
+    for _ in range(MOST_DEEPER):
+        found = motion_of_track(problem, tracks.prices, joined(passes))
+        if not isinstance(found, TooDeep):
+            return found
+        more = [tracks.with_places(track, found.places, proposal.box) for track in passes]
+        passes = [track for track in more if track is not None]
+        if len(passes) < len(more):
+            break
+    return None
 
 
 def _different(proposals: Iterable[_Proposal]) -> list[_Proposal]:
@@ -156,23 +170,41 @@ def _on_branches(
 ) -> list[list[OwnTrack | None]]:
     """Return tracks of all passes: cheap ones on one IK branch, and the cheapest on several."""
     passes = range(n_passes)
-    few = [tracks.over_few(index, FEW, box) for index in passes]
-    if not all(few):
-        return []
-    common = set(few[0]).intersection(*few)
-    costs = {branch: sum(one[branch].cost for one in few) for branch in common}
-    cheapest = sorted(costs, key=costs.__getitem__)[:MOST_BRANCHES]
-    chosen = [[branch] * n_passes for branch in cheapest]
-    chosen.append([min(one, key=lambda branch: one[branch].cost) for one in few])
-    begun = [few]
-    if box is None:  # in boxes, tracks of smaller ones are known
-        begun.append([tracks.over_few(index, FEWEST) for index in passes])
+    # in boxes, tracks of smaller ones are known
+    begun = [[tracks.over_few(index, few, box) for index in passes] for few in _fews(box)]
+    begun = [one for one in begun if all(one)]
+    branches, pairs = list[int](), list[tuple[int, int]]()
+    for one in begun:
+        common = set(one[0]).intersection(*one)
+        branches += _cheapest({branch: sum(at[branch].cost for at in one) for branch in common})
+        for index, at in enumerate(one):
+            pairs.append((index, _cheapest({branch: at[branch].cost for branch in at})[0]))
+    pairs += [(index, branch) for branch in branches for index in passes]
     found: dict[tuple[int, int], OwnTrack | None] = {}
-    for index, branch in dict.fromkeys(pair for one in chosen for pair in enumerate(one)):
+    for index, branch in dict.fromkeys(pairs):
         starts = [one[index][branch] for one in begun if branch in one[index]]
         ends = filter(None, [tracks.over_all(start, box) for start in starts])
         found[index, branch] = min(ends, key=lambda track: track.cost, default=None)
-    return [[found[pair] for pair in enumerate(one)] for one in chosen]
+    chosen = [[found[index, branch] for index in passes] for branch in dict.fromkeys(branches)]
+    of_passes = [
+        [track for (i, _), track in found.items() if i == index and track] for index in passes
+    ]
+    if all(of_passes):
+        chosen.append([min(one, key=lambda track: track.cost) for one in of_passes])
+    return chosen
+
+
+def _fews(box: JointBox | None) -> Sequence[int]:
+    return (FEW, FEWEST) if box is None else (FEW,)
+
+
+def _cheapest(costs: Mapping[int, float]) -> list[int]:
+    """Return the cheapest IK branches, of images one."""
+    found: list[int] = []
+    for branch in sorted(costs, key=costs.__getitem__):
+        if not found or costs[branch] - costs[found[-1]] > ALIKE * costs[branch]:
+            found.append(branch)
+    return found[:MOST_BRANCHES]
 
 
 def _prices(weights: ObjectiveWeights, costs: CostWeights) -> CostWeights:

@@ -21,6 +21,7 @@ from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import no_path
 from opl.planning.track_check import Collides, Free, check_track
 
+NEGLIGIBLE = 1e-4  # of travel in [rad] and the like: round-off along a path that rests adds up
 AT_REST = 1e-6  # [rad] what joints turn all together at the most where the robot counts as at rest
 WORK_OF_A_CHECK = 0.1  # units, for each of the places of a motion, beside what the scene is asked
 
@@ -39,8 +40,8 @@ class ObjectiveValue:
 
     @property
     def gap(self) -> float:
-        """Fraction by which the path may miss the least."""
-        return 1.0 - self.lower_bound / self.value if self.value > 0.0 else 0.0
+        """Fraction by which the path may miss the least; 0 where what it has is negligible."""
+        return 1.0 - self.lower_bound / self.value if self.value > NEGLIGIBLE else 0.0
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,7 @@ def problem_of(job, points_of=None):
     if points_of is not None:
         points = CutterPoints(
             points.Ts_workpiece_cutter[points_of],
-            points.pass_index[points_of],
+            points.pass_index[points_of] - points.pass_index[points_of][0],
             points.arc_length[points_of],
         )
     return problem_in(planning_scene(job.cell), job, points)

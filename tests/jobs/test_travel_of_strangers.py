@@ -1,0 +1,27 @@
+"""Random jobs of which the least joint travel was far from what was found, or from its bound."""
+
+import pytest
+
+import opl
+from benchmarks.stranger_jobs import draw_job
+from opl.least.least_cost import least_cost
+from opl.run.searches import search_path
+from tests.support.planned import problem_of
+
+
+@pytest.mark.parametrize(
+    ("seed", "index", "attempt", "most"),
+    [
+        (20262001, 29, 0, 0.03),  # a hollow: the part sinks between cutter points, past barriers
+        (20262001, 14, 0, 0.05),  # a torus: the cheapest branch is not that of many cutter points
+        (20262001, 28, 0, 0.0),  # a cylinder that rests
+    ],
+)
+def test_what_is_found_is_near_to_its_bound(seed, index, attempt, most, tmp_path):
+    drawn = draw_job(seed, index, attempt, tmp_path, "travel")
+    job = opl.load_job(drawn.job)
+    problem = problem_of(job)
+    found = search_path(job.search, problem).plan.objective
+    assert found.gap <= most
+    # nothing is cut off: the bound of itself lies below
+    assert least_cost(problem, 1.0, 0.0) <= found.value * (1.0 + 1e-9)
