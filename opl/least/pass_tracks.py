@@ -33,7 +33,7 @@ HARDLY = 0.0005  # of its cost
 # spacings of the field: no closer than that before more cutter points are put in, and at last
 CLOSEST_BETWEEN, CLOSEST = 0.25, 0.005
 ALIKE = 1e-6  # tracks whose costs differ by less are images of one another
-LONGER = 0.02  # of the mean way from place to place: what a way may be longer than it is told
+LONGER = 0.005  # of the mean way from place to place: what a way may be longer than it is told
 MOST_HALVINGS = 4  # of ways that are
 
 
