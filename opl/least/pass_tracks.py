@@ -22,7 +22,8 @@ from opl.planning.settings import CostWeights
 from opl.planning.turned import Kept
 from opl.search.box import JointBox
 from opl.search.smooth import smoothest
-from opl.walls.shut_leads import RESERVE
+from opl.walls.images import wrist_flips
+from opl.walls.shut_leads import RESERVE, ShutLeads
 
 # cutter points of a pass that are looked at first: the more, the more of a staircase the first
 # track is; the fewer, the less it knows of what lies between
@@ -46,11 +47,14 @@ class PassTracks:
 
     Attributes:
         prices: The same.
+        minds_leads: Whether passes begin and end only where their leads exist, as far as is seen.
     """
 
     def __init__(self, problem: GrindingProblem, prices: CostWeights) -> None:
         self._problem, self.prices = problem, prices
         self._scene = problem.scene.collision.wider(RESERVE)
+        self._leads = ShutLeads(problem)
+        self.minds_leads = False
 
     def about(
         self,
@@ -168,6 +172,8 @@ class PassTracks:
         (matrix,) = open_matrices(problem)
         if box is not None:
             matrix.free &= matrix.free_inside(box)
+        if self.minds_leads:
+            self._leave_out_leads(places, ik_branch, t, matrix.free)
         cost = track_cost(problem, nodes, self.prices, matrix.free)
         while True:
             found = smoothest(matrix.ladder, matrix.blocked_edges, matrix.free, cost)
@@ -179,6 +185,15 @@ class PassTracks:
                 return OwnTrack(places, branches, nodes.t_along(found.rows), along, found.cost)
             for column in struck:
                 matrix.sweep(self._scene, column, "collides")
+
+    def _leave_out_leads(self, places: Array, ik_branch: int, t: Array, free: np.ndarray) -> None:
+        """Leave out nodes, flags of shape (n, m), where the pass cannot begin or end."""
+        points, last = self._problem.points, len(places) - 1
+        flips = len(wrist_flips(self._problem.cell.robot.arm))
+        family, flip = (ik_branch % 4, ik_branch // 4) if flips > 1 else (ik_branch, 0)
+        for column in (0, last):
+            T, rows = points.frames_at(places[[column]])[0], np.flatnonzero(free[column])
+            free[column, rows] = ~self._leads.at(T, family, flip, t[column, rows])
 
 
 def _spread(columns: np.ndarray, most: int) -> np.ndarray:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.geometry.frames import Array
+from opl.geometry.toolpath import CutterPoints
 from opl.least.own_track import SAMPLES, OwnTrack, nodes_about
 from opl.least.sinking import first_sunk, places_for
 from opl.planning.costs import track_cost
@@ -25,19 +26,21 @@ MOST_WORK = 4000.0  # units
 
 
 @dataclass(frozen=True)
-class TooDeep:
-    """The part sinks too deep into the wheel between places of a track, not at them.
+class Stopped:
+    """No motion of a track, or near to it, was found.
 
     Attributes:
-        places: Those of the track, and others there that are wanted.
+        places: Those of the track, and others between them where the part sinks too deep.
+        at_ends: Whether a pass cannot begin or end where it was tried.
     """
 
     places: Array
+    at_ends: bool
 
 
 def motion_of_track(
     problem: GrindingProblem, prices: CostWeights, track: OwnTrack
-) -> Plan | TooDeep | None:
+) -> Plan | Stopped:
     """Return the motion of a track, or where that is not free, of the cheapest near to it that is.
 
     Any image of it: full turns and flips of the wrist that the whole motion has.
@@ -48,14 +51,14 @@ def motion_of_track(
         track: Through all cutter points.
 
     Returns:
-        The plan, or what stopped it; None if none is found for another reason.
+        The plan, or what stopped it.
     """
     t, q = nodes_about(problem, track)
     flips = enumerate(wrist_flips(problem.cell.robot.arm))
     moves = [(track.ik_branch ^ (4 * number), *flip) for number, flip in flips]
     nodes = everywhere(problem.cell, t, q, ~np.isnan(q[..., 0]), moves)
     if not nodes:
-        return None
+        return Stopped(track.places, False)
     points = problem.points.at_places(track.places)
     near = problem.over_nodes(track.places, points, t, nodes)
     matrices = open_matrices(near)
@@ -64,13 +67,20 @@ def motion_of_track(
     outcome = propose_and_check(near, matrices, proposals, 0, MOST_CHECKS, MOST_WORK, collided)
     if isinstance(outcome, Found):
         return outcome.plan.at_places(track.places)
-    sunk = first_sunk(near, collided)
-    if sunk is None:
-        return None
-    wanted = [
-        np.linspace(one.first, one.last, one.parts + 1) for one in places_for(track.places, sunk)
-    ]
-    return TooDeep(np.unique(np.concatenate([track.places, *wanted])))
+    sunk, places = first_sunk(near, collided), track.places
+    if sunk is not None:
+        wanted = [
+            np.linspace(one.first, one.last, one.parts + 1) for one in places_for(places, sunk)
+        ]
+        places = np.unique(np.concatenate([places, *wanted]))
+    met = {column for matrix in matrices for column, _ in matrix.causes}
+    return Stopped(places, not met.isdisjoint(_ends(points)))
+
+
+def _ends(points: CutterPoints) -> set[int]:
+    """Return the first and the last column of each pass."""
+    changes = np.flatnonzero(np.diff(points.pass_index))
+    return {0, *changes.tolist(), *(changes + 1).tolist(), len(points) - 1}
 
 
 def _cheapest_first(

@@ -17,7 +17,7 @@ import numpy as np
 from opl.least.least_cost import least_cost
 from opl.least.own_track import OwnTrack, joined, tracks_of
 from opl.least.pass_tracks import FEW, FEWEST, PassTracks
-from opl.least.track_motion import TooDeep, motion_of_track
+from opl.least.track_motion import Stopped, motion_of_track
 from opl.motion.figures import figures_of_path
 from opl.planning.plan import ObjectiveValue, Plan
 from opl.planning.problem import GrindingProblem
@@ -30,7 +30,7 @@ WIDENINGS = (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0)
 MOST_BRANCHES = 2  # on which all passes are ground: those cheapest over few cutter points
 WORTH_CHANGING = 0.01  # of the sum: what is gained where passes lie on several IK branches
 ALIKE = 1e-4  # by which fraction the sums of images may differ
-MOST_DEEPER = 5  # times that a proposal gets more places
+MOST_TURNS = 6  # from tracks to their motion
 MOST_TRIED = 6  # proposals of which motions are made
 BOUND_BEGINS, MOTIONS_BEGIN = 0.4, 0.7  # of the work; tracks before
 TIES = 1e-3  # times the costs that decide between tracks of equal weighted sum
@@ -117,12 +117,19 @@ class _Proposal:
 
 
 def _motion(problem: GrindingProblem, tracks: PassTracks, proposal: _Proposal) -> Plan | None:
-    """Return the motion of a proposal, through more places where the part sinks between them."""
+    """Return the motion of a proposal, or of one near to it where that is stopped, if any.
+
+    Through more places where the part sinks between them, from where passes can begin and end.
+    """
     passes = [tracks.through_places(track, proposal.box) for track in proposal.passes]
-    for _ in range(MOST_DEEPER):
-        found = motion_of_track(problem, tracks.prices, joined(passes))
-        if not isinstance(found, TooDeep):
+    for _ in range(MOST_TURNS):
+        track = joined(passes)
+        found = motion_of_track(problem, tracks.prices, track)
+        if not isinstance(found, Stopped):
             return found
+        if len(found.places) == len(track.places) and (tracks.minds_leads or not found.at_ends):
+            break
+        tracks.minds_leads |= found.at_ends
         more = [tracks.with_places(track, found.places, proposal.box) for track in passes]
         passes = [track for track in more if track is not None]
         if len(passes) < len(more):
