@@ -122,7 +122,7 @@ def _search_range(
     else:
         return best, last.plan if isinstance(last, Found) else None
     assert not isinstance(last, Found), "what was found is a plan"
-    if proven and isinstance(last, Exhausted):
+    if isinstance(last, Exhausted) and (proven or cut_off_in(last.matrices)):
         raise no_path(problem, last.matrices, f"proven: {NONE_IS_FREE}")
     if proven:
         reasons = explain(problem, in_turns.matrices)
