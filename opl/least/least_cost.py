@@ -128,15 +128,23 @@ class _PassBound:
                     break
                 # no bound over these cutter points is larger than what is attained there
                 most = proven + HALFWAY * (min(attained, ceiling) - proven)
-                # where all at one of them seem struck, it is those that matter
-                wanted = [
-                    (one.least < most) & (np.isfinite(own) | (one.seen == STRUCK))
+                families = [
+                    self._finer(places, one, own, most)
                     for one, own in zip(families, told, strict=True)
                 ]
-                families = [
-                    cut(self._problem, places, one, chosen)
-                    for one, chosen in zip(families, wanted, strict=True)
-                ]
+
+    def _finer(
+        self, places: np.ndarray, cells: PostureCells, attained: float, most: float
+    ) -> PostureCells:
+        """Return cells, those cut finer through which ways may cost less than so much.
+
+        Where all cells at some place seem struck, so that nothing is attained, it is those that
+        matter.
+        """
+        matters = cells.least < most
+        if np.isinf(attained):
+            matters &= cells.seen == STRUCK
+        return cut(self._problem, places, cells, matters)
 
     def _seen(self, cells: PostureCells) -> PostureCells:
         """Return cells with what is seen of collisions, but for those struck all over."""
