@@ -24,7 +24,7 @@ from opl.walls.images import Images, seams_of
 from opl.walls.sides import Side
 
 FEWEST = 5  # cutter points of a pass that are looked at first
-MOST_WORK = 4e7  # ways from cell to cell that are looked at, of all passes and rounds
+MOST_WORK = 3e7  # ways from cell to cell that are looked at, of all passes and rounds
 CLOSE = 0.01  # fraction of it by which a bound may stay below what is known to be attained
 ROUNDS = 8  # of cutting cells, before more cutter points are taken in
 SETTLED = 0.005  # by which it may stay below ways over postures: then no more is cut either

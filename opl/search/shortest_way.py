@@ -104,10 +104,13 @@ def _edge(  # type: ignore[no-untyped-def]
         low += pad_low[b, joint] - pad_high[a, joint]
         high = away + max(d_b, 0.0) - min(d_a, 0.0)
         high += pad_high[b, joint] - pad_low[a, joint]
-        gap = max(low, -high, 0.0)
+        # of all full turns, none is nearer than so much
+        gap = max(min(low, 2.0 * np.pi - high), min(-high, 2.0 * np.pi + low), 0.0)
         lasts = max(lasts, gap / max_speed[joint])
         price[joint] = 0.0
-        if max(high, -low) < np.pi:  # else another turn might be nearer
+        if max(high, -low) >= np.pi:  # one that is not linear along the chords may be
+            fixed += travel * gap
+        else:
             price[joint] = travel if middle > turns else -travel
             fixed += price[joint] * away + _pads(price[joint], pad_low, pad_high, a, b, joint)
             rise_a += price[joint] * d_a

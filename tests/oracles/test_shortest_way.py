@@ -17,12 +17,19 @@ def prices_of(travel, time, n_columns):
     return WayPrices(travel, time, seconds, np.linspace(1.0, 3.0, 6), 400.0)
 
 
-def drawn(seed, n_columns=4, n_cells=21, long=1.0):
-    """Return cells side by side in each column, as those of a curve that is cut, and their pads."""
+PRICE_OF_TRAVEL = prices_of(1.0, 0.0, 4)
+
+
+def drawn(seed, n_columns=4, n_cells=21, long=1.0, apart=0.0):
+    """Return cells side by side in each column, as those of a curve that is cut, and their pads.
+
+    The columns are some radians apart.
+    """
     random = np.random.default_rng(seed)
     first = n_cells * np.arange(n_columns + 1)
     corners = np.cumsum(random.normal(0.0, 0.05, (n_columns, n_cells + 1, 6)), axis=1)
     corners += random.normal(0.0, 0.3, (n_columns, 1, 6))
+    corners += apart * np.arange(n_columns)[:, None, None]
     t = np.linspace(-30.0, 30.0, n_cells + 1)
     start = corners[:, :-1].reshape(-1, 6)
     along = long * np.diff(corners, axis=1).reshape(-1, 6)
@@ -33,7 +40,8 @@ def drawn(seed, n_columns=4, n_cells=21, long=1.0):
 
 def cost(prices, q, t):
     """Return what a way over postures is charged, q of shape (n, 6) and t of shape (n,)."""
-    turned = np.abs(np.diff(q, axis=0))
+    change = np.diff(q, axis=0)
+    turned = np.abs(change - 2.0 * np.pi * np.round(change / (2.0 * np.pi)))
     seconds = np.maximum((turned / prices.max_speed).max(axis=1), prices.seconds)
     seconds = np.maximum(seconds, np.abs(np.diff(t)) / prices.contact_speed)
     return prices.travel * turned.sum() + prices.time * seconds.sum()
@@ -41,10 +49,11 @@ def cost(prices, q, t):
 
 @SEEDS
 @PRICES
+@pytest.mark.parametrize("apart", [0.0, 3.0, np.pi, 6.0])
 def test_no_way_that_is_drawn_costs_less_than_what_is_told_of_any_cell_it_passes(
-    seed, travel, time
+    seed, travel, time, apart
 ):
-    cells, random = drawn(seed), np.random.default_rng(seed + 1000)
+    cells, random = drawn(seed, apart=apart), np.random.default_rng(seed + 1000)
     n_columns = len(cells.first) - 1
     prices = prices_of(travel, time, n_columns)
     potential = cheapest_over_ends(cells, prices_of(travel, 0.0, n_columns))
@@ -63,8 +72,11 @@ def test_no_way_that_is_drawn_costs_less_than_what_is_told_of_any_cell_it_passes
 
 @SEEDS
 @PRICES
-def test_of_cells_without_length_the_cheapest_way_is_that_of_all_there_are(seed, travel, time):
-    cells = drawn(seed, n_columns=3, n_cells=17, long=0.0)
+@pytest.mark.parametrize("apart", [0.0, np.pi])
+def test_of_cells_without_length_the_cheapest_way_is_that_of_all_there_are(
+    seed, travel, time, apart
+):
+    cells = drawn(seed, n_columns=3, n_cells=17, long=0.0, apart=apart)
     prices = prices_of(travel, time, 3)
     told = cheapest_ways(cells, prices, cheapest_over_ends(cells, prices_of(travel, 0.0, 3)))
     columns = [range(first, end) for first, end in pairwise(cells.first)]
@@ -73,3 +85,12 @@ def test_of_cells_without_length_the_cheapest_way_is_that_of_all_there_are(seed,
         at = np.array(way)
         least[at] = np.minimum(least[at], cost(prices, cells.start[at], cells.t_low[at]))
     assert told == pytest.approx(least, abs=1e-9)
+
+
+@pytest.mark.parametrize("apart", [3.0, np.pi])
+def test_of_short_cells_hardly_less_is_told_than_of_their_ends(apart):
+    """Also where the nearest full turn of a joint differs from end to end of a cell."""
+    cells = drawn(3, long=0.01, apart=apart)
+    over_ends = cheapest_over_ends(cells, PRICE_OF_TRAVEL)
+    told = cheapest_ways(cells, PRICE_OF_TRAVEL, over_ends)
+    assert 0.98 * over_ends[cells.ends.first[-2] :].min() < told.min()
