@@ -38,6 +38,7 @@ def plan_optimal(
     follow: Follow = to_the_end,
     otherwise: Callable[[float], Plan | None] | None = None,
     seams: Seams | None = None,
+    untried: bool = False,
     beside: Beside | None = None,
 ) -> Plan:
     """Find the collision-free motion with the least joint range sum, the smoothest of these.
@@ -50,6 +51,7 @@ def plan_optimal(
         otherwise: Looks for a motion in another way, where the proof finds none, given how many
             units of work are left for that.
         seams: Where full turns are counted from, where that is known.
+        untried: Whether no motion was tried: else where none is known, those tried collide.
         beside: What may work beside this process, if anything.
 
     Returns:
@@ -58,7 +60,7 @@ def plan_optimal(
     Raises:
         NoMotionError: If no motion was known and none was found.
     """
-    search = OptimalSearch(problem, settings, fallback, seams)
+    search = OptimalSearch(problem, settings, fallback, seams, untried)
     share = 1.0 if otherwise is None else 1.0 - OTHERWISE_SHARE
 
     def goes_on() -> bool:

@@ -48,6 +48,7 @@ class OptimalSearch:
         settings: What is wanted.
         fallback: A motion that is known.
         seams: Where full turns are counted from, where that is known.
+        untried: Whether no motion was tried, so that none collided.
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class OptimalSearch:
         settings: OptimalSettings,
         fallback: Plan | None,
         seams: Seams | None = None,
+        untried: bool = False,
     ) -> None:
         self._problem, self._settings = problem, settings
         robot, points, most = problem.cell.robot, problem.points, Travel(np.inf, np.inf)
@@ -74,7 +76,7 @@ class OptimalSearch:
         self._given_up = self._in_vain = 0  # boxes without a motion near the bound, or a free one
         self._hoped = Hope(fallback is not None)
         self.forbidden: Forbidden | None = None  # of collisions, once they are known to matter
-        if fallback is None or fallback.checks > 1:  # what was proposed first is not free
+        if not untried and (fallback is None or fallback.checks > 1):  # the first is not free
             self._leave_out_collisions()
         self.proof = self._new_proof(largest)
         self._places: set[float] = set()
@@ -124,8 +126,7 @@ class OptimalSearch:
         if self.proof.closed:
             self._hope_for_less()
             return
-        candidate = self.proof.take_next()
-        if candidate is None:
+        if (candidate := self.proof.take_next()) is None:
             return
         box, most = JointBox(candidate.low, candidate.high), self.proof.threshold
         self._sampler.mirrored = candidate.mirrored
@@ -214,8 +215,7 @@ class OptimalSearch:
         if not self._sampler.collisions:
             return False
         few = few_columns(self._problem.points.pass_index)  # of every pass, so that each has some
-        places = np.union1d(list(self._places), few.astype(float))
-        columns = self._sampler.columns(box, placements, places)
+        columns = self._sampler.columns(box, placements, np.union1d(list(self._places), few))
         known, _ = columns.missed(box, self._places, CLEARLY_MISSED * self.proof.threshold)
         return self.proof.clear(known)
 

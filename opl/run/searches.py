@@ -21,7 +21,7 @@ from opl.planning.multi_start import (
     plan_recursive,
     try_recursive,
 )
-from opl.planning.plan import Exhausted, Found, Plan
+from opl.planning.plan import Exhausted, Found, OutOfBudget, Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import cut_off_in, explain, no_path
 from opl.planning.settings import ObjectiveWeights, Start
@@ -116,7 +116,10 @@ def _search_range(
     others = None if isinstance(last, Exhausted) else otherwise
     try:
         counted_from = None if seams is None else seams.value()
-        best = plan_optimal(problem, search.optimal, known, follow, others, counted_from, beside)
+        untried = isinstance(last, OutOfBudget) and last.checks == 0  # too many points, most likely
+        best = plan_optimal(
+            problem, search.optimal, known, follow, others, counted_from, untried, beside
+        )
     except NoMotionError as error:
         least, proven, spent = error.lower_bound, error.proven, error.spent
     else:

@@ -226,7 +226,7 @@ def test_what_a_proof_that_ends_early_leaves_over_goes_to_the_recursive_search(m
     assert wanted.checks > 1
     monkeypatch.setattr(searches, "MOST_FIRST_CHECKS", 1)
 
-    def gives_up_at_once(problem, settings, known, report, otherwise, seams, beside):
+    def gives_up_at_once(problem, settings, known, follow, otherwise, seams, untried, beside):
         assert known is None
         return otherwise(1e6)
 

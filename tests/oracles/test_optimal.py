@@ -14,6 +14,7 @@ from opl.cell.full_turns import full_turns
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.least.least_cost import least_cost
 from opl.least.least_range import NoMotionError, plan_optimal
+from opl.least.optimal import OptimalSearch
 from opl.least.weighted import plan_weighted
 from opl.motion.collision_check import colliding_moves
 from opl.motion.figures import figures_of_path
@@ -257,8 +258,11 @@ def test_what_is_known_of_another_objective_is_true_at_any_moment(weights):
         assert plan.open_because == ENDED
 
 
-def test_without_a_motion_that_is_known_the_proof_finds_one():
-    plan = plan_optimal(one_row(), SETTINGS, None)
+@pytest.mark.parametrize("untried", [False, True])
+def test_without_a_motion_that_is_known_the_proof_finds_one(untried):
+    search = OptimalSearch(one_row(), SETTINGS, None, untried=untried)
+    assert (search.forbidden is None) == untried  # else those tried would have collided
+    plan = plan_optimal(one_row(), SETTINGS, None, untried=untried)
     assert plan.gap <= SETTINGS.widen
     assert plan.lower_bound <= optimal(one_row).path.joint_range_sum
 
