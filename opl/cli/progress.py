@@ -45,10 +45,10 @@ def progress_bar(quiet: bool) -> Iterator[opl.Watch]:
         def show(stage: opl.Stage, fraction: float) -> None:
             nonlocal furthest
             furthest = max(furthest, order.index(stage.value) + fraction)
-            told = STAGES[stage.value]
+            text = STAGES[stage.value]
             if stage is opl.Stage.SEARCH and watch.so_far is not None:
-                told = f"{told}, {_known(watch.so_far)}"
-            bar.update(task, description=told, completed=furthest)
+                text = f"{text}, {_known(watch.so_far)}"
+            bar.update(task, description=text, completed=furthest)
             if time.monotonic() - drawn[0] > REDRAWN or fraction == 0.0:
                 drawn[0] = time.monotonic()
                 bar.refresh()

@@ -120,8 +120,8 @@ class _PassBound:
                     return
                 # more than the ceiling is not worth knowing
                 families = [self._seen(one.chosen(one.least < ceiling)) for one in families]
-                told = [self._attained(len(places), prices, one) for one in families]
-                attained = min(told, default=np.inf)
+                of_each = [self._attained(len(places), prices, one) for one in families]
+                attained = min(of_each, default=np.inf)
                 adds = count < len(self._columns) and np.isfinite(ceiling)
                 more = ceiling - attained if adds else 0.0
                 if proven >= attained * (1.0 - SETTLED) or attained - proven <= LITTLE * more:
@@ -130,7 +130,7 @@ class _PassBound:
                 most = proven + HALFWAY * (min(attained, ceiling) - proven)
                 families = [
                     self._finer(places, one, own, most)
-                    for one, own in zip(families, told, strict=True)
+                    for one, own in zip(families, of_each, strict=True)
                 ]
 
     def _finer(

@@ -76,8 +76,8 @@ def plan_weighted(
             proposals.append(one)
             if not goes_on(0.0, lower_bound):
                 break
-        told = [[track.cost for track in one.passes] for one in proposals]
-        worth = np.min(told, axis=0) if told else np.full(problem.points.n_passes, np.inf)
+        each = [[track.cost for track in one.passes] for one in proposals]
+        worth = np.min(each, axis=0) if each else np.full(problem.points.n_passes, np.inf)
         of_ranges, attained = lower_bound, float(worth.sum())
 
         def rises(cost: float) -> bool:

@@ -40,7 +40,10 @@ class FixedReport:
 
 @dataclass(frozen=True)
 class ObjectiveReport:
-    """Travel in rad, time in s or weighted sum of the path, and its lower bound."""
+    """Travel in rad, time in s or weighted sum of the path, and its lower bound.
+
+    The gap is 0 where the value is below 1e-4, which is not looked into further.
+    """
 
     value: float
     lower_bound: float
