@@ -74,7 +74,10 @@ class CutterPoints:
         return interpolate(Ts[before], Ts[after], place - before)
 
     def at_places(self, place: Array) -> CutterPoints:
-        """Return fractional cutter points of some passes, shape (n,), as points of their own."""
-        index = self.pass_index[place.astype(int)]
+        """Return fractional cutter points of some passes, shape (n,), as points of their own.
+
+        Their passes count up from 0 again.
+        """
+        _, index = np.unique(self.pass_index[place.astype(int)], return_inverse=True)
         arc_length = np.interp(place, np.arange(len(self)), self.arc_length)
-        return CutterPoints(self.frames_at(place), index - index[0], arc_length)
+        return CutterPoints(self.frames_at(place), index, arc_length)

@@ -20,7 +20,7 @@ from opl.search.joint_limits import about
 from opl.walls.cut_cells import shut_along
 from opl.walls.families import GROWN, grown
 from opl.walls.images import Seams, image_within_limits, wrist_flips
-from opl.walls.placement import Placement
+from opl.walls.placement import Placement, of_passes
 from opl.walls.shut_leads import RESERVE, ShutLeads
 
 FINE = 33  # contact positions of a place at which a box is held against it
@@ -51,6 +51,8 @@ class ColumnSampler:
         self.mirrored = False  # whether they are those with the wrist flipped that may not collide
         self.reserve = RESERVE  # [m] beyond the clearance needed that postures leave
         self.leads = ShutLeads(problem)
+        changes = np.flatnonzero(np.diff(problem.points.pass_index))
+        self._ends = np.unique([0, *changes, *(changes + 1), len(problem.points) - 1])
         self._limits = tuple(limits)
         self.flips = wrist_flips(problem.cell.robot.arm)
         self.work = 0.0  # what was sampled so far, in units of work
@@ -139,19 +141,18 @@ class ColumnSampler:
         held = np.where(columns.free, missing(columns.q, box), np.inf).min(axis=1) <= GROWN
         met = np.flatnonzero(~held & (missed <= GROWN))  # by a chord alone
         poor[met] = hidden(columns.q[met], row[met]) > HIDDEN * box.size
+        if not (own := np.flatnonzero(poor)).size:
+            return columns
         t, q, free = columns.t.copy(), columns.q.copy(), columns.free.copy()
         last = t.shape[1] - 1
-        for index, placement in enumerate(columns.placements):
-            own = np.flatnonzero((columns.points.pass_index == index) & poor)
-            if not len(own):
-                continue
-            low = t[own, np.maximum(np.floor(row[own]).astype(int) - 1, 0)]
-            high = t[own, np.minimum(np.ceil(row[own]).astype(int) + 1, last)]
-            finer = np.linspace(low, high, last + 1, axis=1)
-            places = columns.places[own]
-            found = self.at(places, self.there(places), [placement], finer)
-            found = self._within(box, self.spared(found, spare[own]))
-            t[own], q[own], free[own] = finer, found.q, found.free
+        low = t[own, np.maximum(np.floor(row[own]).astype(int) - 1, 0)]
+        high = t[own, np.minimum(np.ceil(row[own]).astype(int) + 1, last)]
+        t[own] = np.linspace(low, high, last + 1, axis=1)
+        places, passes = columns.places[own], np.unique(columns.points.pass_index[own])
+        placements = [columns.placements[index] for index in passes.tolist()]
+        found = self.at(places, self.there(places), placements, t[own])
+        found = self._within(box, self.spared(found, spare[own]))
+        q[own], free[own] = found.q, found.free
         return replace(columns, t=t, q=q, free=free)
 
     def _within(self, box: JointBox, columns: Columns) -> Columns:
@@ -163,8 +164,7 @@ class ColumnSampler:
         """Return postures of places at the field's contact positions, shape (n, M, 6)."""
         pass_index = self._problem.points.pass_index[places.astype(int)]
         found = np.empty((len(places), len(self._problem.field.contact_positions), 6))
-        for index, placement in enumerate(placements):
-            own = pass_index == index
+        for own, placement in of_passes(pass_index, placements):
             found[own] = self._placed(self._field.at(places[own], placement.family), placement)
         return found
 
@@ -194,15 +194,13 @@ class ColumnSampler:
         for block in blocks_of(*t.shape):
             frames = there.Ts_workpiece_cutter[block, None]
             solutions = inverse_solutions(problem.cell, frames, t[block])
-            for index, placement in enumerate(placements):
-                own = np.flatnonzero(there.pass_index[block] == index)
-                angles = solutions[own][:, :, placement.family]
-                q[block][own] = self._placed(angles, placement)
+            for own, placement in of_passes(there.pass_index[block], placements):
+                q[block][own] = self._placed(solutions[own, :, placement.family], placement)
         free = ~np.isnan(q[..., 0]) & ~problem.cuts_at(places, there, t)
         free &= _allowed(places, there.pass_index, placements, t)
         free[free] = image_within_limits(problem.cell.robot, self.flips, q[free])
         if self.collisions:
-            self._leave_out_leads(there, placements, t, free)
+            self._leave_out_leads(places, there, placements, t, free)
         return Columns(places, there, tuple(placements), t, q, free)
 
     def spared(self, columns: Columns, spare: Array) -> Columns:
@@ -219,11 +217,15 @@ class ColumnSampler:
         return nearer_nodes(scene, there, t, asked, needed)
 
     def _leave_out_leads(
-        self, there: CutterPoints, placements: Sequence[Placement], t: Array, free: np.ndarray
+        self,
+        places: Array,
+        there: CutterPoints,
+        placements: Sequence[Placement],
+        t: Array,
+        free: np.ndarray,
     ) -> None:
         """Leave postures out, flags of shape (n, m), where passes cannot begin or end."""
-        changes = np.flatnonzero(np.diff(there.pass_index))
-        for column in {0, *changes.tolist(), *(changes + 1).tolist(), len(free) - 1}:
+        for column in np.flatnonzero(np.isin(places, self._ends)).tolist():
             own, row = placements[int(there.pass_index[column])], np.flatnonzero(free[column])
             flip = own.number ^ int(self.mirrored)
             T = there.Ts_workpiece_cutter[column]
@@ -273,7 +275,6 @@ def _allowed(
 ) -> np.ndarray:
     """Return which contact positions of places their passes may use, shape (n, m)."""
     allowed = np.empty(t.shape, dtype=bool)
-    for index, placement in enumerate(placements):
-        own = pass_index == index
+    for own, placement in of_passes(pass_index, placements):
         allowed[own] = placement.side.holds(places[own], t[own])
     return allowed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,5 +46,20 @@ class Placement:
         """Return the placed joint positions, shape (..., 6)."""
         sign, shift = self.flip
         placed = q * sign + shift + self.shift
+        if not self.loose.any():
+            return np.asarray(placed)
         turns = 2.0 * np.pi * np.round((self.center - placed) / (2.0 * np.pi))
         return np.asarray(np.where(self.loose, placed + turns, placed))
+
+
+def of_passes(
+    pass_index: np.ndarray, placements: Sequence[Placement]
+) -> Iterator[tuple[np.ndarray, Placement]]:
+    """Yield which of some places are of a pass, as indices, and its placement.
+
+    Args:
+        pass_index: Pass of each place, shape (n,).
+        placements: The placement of every pass.
+    """
+    for index in np.unique(pass_index).tolist():
+        yield np.flatnonzero(pass_index == index), placements[index]
