@@ -64,6 +64,9 @@ class RemoteJob:
         state: ``queued``, ``running``, ``done``, ``failed`` or ``cancelled``.
         stage: Of a running job, what it does.
         fraction: How much of the stage is done, 0 to 1.
+        value: Of the best path that the search has found by now, of what it keeps small, in rad or
+            s; None before.
+        lower_bound: What the search has proven by now that no path is below; None before.
         status: What became of it: ``ok``, ``no_path``, ``unsafe``, ``not proven``, ``bad input`` or
             ``error``; None while it has not ended.
         exit_status: As of the command line.
@@ -79,6 +82,8 @@ class RemoteJob:
     state: str
     stage: str
     fraction: float
+    value: float | None
+    lower_bound: float | None
     status: str | None
     exit_status: int | None
     message: str | None
@@ -254,8 +259,8 @@ def _refusal(error: urllib.error.HTTPError) -> ServiceError:
 
 def _job(found: Mapping[str, Any]) -> RemoteJob:
     names = (
-        "id", "name", "task", "state", "stage", "fraction", "status", "exit_status", "message",
-        "report",
+        "id", "name", "task", "state", "stage", "fraction", "value", "lower_bound", "status",
+        "exit_status", "message", "report",
     )  # fmt: skip
     files = (
         RemoteFile(one["name"], one["size"], one["sha256"], one["url"]) for one in found["files"]

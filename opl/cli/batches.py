@@ -14,6 +14,7 @@ import click
 import opl
 from opl.cli.inputs import FILE
 from opl.cli.logs import log_to
+from opl.cli.progress import so_far_text
 from opl.cli.stopping import STATUS, Stopped, stopped_by_raising
 
 
@@ -186,9 +187,17 @@ def jobs(folder: Path, ids: tuple[str, ...], as_json: bool) -> None:
         click.echo(", ".join(f"{count} {state}" for state, count in counts.items()))
 
 
+def _at(job: opl.StoredJob) -> str:
+    """Return how far a running job is."""
+    progress, known = job.progress, ""
+    if progress.lower_bound is not None:
+        known = f", {so_far_text(progress.value, progress.lower_bound)}"
+    return f"{progress.stage} {100.0 * progress.fraction:.0f} %{known}"
+
+
 def _line(job: opl.StoredJob) -> str:
     status = "" if job.outcome is None else f" {job.outcome.status}"
-    stage = f", {job.stage} {100.0 * job.fraction:.0f} %" if job.state.value == "running" else ""
+    stage = f", {_at(job)}" if job.state.value == "running" else ""
     took = "" if job.started is None or job.ended is None else f", {job.ended - job.started:.1f} s"
     return f"{job.id[:12]}  {job.state.value}{status}{stage}{took}  {job.name or job.task.job}"
 

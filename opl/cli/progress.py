@@ -47,7 +47,7 @@ def progress_bar(quiet: bool) -> Iterator[opl.Watch]:
             furthest = max(furthest, order.index(stage.value) + fraction)
             text = STAGES[stage.value]
             if stage is opl.Stage.SEARCH and watch.so_far is not None:
-                text = f"{text}, {_known(watch.so_far)}"
+                text = f"{text}, {so_far_text(watch.so_far.value, watch.so_far.lower_bound)}"
             bar.update(task, description=text, completed=furthest)
             if time.monotonic() - drawn[0] > REDRAWN or fraction == 0.0:
                 drawn[0] = time.monotonic()
@@ -57,7 +57,7 @@ def progress_bar(quiet: bool) -> Iterator[opl.Watch]:
         yield watch
 
 
-def _known(so_far: opl.SoFar) -> str:
+def so_far_text(value: float | None, lower_bound: float) -> str:
     """Return what a search knows, in the unit of what it keeps small."""
-    bound = f"bound {so_far.lower_bound:.3f}"
-    return bound if so_far.value is None else f"found {so_far.value:.3f}, {bound}"
+    bound = f"bound {lower_bound:.3f}"
+    return bound if value is None else f"found {value:.3f}, {bound}"

@@ -76,6 +76,13 @@ class JobView(Document):
     state: Literal["queued", "running", "done", "failed", "cancelled"]
     stage: str = Field(description="Of a running job, what it does.")
     fraction: float = Field(description="How much of the stage is done, 0 to 1.")
+    value: float | None = Field(
+        description="Of the best path that the search has found by now, of what it keeps small, in "
+        "rad or s; null before."
+    )
+    lower_bound: float | None = Field(
+        description="What the search has proven by now that no path is below; null before."
+    )
     cancelling: bool
     attempts: int
     created: float = Field(description="Seconds since 1970.")

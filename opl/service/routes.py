@@ -208,7 +208,7 @@ async def _followed(store: Store, job: StoredJob, request: Request) -> AsyncIter
     seen: tuple[object, ...] | None = None
     said = time.monotonic()
     while True:
-        now = (job.state, job.stage, job.fraction, job.cancelling)
+        now = (job.state, job.progress, job.cancelling)
         if now != seen:
             seen, said = now, time.monotonic()
             shown = _view(store, job, False).model_dump(exclude={"result"})
@@ -240,8 +240,7 @@ def _view(store: Store, job: StoredJob, whole: bool) -> models.JobView:
         name=job.name,
         task=job.task.kind,
         state=job.state.value,
-        stage=job.stage,
-        fraction=job.fraction,
+        **vars(job.progress),
         cancelling=job.cancelling,
         attempts=job.attempts,
         created=job.created,

@@ -40,7 +40,10 @@ class Database:
                         file.execute(statement)
                     file.execute(f"PRAGMA user_version = {version}")
                 elif found != version:
-                    message = f"is of another version of opl ({found}, not {version})"
+                    message = (
+                        f"is of another version of opl ({found}, not {version}); remove it: jobs "
+                        "are done again, their files stay"
+                    )
                     raise InputError(str(path), message)
 
     def connection(self) -> sqlite3.Connection:

@@ -19,23 +19,23 @@ from typing import Any
 
 from opl.store.database import Database
 from opl.store.owners import is_gone, this_process
-from opl.store.values import FileRecord, Outcome, State, StoredJob, Task
+from opl.store.values import FileRecord, Outcome, Progress, State, StoredJob, Task
 
 LEASE = 30.0  # [s] that a job stays with an owner who says nothing
 MOST_DEATHS = 3  # of workers, before their job fails
-VERSION = 2
+VERSION = 3
 _TABLE = """
 CREATE TABLE jobs (
     id TEXT PRIMARY KEY, target TEXT NOT NULL UNIQUE, name TEXT NOT NULL, task TEXT NOT NULL,
-    state TEXT NOT NULL, stage TEXT NOT NULL, fraction REAL NOT NULL, cancelling INTEGER NOT NULL,
-    attempts INTEGER NOT NULL, outcome TEXT, created REAL NOT NULL, started REAL, ended REAL,
-    owner TEXT, lease REAL, deaths INTEGER NOT NULL
+    state TEXT NOT NULL, stage TEXT NOT NULL, fraction REAL NOT NULL, value REAL, lower_bound REAL,
+    cancelling INTEGER NOT NULL, attempts INTEGER NOT NULL, outcome TEXT, created REAL NOT NULL,
+    started REAL, ended REAL, owner TEXT, lease REAL, deaths INTEGER NOT NULL
 ) WITHOUT ROWID
 """
 _INDEX = "CREATE INDEX jobs_by_state ON jobs (state, created)"
 _COLUMNS = (
-    "id, target, name, task, state, stage, fraction, cancelling, attempts, outcome, created, "
-    "started, ended"
+    "id, target, name, task, state, stage, fraction, value, lower_bound, cancelling, attempts, "
+    "outcome, created, started, ended"
 )
 
 
@@ -87,8 +87,8 @@ class Store:
                     return self._job(file, id_)
                 file.execute("DELETE FROM jobs WHERE target = ?", [target])
             file.execute(
-                "INSERT INTO jobs VALUES (?, ?, ?, ?, 'queued', '', 0, 0, 0, NULL, ?, NULL, NULL, "
-                "NULL, NULL, 0)",
+                "INSERT INTO jobs VALUES (?, ?, ?, ?, 'queued', '', 0, NULL, NULL, 0, 0, NULL, ?, "
+                "NULL, NULL, NULL, NULL, 0)",
                 [id_, target, name, json.dumps(asdict(task)), time.time()],
             )
             return self._job(file, id_)
@@ -132,14 +132,14 @@ class Store:
             )
             return self._job(file, found[0])
 
-    def renew(self, id_: str, stage: str, fraction: float) -> bool:
+    def renew(self, id_: str, progress: Progress) -> bool:
         """Say how far a job is and keep it; return whether to go on, not after a cancellation."""
         # what is lost with a failing system is progress only
         with self._file.changing(durable=False) as file:
             kept = file.execute(
-                "UPDATE jobs SET stage = ?, fraction = ?, lease = ? "
+                "UPDATE jobs SET stage = ?, fraction = ?, value = ?, lower_bound = ?, lease = ? "
                 "WHERE id = ? AND owner = ? AND state = 'running' AND cancelling = 0",
-                [stage, fraction, time.time() + LEASE, id_, self._owner],
+                [*vars(progress).values(), time.time() + LEASE, id_, self._owner],
             )
             return kept.rowcount > 0
 
@@ -239,7 +239,8 @@ class Store:
         )
         file.execute(
             "UPDATE jobs SET state = CASE cancelling WHEN 1 THEN 'cancelled' ELSE 'queued' END, "
-            "stage = '', fraction = 0, owner = NULL WHERE id = ? AND state = 'running'",
+            "stage = '', fraction = 0, value = NULL, lower_bound = NULL, owner = NULL "
+            "WHERE id = ? AND state = 'running'",
             [id_],
         )
 
@@ -249,7 +250,7 @@ def _is_final(state: State, outcome: str | None) -> bool:
 
 
 def _stored(row: tuple[Any, ...]) -> StoredJob:
-    id_, target, name, task, state, stage, fraction, cancelling, attempts, outcome, *times = row
+    id_, target, name, task, state, *progress, cancelling, attempts, outcome = row[:-3]
     fields = json.loads(task)
     return StoredJob(
         id_,
@@ -257,12 +258,11 @@ def _stored(row: tuple[Any, ...]) -> StoredJob:
         name,
         Task(**{**fields, "programs": tuple(fields["programs"])}),
         State(state),
-        stage,
-        fraction,
+        Progress(*progress),
         bool(cancelling),
         attempts,
         None if outcome is None else _outcome(json.loads(outcome)),
-        *times,
+        *row[-3:],
     )
 
 

@@ -90,6 +90,24 @@ class Outcome:
 
 
 @dataclass(frozen=True)
+class Progress:
+    """How far a running job is.
+
+    Attributes:
+        stage: What it does.
+        fraction: How much of the stage is done, 0 to 1.
+        value: Of the best path that its search has found by now, of what the search keeps small, in
+            [rad] or [s]; None before there is one.
+        lower_bound: What it has proven by now that no path is below; None before it began.
+    """
+
+    stage: str = ""
+    fraction: float = 0.0
+    value: float | None = None
+    lower_bound: float | None = None
+
+
+@dataclass(frozen=True)
 class StoredJob:
     """A job of the store.
 
@@ -99,8 +117,7 @@ class StoredJob:
         name: For people.
         task: What is to be done.
         state: How far it is.
-        stage: Of a running job, what it does.
-        fraction: How much of the stage is done, 0 to 1.
+        progress: How far it is while it is running.
         cancelling: Whether somebody has asked to cancel it.
         attempts: How often it was begun.
         outcome: What became of it, None while nothing has.
@@ -112,8 +129,7 @@ class StoredJob:
     name: str
     task: Task
     state: State
-    stage: str
-    fraction: float
+    progress: Progress
     cancelling: bool
     attempts: int
     outcome: Outcome | None

@@ -24,7 +24,7 @@ from opl.job.files import MOST_BYTES, files_of_job
 from opl.run.job_folder import claim_folder, put_files
 from opl.store.identity import made_with
 from opl.store.made import note_files
-from opl.store.values import Outcome, Task
+from opl.store.values import Outcome, Progress, Task
 from opl.work.worker import BEAT, BUG, Beat, Limits, Worker, WorkerDied
 
 PATIENCE = "20s"  # for a scheduler to answer
@@ -122,7 +122,7 @@ class ClusterDoer:
                 if self._stopped:
                     future.cancel(force=True)
                     raise WorkerDied from None
-                if not beat(ELSEWHERE, 0.0):
+                if not beat(Progress(ELSEWHERE)):
                     future.cancel(force=True)
                     return None
             except (distributed.scheduler.KilledWorker, OSError) as error:

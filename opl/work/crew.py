@@ -10,7 +10,7 @@ from typing import Protocol
 from opl.errors import OplError
 from opl.store.events import tell
 from opl.store.jobs import Store
-from opl.store.values import Outcome, State, StoredJob, Task
+from opl.store.values import Outcome, Progress, State, StoredJob, Task
 from opl.work.worker import BUG, Beat, WorkerDied
 
 IDLE = 0.5  # [s] between two looks for work, unless somebody says that there is some
@@ -109,13 +109,13 @@ class Crew:
         tell("begun", job=job.id, name=job.name, kind=job.task.kind, attempt=job.attempts)
         last = ("", 0.0)
 
-        def beat(stage: str, fraction: float) -> bool:
+        def beat(progress: Progress) -> bool:
             nonlocal last
             now = time.monotonic()
-            if stage == last[0] and now - last[1] < SELDOM:
+            if progress.stage == last[0] and now - last[1] < SELDOM:
                 return True
-            last = stage, now
-            return self._store.renew(job.id, stage, fraction)
+            last = progress.stage, now
+            return self._store.renew(job.id, progress)
 
         try:
             outcome = doer.do(job.task, beat)

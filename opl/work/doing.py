@@ -33,9 +33,9 @@ from opl.run.surfacing import cut_surface
 from opl.run.values import Refused
 from opl.run.watch import Stage, Watch
 from opl.store.made import note_files
-from opl.store.values import Outcome, Task
+from opl.store.values import Outcome, Progress, Task
 
-Tell = Callable[[str, float], bool]
+Tell = Callable[[Progress], bool]
 SELDOM = 0.05  # [s] between two words about progress
 CREASE = math.radians(30.0)  # between triangles of a mesh that ends a face, as of `opl faces`
 FIGURES = "figures.json"  # of a task that is no run
@@ -80,7 +80,9 @@ def do(task: Task, tell: Tell) -> Outcome | None:
         nonlocal last
         if fraction in (0.0, 1.0) or time.monotonic() - last > SELDOM:
             last = time.monotonic()
-            if not tell(stage.value, fraction):
+            known = watch.so_far if stage is Stage.SEARCH else None
+            figures = (None, None) if known is None else (known.value, known.lower_bound)
+            if not tell(Progress(stage.value, fraction, *figures)):
                 watch.cancel()
 
     watch = Watch(report)

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from opl.files.apart import end_with_parent
 from opl.files.claiming import release_folders
-from opl.store.values import Outcome, Task
+from opl.store.values import Outcome, Progress, Task
 
 BEAT = 0.1  # [s] between two looks at a task
 # what the process does first: the same modules as here, nothing of the folder that it stands in
@@ -37,7 +37,7 @@ LISTENS = 5.0  # [s] for a task to hear that it is cancelled
 BUG = 1  # exit status of what ended with an error that is not opl's own
 
 # told how far a task is; returns whether to go on
-Beat = Callable[[str, float], bool]
+Beat = Callable[[Progress], bool]
 
 
 class WorkerDied(Exception):
@@ -116,16 +116,16 @@ class Worker:
         self.start()
         pipe = self._pipe
         assert pipe is not None
-        began, stage, fraction = time.monotonic(), "", 0.0
+        began, progress = time.monotonic(), Progress()
         cancelled_at: float | None = None
         try:
             pipe.send(task)
             while True:
                 if pipe.poll(BEAT):
                     found = self._receive(pipe)
-                    if not isinstance(found, tuple):
+                    if not isinstance(found, Progress):
                         return found
-                    stage, fraction = found
+                    progress = found
                 now = time.monotonic()
                 most = self._limits.seconds
                 if most is not None and now - began > most:
@@ -133,7 +133,7 @@ class Worker:
                     message = f"{task.job}: takes more than the {most:g} s that it may take"
                     return Outcome("error", BUG, message, final=False)
                 if cancelled_at is None:
-                    if not beat(stage, fraction):
+                    if not beat(progress):
                         cancelled_at = now
                         pipe.send(None)
                 elif now - cancelled_at > LISTENS:
@@ -150,9 +150,9 @@ class Worker:
                 self._process.wait(GRACE)
         self._drop()
 
-    def _receive(self, pipe: Connection) -> Outcome | tuple[str, float] | None:
+    def _receive(self, pipe: Connection) -> Outcome | Progress | None:
         try:
-            found: Outcome | tuple[str, float] | None = pipe.recv()
+            found: Outcome | Progress | None = pipe.recv()
             return found
         except (EOFError, OSError) as error:
             self._drop()
@@ -186,15 +186,15 @@ def work(pipe: Connection, parent: int) -> None:
         if task is None:  # the task that was cancelled had ended before
             continue
         os.chdir(home / task.home)
-        found = doing.do(task, lambda stage, fraction: _goes_on(pipe, stage, fraction))
+        found = doing.do(task, lambda progress: _goes_on(pipe, progress))
         os.chdir(home)
         pipe.send(found)
         doing.tidy_up()
 
 
-def _goes_on(pipe: Connection, stage: str, fraction: float) -> bool:
+def _goes_on(pipe: Connection, progress: Progress) -> bool:
     """Pass on how far a task is; return whether to go on."""
-    pipe.send((stage, fraction))
+    pipe.send(progress)
     if pipe.poll():
         pipe.recv()
         return False

@@ -89,6 +89,11 @@ def test_a_job_is_followed_from_the_queue_to_its_figures(done):
     assert done[-1].status == "ok" and done[-1].exit_status == 0
     assert done[-1].result["path"]["joint_range_sum_rad"] > 0.0
     assert all(0.0 <= job.fraction <= 1.0 for job in done)
+    path = done[-1].result["path"]
+    for job in done:  # what is known by now is told of the search only
+        assert job.stage == "search" or (job.value, job.lower_bound) == (None, None)
+        assert job.lower_bound is None or job.lower_bound <= path["joint_range_sum_rad"]
+        assert job.value is None or job.value >= path["lower_bound_rad"]
 
 
 def test_the_same_job_is_answered_from_the_store(service, files, done):

@@ -2,6 +2,7 @@
 
 import os
 import signal
+from dataclasses import replace
 
 import pytest
 
@@ -16,7 +17,7 @@ def task(tmp_path):
     return Task("run", "job.yaml", "out", home=str(write_job(tmp_path).parent))
 
 
-def on(_stage, _fraction):
+def on(_progress):
     return True
 
 
@@ -39,9 +40,9 @@ def test_a_job_that_takes_too_much_memory_is_ended(task):
 def test_a_job_is_cancelled_while_it_is_planned_and_one_killed_is_told(task, tmp_path):
     worker, seen = Worker(Limits()), []
 
-    def until_the_search(stage, _fraction):
-        seen.append(stage)
-        return stage != "search"
+    def until_the_search(progress):
+        seen.append(progress.stage)
+        return progress.stage != "search"
 
     assert worker.do(task, until_the_search) is None
     assert worker.pid is not None  # it is ready for the next one
@@ -50,6 +51,17 @@ def test_a_job_is_cancelled_while_it_is_planned_and_one_killed_is_told(task, tmp
     with pytest.raises(WorkerDied):
         worker.do(task, lambda *_: os.kill(worker.pid, signal.SIGKILL) or True)
     assert worker.pid is None
+
+
+def test_what_a_search_knows_by_now_is_told(task, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    seen = []
+    doing.do(
+        replace(task, changes={"search.method": "optimal"}), lambda at: seen.append(at) or True
+    )
+    last = [at for at in seen if at.stage == "search"][-1]
+    assert last.fraction == 1.0 and 0.99 * last.value < last.lower_bound <= last.value
+    assert {(at.value, at.lower_bound) for at in seen if at.stage != "search"} == {(None, None)}
 
 
 def test_a_folder_of_somebody_else_is_no_fault_of_the_job(task, tmp_path, monkeypatch):

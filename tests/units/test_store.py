@@ -11,7 +11,7 @@ from opl.files.names import checked_name
 from opl.job.files import files_of_job
 from opl.store.jobs import MOST_DEATHS, Store
 from opl.store.made import changed_files, note_files
-from opl.store.values import FileRecord, Outcome, State, Task
+from opl.store.values import FileRecord, Outcome, Progress, State, Task
 from tests.support.jobs import write_job, write_robot
 
 TASK = Task("run", "job.yaml", "out", changes={"passes.rows": 2}, programs=("A.JBI",))
@@ -98,7 +98,7 @@ def test_a_lease_that_is_not_renewed_ends(store, monkeypatch):
     store.submit("1", "A", "", TASK)
     other(store).claim()
     assert store.claim().attempts == 2
-    assert not other(store).renew("1", "search", 0.5)
+    assert not other(store).renew("1", Progress("search", 0.5, 2.5, 2.25))
     other(store).finish("1", Outcome("error", 1))  # too late: it is somebody else's
     assert store.get("1").state is State.RUNNING
 
@@ -124,10 +124,10 @@ def test_cancelling(store):
     for id_ in ("1", "2"):
         store.submit(id_, id_, "", TASK)
     store.claim("1")
-    assert store.renew("1", "search", 0.5)
-    assert store.get("1").stage == "search"
+    assert store.renew("1", Progress("search", 0.5, 2.5, 2.25))
+    assert store.get("1").progress == Progress("search", 0.5, 2.5, 2.25)
     assert store.cancel("1").cancelling and store.cancel("2").state is State.CANCELLED
-    assert not store.renew("1", "search", 0.6)
+    assert not store.renew("1", Progress("search", 0.6))
     store.finish("1", None)
     assert store.get("1").state is State.CANCELLED
     assert store.cancel("nobody") is None
