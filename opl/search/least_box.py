@@ -80,9 +80,9 @@ class BoxProof:
         """Begin a tree of subproblems: one of which nothing but a bound is known."""
         self._of_tree, self._walls_then = 0, len(self.walls)
         self._open: list[Subproblem] = []
-        core = np.outer([np.inf, -np.inf], np.ones(6))
-        nothing, low, high = np.empty((0, 5), dtype=np.int64), core[0], core[1]
-        heapq.heappush(self._open, Subproblem(bound, self._count, nothing, 0, low, high, core))
+        low, high = np.full(6, np.inf), np.full(6, -np.inf)
+        nothing = np.empty((0, 5), dtype=np.int64)
+        heapq.heappush(self._open, Subproblem(bound, self._count, nothing, 0, low, high))
 
     def again(self, threshold: float) -> BoxProof:
         """Return the proof begun again for boxes below another size, with the walls of this one."""
@@ -179,7 +179,7 @@ class BoxProof:
         assert node.found is not None
         # against a core turned inside out, so that no face is held by it
         n, low, high = node.n_walls, node.found.high, node.found.low
-        box, place, lost = np.stack([low, high]), np.empty((n, 2)), np.empty(n)
+        box, place, lost = np.empty((2, 6)), np.empty((n, 2)), np.empty(n)
         prices = np.empty((n, 12))
         size = float((low - high).sum())
         table, shifts = self._cells.table, self._cells.shifts
@@ -240,8 +240,7 @@ class BoxProof:
     def _part(self, node: Subproblem, spans: np.ndarray) -> Subproblem:
         """Return the part of a subproblem that leads through some spans."""
         self._count += 1
-        low, high = node.low, node.high
-        return Subproblem(node.bound, self._count, spans, node.n_walls, low, high, node.near)
+        return Subproblem(node.bound, self._count, spans, node.n_walls, node.low, node.high)
 
     def _bound(self, node: Subproblem) -> bool:
         """Bound a subproblem; return whether it is still of interest."""
@@ -265,7 +264,7 @@ class BoxProof:
         spans = np.concatenate([node.spans, *new])
         low, high, table = node.low.copy(), node.high.copy(), cells.table
         sizes, lost, place = np.empty(n_walls), np.empty(n_walls), np.empty((n_walls, 2))
-        box, prices = node.near.copy(), np.empty((n_walls, 12))
+        box, prices = np.empty((2, 6)), np.empty((n_walls, 12))
         limits = np.array([(one.lower, one.upper) for one in self._limits_of(spans)])
         self.work += NUMBERS_OF_A_CELL * float((spans[:, END] - spans[:, FIRST]).sum())
         passes = cells.pass_index[:n_walls], cells.n_keys
@@ -282,7 +281,7 @@ class BoxProof:
         node.bound = max(node.bound, bound, float(sizes.max()))
         if node.bound >= closing:
             return False
-        node.spans, node.n_walls, node.low, node.high, node.near = spans, n_walls, low, high, box
+        node.spans, node.n_walls, node.low, node.high = spans, n_walls, low, high
         node.found = Relaxation(box[0], box[1], place, lost, closing, cells.changes)
         return True
 

@@ -42,7 +42,6 @@ class Subproblem:
         n_walls: Of how many walls.
         low: The lower faces are not above these, in [rad], shape (6,).
         high: The upper faces are not below these.
-        near: Faces of the least box of the subproblem that it is part of, shape (2, 6).
     """
 
     bound: float
@@ -51,7 +50,6 @@ class Subproblem:
     n_walls: int = field(compare=False)
     low: Array = field(compare=False)
     high: Array = field(compare=False)
-    near: Array = field(compare=False)
     found: Relaxation | None = field(default=None, compare=False)
 
 

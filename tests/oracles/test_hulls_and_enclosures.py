@@ -74,6 +74,43 @@ def test_the_bound_over_hulls_is_that_of_another_solver(seed):
     assert (prices >= 0.0).all() and (prices.sum(axis=0) <= 1.0 + 1e-9).all()
 
 
+def alike_walls(random, n_walls):
+    """Return the cells and spans of walls of one or two cells, each hardly beside the one before.
+
+    As those of cutter points that follow each other.
+    """
+    q = random.normal(size=(3, 6)) * 0.4
+    drift = random.normal(size=(4, 3, 6)) * 0.02
+    cells, spans = [], []
+    for wall in range(n_walls):
+        x = np.linspace(0.0, 1.0, n_walls)[wall]
+        ends = q + sum(np.sin((k + 1) * np.pi * x) * one for k, one in enumerate(drift))
+        n, first, t = int(random.integers(1, 3)), len(cells), [0.0, 1.0, 2.0]
+        for k in range(n):
+            cells.append([*ends[k], *ends[k + 1], *[-1e-5] * 6, *[1e-5] * 6, t[k], t[k + 1]])
+        spans.append((wall, 0, 0, first, len(cells)))
+    return np.array(cells), np.array(spans, dtype=np.int64)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_of_many_walls_that_are_alike_too(seed):
+    random, n_walls = np.random.default_rng(seed), 150
+    cells, spans = alike_walls(random, n_walls)
+    low = cells[0, :6] - 0.01
+    high = low + 0.02
+    wanted = by_scipy(cells, spans, low, high)
+    box, place, lost = np.empty((2, 6)), np.empty((n_walls, 2)), np.empty(n_walls)
+    prices = np.empty((n_walls, 12))
+    sought = 1.001 * wanted, box, place, lost, prices
+    bound, _ = least_box(cells, np.zeros((1, 6)), spans, n_walls, low, high, *sought)
+    # as near as a tenth of what is left to be closed, below and above
+    assert wanted - 1.1e-4 * wanted <= bound <= wanted + 1e-8
+    assert wanted - 1e-8 <= (box[1] - box[0]).sum() <= wanted + 1.1e-4 * wanted
+    for wall in range(n_walls):  # the box meets the hull of each wall
+        own = spans[spans[:, 0] == wall]
+        assert by_scipy(cells, own, *box) <= (box[1] - box[0]).sum() + 2e-6
+
+
 @pytest.mark.parametrize("name", ["mh24", "ur10e", "irb2600"])
 def test_no_posture_lies_outside_of_what_holds_it_at_the_end_of_the_reach_either(name):
     robot, random, held = load_robot(name), np.random.default_rng(7), 0
