@@ -25,7 +25,7 @@ ROUND_OFF = 1e-9  # [rad] of the sums that make a bound
 MOST_LOOKS = 4000  # at walls
 MOST_CUTS = 96  # known at once; those that hold nothing up give way
 BETWEEN = 0.1  # of the way from the least box so far to one that meets all: where cuts are sought
-ENOUGH = 0.1  # of what is left to be closed: how near these may come to each other at the least
+ENOUGH = 0.02  # of what is left to be closed: how near these may come to each other at the least
 NEAR = 3e-3  # of the size of interest: likewise
 
 
