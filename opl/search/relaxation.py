@@ -3,7 +3,8 @@
 A box that misses the hull of a wall has to grow towards it: the prices of faces that tell by how
 much are a cut, a sum over the faces that no box which meets the wall is below. The least box that
 keeps the cuts known so far, and one that meets all hulls, come nearer to each other: the wall that
-is farthest from a box between the two gives the next cut, or a point of its hull for the second. A
+is farthest from a box between the two gives the next cut, or a point of its hull for the second
+(cutting planes: Kelley, J. SIAM 8, 1960; between two points: Ben-Ameur and Neto, 2007). A
 wall beside one that gave a cut is mostly met then as well: few of many walls that are alike give
 any.
 

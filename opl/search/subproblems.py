@@ -17,7 +17,7 @@ class Relaxation:
     Attributes:
         low: Lower faces of the box found, shape (6,).
         high: Upper faces.
-        place: Where it meets the hull of each wall: along it, and at which source, shape (k, 2).
+        place: Where the hull of each wall is near to it: along it, and at which source, (k, 2).
         lost: How much more a wall would press had its cells no pads, in [rad], shape (k,).
         closing: Bounds beyond this were of no interest when it was found, in [rad].
         changes: How often cells had become shorter by then.
