@@ -179,11 +179,10 @@ class BoxProof:
         assert node.found is not None
         # against a core turned inside out, so that no face is held by it
         n, low, high = node.n_walls, node.found.high, node.found.low
-        box, place, lost = np.empty((2, 6)), np.empty((n, 2)), np.empty(n)
-        prices = np.empty((n, 12))
+        box, lost, prices = np.empty((2, 6)), np.empty(n), np.empty((n, 12))
         size = float((low - high).sum())
         table, shifts = self._cells.table, self._cells.shifts
-        least_box(table, shifts, node.spans, n, low, high, size, box, place, lost, prices)
+        least_box(table, shifts, node.spans, n, low, high, size, box, lost, prices)
         return np.asarray(prices[:, :6] - prices[:, 6:])
 
     def show_soon(self) -> None:
@@ -263,7 +262,7 @@ class BoxProof:
             keys[index] = np.unique(new[-1][:, KEY])
         spans = np.concatenate([node.spans, *new])
         low, high, table = node.low.copy(), node.high.copy(), cells.table
-        sizes, lost, place = np.empty(n_walls), np.empty(n_walls), np.empty((n_walls, 2))
+        sizes, lost = np.empty(n_walls), np.empty(n_walls)
         box, prices = np.empty((2, 6)), np.empty((n_walls, 12))
         limits = np.array([(one.lower, one.upper) for one in self._limits_of(spans)])
         self.work += NUMBERS_OF_A_CELL * float((spans[:, END] - spans[:, FIRST]).sum())
@@ -275,14 +274,15 @@ class BoxProof:
             return False
         few = spans[self._few_cells(spans)]
         bound, numbers = least_box(
-            table, cells.shifts, few, n_walls, low, high, closing, box, place, lost, prices
+            table, cells.shifts, few, n_walls, low, high, closing, box, lost, prices
         )
         self.work += numbers
         node.bound = max(node.bound, bound, float(sizes.max()))
         if node.bound >= closing:
             return False
         node.spans, node.n_walls, node.low, node.high = spans, n_walls, low, high
-        node.found = Relaxation(box[0], box[1], place, lost, closing, cells.changes)
+        pressed = prices.sum(axis=1)
+        node.found = Relaxation(box[0], box[1], lost, pressed, closing, cells.changes)
         return True
 
     def _limits_of(self, spans: np.ndarray) -> Sequence[JointBox]:

@@ -43,11 +43,11 @@ def _without_slack(table, basic, n_cuts):  # type: ignore[no-untyped-def]
 
 @kernel(
     "UniTuple(float64,2)(float64[:,::1],float64[:,::1],int64[:,::1],int64,float64[::1],float64[::1],"
-    "float64,float64[:,::1],float64[:,::1],float64[::1],float64[:,::1])",
+    "float64,float64[:,::1],float64[::1],float64[:,::1])",
     early=True,
 )
 def least_box(  # type: ignore[no-untyped-def]
-    cells, shifts, spans, n_walls, low, high, closing, box, place, lost, prices
+    cells, shifts, spans, n_walls, low, high, closing, box, lost, prices
 ):
     """Return a bound on the box that holds a core and a point of each wall, in [rad].
 
@@ -63,8 +63,6 @@ def least_box(  # type: ignore[no-untyped-def]
         high: The upper faces are not below these.
         closing: A larger bound than this is of no interest, in [rad].
         box: Filled with the faces of a box that meets the hulls, lower ones first, shape (2, 6).
-        place: Filled with where the hull of each wall is near to it: along it, and at which source,
-            both the mean of the points that it lies between, shape (n_walls, 2).
         lost: Filled with how much more each wall would press had its cells no pads, in [rad].
         prices: Filled with how hard each wall presses on each upper face of the box, and on each
             lower one, from 0 to 1, shape (n_walls, 12).
@@ -76,11 +74,12 @@ def least_box(  # type: ignore[no-untyped-def]
         end[spans[k, 0]] = max(end[spans[k, 0]], k + 1)
     # of each wall a point of its hull, as it presses on the core
     point, price, lower, upper = np.zeros((n_walls, 12)), np.empty(12), low.copy(), high.copy()
-    place[:], prices[:], lost[:] = 0.0, 0.0, 0.0
+    place = np.empty(2)
+    prices[:], lost[:] = 0.0, 0.0
     for w in range(n_walls):
         if end[w] > begin[w]:
             own = spans[begin[w] : end[w]]
-            work += nearest_end(cells, shifts, own, low, high, point[w], place[w])
+            work += nearest_end(cells, shifts, own, low, high, point[w], place)
     # variables: how far each face is beyond the core; rows: by how much each cut is kept, from name
     # 12 on
     table = np.zeros((1 + MOST_CUTS, 13))
@@ -115,7 +114,7 @@ def least_box(  # type: ignore[no-untyped-def]
         own = spans[begin[worst] : end[worst]]
         upper[:], lower[:] = high + between[:6], low - between[6:]
         point[worst] -= between
-        away, numbers = missed(cells, shifts, own, lower, upper, price, point[worst], place[worst])
+        away, numbers = missed(cells, shifts, own, lower, upper, price, point[worst], place)
         point[worst] += between
         work += numbers
         met[worst] = True

@@ -17,16 +17,16 @@ class Relaxation:
     Attributes:
         low: Lower faces of the box found, shape (6,).
         high: Upper faces.
-        place: Where the hull of each wall is near to it: along it, and at which source, (k, 2).
         lost: How much more a wall would press had its cells no pads, in [rad], shape (k,).
+        pressed: How hard a wall presses on all faces together, each from 0 to 1, shape (k,).
         closing: Bounds beyond this were of no interest when it was found, in [rad].
         changes: How often cells had become shorter by then.
     """
 
     low: Array
     high: Array
-    place: Array
     lost: Array
+    pressed: Array
     closing: float
     changes: int
 

@@ -61,13 +61,12 @@ def test_the_bound_over_hulls_is_that_of_another_solver(seed):
     low = random.normal(size=6) * 0.05
     high = low + np.abs(random.normal(size=6)) * 0.05
     wanted = by_scipy(cells, spans, low, high)
-    box, place, lost = np.empty((2, 6)), np.empty((n_walls, 2)), np.empty(n_walls)
-    prices = np.empty((n_walls, 12))
+    box, lost, prices = np.empty((2, 6)), np.empty(n_walls), np.empty((n_walls, 12))
     box[:] = low - random.uniform(0.0, 0.1, 6), high + random.uniform(0.0, 0.1, 6)
     turns = 2.0 * np.pi * random.integers(-2, 3, (int(spans[:, 2].max()) + 1, 6))
     for _, _, source, first, end in spans.tolist():
         cells[first:end, :12] -= np.tile(turns[source], 2)
-    sought = wanted + 1e-9, box, place, lost, prices
+    sought = wanted + 1e-9, box, lost, prices
     bound, _ = least_box(cells, turns, spans, n_walls, low, high, *sought)
     assert bound <= wanted + 1e-8
     assert bound >= wanted - 1e-4
@@ -99,9 +98,8 @@ def test_of_many_walls_that_are_alike_too(seed):
     low = cells[0, :6] - 0.01
     high = low + 0.02
     wanted = by_scipy(cells, spans, low, high)
-    box, place, lost = np.empty((2, 6)), np.empty((n_walls, 2)), np.empty(n_walls)
-    prices = np.empty((n_walls, 12))
-    sought = 1.001 * wanted, box, place, lost, prices
+    box, lost, prices = np.empty((2, 6)), np.empty(n_walls), np.empty((n_walls, 12))
+    sought = 1.001 * wanted, box, lost, prices
     bound, _ = least_box(cells, np.zeros((1, 6)), spans, n_walls, low, high, *sought)
     # as near as a tenth of what is left to be closed, below and above
     assert wanted - 1.1e-4 * wanted <= bound <= wanted + 1e-8
