@@ -14,20 +14,21 @@ from threading import Lock
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.geometry.mesh import TriangleMesh
 from opl.verification.engine import SCALE, BulletClient, pybullet
 
 RAY = np.array([0.2748, 0.5913, 0.7582])  # not along any edge of a likely mesh
 
 
-def triangle_body(client: BulletClient, mesh: TriangleMesh) -> int:
+def triangle_body(client: BulletClient, triangles: Array) -> int:
     """Add a body without mass and return Bullet's number of it.
 
     Bullet makes one convex shape for each object of an OBJ file; here each triangle is an object.
+    Their corners are in [m], shape (n, 3, 3).
     """
-    lines = ["v {:.9g} {:.9g} {:.9g}".format(*vertex) for vertex in SCALE * mesh.vertices]
-    for number, face in enumerate(mesh.faces + 1):
-        lines += [f"o t{number}", "f {} {} {}".format(*face)]
+    lines = []
+    for number, corners in enumerate(SCALE * triangles):
+        lines += ["v {:.9g} {:.9g} {:.9g}".format(*corner) for corner in corners]
+        lines += [f"o t{number}", "f {} {} {}".format(*range(3 * number + 1, 3 * number + 4))]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "triangles.obj"
         path.write_text("\n".join(lines) + "\n", encoding="ascii")

@@ -4,6 +4,7 @@ Nothing here is shared with `opl.cell.collision`: PyBullet reads the URDF itself
 itself and measures distances itself. The part is a concave triangle mesh, not its convex hull,
 which Bullet allows only for bodies without mass that are placed by pose. Between two such meshes
 Bullet finds nothing at all, so every other mesh is a compound of its triangles, each a convex body.
+Meshes are in pieces, of which those that cannot be the nearest are not measured.
 """
 
 from __future__ import annotations
@@ -16,33 +17,19 @@ import numpy as np
 from opl.cell.workcell import PART, WorkCell
 from opl.geometry.frames import Array, transform
 from opl.geometry.mesh import TriangleMesh
-from opl.geometry.shapes import Body, Box, Cylinder
-from opl.verification.arm import BASE_LINK, Arm, as_placed, as_pose
+from opl.verification.arm import BASE_LINK, as_placed, as_pose
+from opl.verification.bodies import MARGIN, Bodies, Solid
 from opl.verification.drum import Drum
-from opl.verification.engine import SCALE, pybullet
-from opl.verification.meshes import concave_shape, is_inside, triangle_body
-from opl.verification.patches import Patches
+from opl.verification.engine import SCALE
+from opl.verification.meshes import is_inside
 
 # Bullet rounds the edges of a link's boxes and cylinders by its own margin, a thousandth of its
 # lengths, so that they seem farther away than they are: 0.085 mm was seen. It is added to what is
 # needed. Links of meshes are blown up by that margin: they seem nearer
 LINK_ROUNDING = 1e-4  # [m]
-# Bullet rounds the edges of cylinders by their margin and blows up meshes by it: the default of
-# 1 mm is as much as the contact itself
-MARGIN = 1e-5  # [m]
 # Bullet's distance of a mesh from the wheel is too small by up to 0.012 mm, its depth by 0.05 mm:
 # 2000 random configurations each in the V and S cells, against the exact distance
 GAP_ACCURACY = 1e-4  # [m]
-
-
-@dataclass(frozen=True)
-class Solid:
-    """One thing that can be touched: a body, or a link of the robot."""
-
-    name: str
-    body: int
-    link: int
-    moved_by: int = 0  # number of joints, the first ones, that move it
 
 
 @dataclass(frozen=True)
@@ -75,31 +62,25 @@ class SolidPair:
         return less <= joint < more
 
 
-class World(Arm):
+class World(Bodies):
     """A physics server with the cell in it; use as a context manager."""
 
     def __init__(self, cell: WorkCell) -> None:
         super().__init__(cell)
         self._cell = cell
-        self._closest_points = self._client.getClosestPoints
-        self._place = self._client.resetBasePositionAndOrientation
         self._links = [Solid(self._link_name(BASE_LINK), self._robot, BASE_LINK)]
         for count, index in enumerate(self._joints, start=1):
             self._links.append(Solid(self._link_name(index), self._robot, index, count))
         # the part is the first of the held bodies
-        part = self._add_mesh(cell.part.triangles.reshape(-1, 3))
+        part = self._add_mesh(PART, cell.part.triangles, self._concave)
         held = [(part, self._part_at_flange)]
         held += [(self._add(body), as_placed(body.T_parent_body)) for body in cell.fixture]
         self._held = [(replace(solid, moved_by=len(self._joints)), at) for solid, at in held]
+        self._part, _ = self._held[0]
         wheel = cell.wheel_body()
-        self._wheel = self._add(wheel, wheel.T_parent_body)
+        self._wheel = self._add(wheel, stands=True)
         self._drum = Drum(wheel.T_parent_body, cell.wheel.radius, cell.wheel.width)
-        self._obstacles = [self._add(body, body.T_parent_body) for body in cell.obstacles]
-        boxes = map(_box_around, cell.obstacles)
-        self._standing = dict(zip(self._obstacles, boxes, strict=True))
-        # Bullet tests every triangle in the box around the wheel, nearly all of a fine mesh
-        self._patches = Patches.of(cell.part.triangles)
-        self._shown = [self._add_mesh(patch.reshape(-1, 3)) for patch in self._patches.triangles]
+        self._obstacles = [self._add(body, stands=True) for body in cell.obstacles]
         self.move_to(np.zeros(len(self._joints)))
 
     def __enter__(self) -> World:
@@ -117,8 +98,7 @@ class World(Arm):
 
     def part_and_wheel(self) -> SolidPair:
         """Return the pair that may touch; how far apart the two must be on free moves."""
-        part, _ = self._held[0]
-        return SolidPair(part, self._wheel, self._cell.part_from_wheel)
+        return SolidPair(self._part, self._wheel, self._cell.part_from_wheel)
 
     def _pairs(self) -> Iterator[SolidPair]:
         links, clearance = self._links, self._cell.required_clearance
@@ -144,33 +124,9 @@ class World(Arm):
         flange = self._turned(q)
         placed = [self._joined(*flange, *at_flange) for _, at_flange in self._held]
         for (held, _), at in zip(self._held, placed, strict=True):
-            self._place(held.body, *at)
-        self._part_at = placed[0]
-        self._T_base_workpiece = as_pose(*self._part_at)
+            self._move(held, at)
+        self._T_base_workpiece = as_pose(*placed[0])
         return self._T_base_workpiece
-
-    def distance(self, first: Solid, second: Solid, within: float) -> float:
-        """Return the distance in [m], negative in penetration, inf beyond ``within``."""
-        if first == self._held[0][0] and second in self._standing:
-            bounds = self._patches.from_box(*self._standing[second], self._T_base_workpiece)
-            nearest = np.inf
-            for k in bounds.argsort():
-                if bounds[k] > min(nearest, within) + 2.0 * MARGIN:
-                    break
-                nearest = min(nearest, self._from_patch(k, second, min(nearest, within)))
-            return nearest
-        return self._measured(first, second, within)
-
-    def _from_patch(self, k: int, other: Solid, within: float) -> float:
-        """Return the distance of a patch of the part from another solid, as `distance`."""
-        self._place(self._shown[k].body, *self._part_at)
-        return self._measured(self._shown[k], other, within)
-
-    def _measured(self, first: Solid, second: Solid, within: float) -> float:
-        """Return what Bullet says of two solids, as `distance`."""
-        bodies, links = (first.body, second.body), (first.link, second.link)
-        contacts = self._closest_points(*bodies, SCALE * within, *links)
-        return min((contact[8] for contact in contacts), default=np.inf) / SCALE
 
     def gap(self, within: float, counts: float = np.inf) -> float:
         """Return the distance of the part from the wheel in [m], as `distance`.
@@ -179,7 +135,8 @@ class World(Arm):
         was measured. Once the part is known to be within, only distances less than ``counts`` are
         the smallest there is; others are those of some patch.
         """
-        beside = self._patches.beside(self._drum, self._T_base_workpiece)
+        patches = self._pieces[self._part.body].patches
+        beside = patches.beside(self._drum, self._T_base_workpiece)
         bounds, nearest = beside.boxes, np.inf
         for k in bounds.argsort():
             wanted = min(nearest, within if nearest > within else counts) + 2.0 * MARGIN
@@ -188,7 +145,7 @@ class World(Arm):
             if beside.of_corners(k) > wanted or beside.is_beyond(k, wanted + GAP_ACCURACY):
                 continue
             ahead = min(nearest, max(within, 0.0))
-            nearest = min(nearest, self._from_patch(k, self._wheel, ahead))
+            nearest = min(nearest, self._from_piece(self._part, k, self._wheel, ahead))
         return nearest
 
     def surrounding(self) -> list[str]:
@@ -223,7 +180,7 @@ class World(Arm):
         radii = {}
         for solid in (*self._links[1:], *(held for held, _ in self._held)):
             origin = origins[solid.moved_by - 1]
-            box = np.array(self._client.getAABB(solid.body, solid.link)) / SCALE
+            box = np.array(self._box(solid))
             away = np.abs(box - origin).max(axis=0)
             radii[solid] = float(np.linalg.norm(away))
         found = np.zeros((len(pairs), len(self._joints)))
@@ -237,49 +194,3 @@ class World(Arm):
         if index == BASE_LINK:
             return str(self._client.getBodyInfo(self._robot)[0].decode())
         return str(self._client.getJointInfo(self._robot, index)[12].decode())
-
-    def _add_mesh(self, corners: Array) -> Solid:
-        """Add triangles, their corners of shape (3 m, 3)."""
-        return self._body(PART, concave_shape(self._client, corners))
-
-    def _add(self, body: Body, T_base_body: Array | None = None) -> Solid:
-        client = self._client
-        if isinstance(body.shape, Box):
-            half = [SCALE * edge / 2.0 for edge in body.shape.size]
-            shape = client.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half)
-            solid = self._body(body.name, shape)
-        elif isinstance(body.shape, Cylinder):
-            shape = client.createCollisionShape(
-                pybullet.GEOM_CYLINDER,
-                radius=SCALE * body.shape.radius,
-                height=SCALE * body.shape.length,
-            )
-            solid = self._body(body.name, shape)
-        else:
-            solid = self._as_solid(body.name, triangle_body(client, body.shape))
-        if T_base_body is not None:
-            at = as_placed(T_base_body)
-            client.resetBasePositionAndOrientation(solid.body, *at)
-        return solid
-
-    def _body(self, name: str, shape: int) -> Solid:
-        body = self._client.createMultiBody(baseMass=0.0, baseCollisionShapeIndex=shape)
-        return self._as_solid(name, body)
-
-    def _as_solid(self, name: str, body: int) -> Solid:
-        self._client.changeDynamics(body, BASE_LINK, collisionMargin=SCALE * MARGIN)
-        return Solid(name, body, BASE_LINK)
-
-
-def _box_around(body: Body) -> tuple[Array, Array]:
-    """Return the lowest and the highest coordinates of a body in the frame it is given in."""
-    T, shape = body.T_parent_body, body.shape
-    if isinstance(shape, TriangleMesh):
-        corners = transform(T, shape.vertices)
-        return corners.min(axis=0), corners.max(axis=0)
-    if isinstance(shape, Box):
-        half = np.array(shape.size) / 2.0
-    else:
-        half = np.array([shape.radius, shape.radius, shape.length / 2.0])
-    reach = np.abs(T[:3, :3]) @ half
-    return T[:3, 3] - reach, T[:3, 3] + reach

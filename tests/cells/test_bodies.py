@@ -28,6 +28,7 @@ from tests.support.bare_cells import (
     block,
     c_shape,
     convex_hull,
+    cut_finer,
     free_move,
     random_configurations,
     with_obstacle,
@@ -122,6 +123,29 @@ def test_every_pair_is_asked_as_the_rules_say():
     assert bullet == {(pair(names[a], names[b]), needed) for a, b, needed in other.pairs}
     assert not {names for names, _ in bullet} & cell.pairs.allowed
     assert (pair("B_link", "floor"), 0.1) in bullet and (pair("L_link", "R_link"), 0.02) in bullet
+
+
+def test_a_mesh_is_as_far_away_however_many_triangles_it_has():
+    # of two bodies PyBullet can hand over 47 661 points that it finds, some four of each triangle
+    part, post = block((0.2, 0.16, 0.1)), block((0.5, 0.4, 0.3))
+    random, found = np.random.default_rng(3), []
+    q = np.radians([10.0, 20.0, -20.0, 30.0, -70.0, 40.0]) + random.normal(scale=0.2, size=(40, 6))
+    for few_parts, few_posts in ((True, True), (False, True), (True, False)):
+        shape = post if few_posts else cut_finer(post, 6)
+        standing = Body("post", shape, at(1.0, 0.2, 0.5))
+        cell = bare_cell(part if few_parts else cut_finer(part, 6), [standing])
+        with World(cell) as world:
+            pairs, told = world.pairs(), []
+            for one in q:
+                world.move_to(one)
+                told += [world.distance(asked.first, asked.second, 0.13) for asked in pairs]
+        found.append(np.array(told))
+    coarse, *finer = found
+    for fine in finer:
+        apart = coarse > 0.0  # how deep bodies are in each other is told of one triangle
+        assert np.isfinite(coarse[apart]).sum() > 40
+        assert fine[apart] == pytest.approx(coarse[apart], abs=STATED)
+        assert (fine[~apart] <= 0.0).all() and (fine[~apart] > -1.0).all()
 
 
 # a hollow stays a hollow, whatever is in it

@@ -29,6 +29,14 @@ def block(size):
     return TriangleMesh(np.asarray(box.vertices), np.asarray(box.faces))
 
 
+def cut_finer(mesh, times):
+    """Return a mesh with each triangle cut into four, so many times."""
+    finer = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    for _ in range(times):
+        finer = finer.subdivide()
+    return TriangleMesh(np.asarray(finer.vertices), np.asarray(finer.faces))
+
+
 def c_shape(width=0.2, wall=0.03, depth=0.1):
     """Return a C extruded along z, open towards +x: a square frame with one side missing."""
     a, b = width / 2.0, width / 2.0 - wall
