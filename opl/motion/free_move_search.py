@@ -9,6 +9,7 @@ end, and a configuration that could not be joined with several others is taken t
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +22,7 @@ from opl.motion.straight_moves import StraightMoves
 
 MOST_CHECKED = 60_000  # configurations, of one search
 MOST_IN_VAIN = 4  # searches from one configuration before it is taken to be shut in
+MOST_LIKE = 4  # searches, by the nearest ends, that a move is held against before it is searched
 MOST_NAMED = 100  # refused moves whose first colliding pair is looked up
 # [rad] that a path may lead beyond both of its ends; less than half a turn of a wrist axis never
 # was seen to be too little, and the whole of its limits is much to search
@@ -97,28 +99,30 @@ class FreeMoveSearch:
         return path[1:-1]
 
     def _like_a_known_one(self, start: Array, goal: Array) -> Array | None:
-        """Return a path that shares one end with a known one and is joined to its other end."""
+        """Return a path that leads on from one that is known, whose ends are joined to these."""
         if not self._paths:
             return None
         from opl.motion.sampling import fewest
 
-        for known in self._paths:
-            for path in (known, known[::-1]):
-                if np.array_equal(path[0], start) and self.joined(path[-1], goal):
-                    return fewest(np.concatenate([path, goal[None]]), self.joined)
-                if np.array_equal(path[-1], goal) and self.joined(start, path[0]):
-                    return fewest(np.concatenate([start[None], path]), self.joined)
+        ways = [way for path in self._paths for way in (path, path[::-1])]
+        for k in _nearest([(way[0], way[-1]) for way in ways], start, goal):
+            if self._beside(start, ways[k][0]) and self._beside(ways[k][-1], goal):
+                before = start[None] if (start != ways[k][0]).any() else ways[k][:0]
+                after = goal[None] if (goal != ways[k][-1]).any() else ways[k][:0]
+                return fewest(np.concatenate([before, ways[k], after]), self.joined)
         return None
 
     def _hopeless(self, start: Array, goal: Array) -> Blocker | None:
-        """Return what blocks a move, if an end is joined to one that was searched in vain."""
-        for one, other, pair in self._in_vain:
-            for near, far in ((one, other), (other, one)):
-                if np.array_equal(start, near) and self.joined(goal, far):
-                    return pair
-                if np.array_equal(goal, near) and self.joined(start, far):
-                    return pair
+        """Return what blocks a move, if its ends are joined to two that were searched in vain."""
+        ends = [way for a, b, _ in self._in_vain for way in ((a, b), (b, a))]
+        for k in _nearest(ends, start, goal):
+            if self._beside(start, ends[k][0]) and self._beside(ends[k][1], goal):
+                return self._in_vain[k // 2][2]
         return None
+
+    def _beside(self, first: Array, second: Array) -> bool:
+        """Return whether two configurations are the same or joined."""
+        return bool((first == second).all()) or self.joined(first, second)
 
     def _shut_in(self, q: Array) -> Blocker | None:
         """Return what shuts a configuration in, if enough searches from it were in vain."""
@@ -153,3 +157,9 @@ class FreeMoveSearch:
         pair: Blocker = met.most_common(1)[0][0] if met else (f"limits of {limits}",)
         self._in_vain.append((start, goal, pair))
         raise BlockedMoveError(pair)
+
+
+def _nearest(ways: Sequence[tuple[Array, Array]], start: Array, goal: Array) -> list[int]:
+    """Return which ways, by their ends, are nearest to a move, and no more than a few of them."""
+    away = [np.abs(a - start).max() + np.abs(b - goal).max() for a, b in ways]
+    return list(np.argsort(away, kind="stable")[:MOST_LIKE])
