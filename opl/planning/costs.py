@@ -30,8 +30,8 @@ class PushAway:
         self._wider = CollisionScene(cell.widened(weights.push_away))
 
     @property
-    def queries(self) -> int:
-        """How many configurations were asked about."""
+    def queries(self) -> float:
+        """What was asked, as of `CollisionScene`."""
         return self._wider.queries
 
     def charge(self, q: Array) -> Array:

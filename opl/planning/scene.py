@@ -13,7 +13,7 @@ from opl.motion.free_leads import FreeLeads
 from opl.motion.free_move_search import FreeMoveSearch
 
 # what makes a unit of work, which is counted so that it is the same on any machine
-QUERIES = 60  # configurations asked about for collisions
+QUERIES = 60  # configurations that coal looks at for collisions
 LOOKS = 20_000  # at spheres and triangles of the part, for its distance to the wheel
 
 
