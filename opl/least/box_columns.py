@@ -9,6 +9,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
+from opl.least.doubts import Doubts
 from opl.least.field_at_places import FieldAtPlaces
 from opl.least.postures import Columns
 from opl.planning.nodes import inverse_solutions
@@ -56,6 +57,7 @@ class ColumnSampler:
         self._limits = tuple(limits)
         self.flips = wrist_flips(problem.cell.robot.arm)
         self.work = 0.0  # what was sampled so far, in units of work
+        self.doubts = Doubts(problem)
 
     @property
     def limits(self) -> Sequence[JointBox]:
@@ -83,7 +85,7 @@ class ColumnSampler:
         there = self.there(places)
         positions = problem.field.contact_positions
         grid = np.broadcast_to(positions, (len(places), len(positions)))
-        cuts = problem.cuts_at(places, there, grid)
+        cuts = self._cuts(places, there, grid)
         cuts |= self._spends(there, grid, ~cuts, spare)
         t = np.empty((len(places), FINE))
         for block in blocks_of(*grid.shape):
@@ -196,12 +198,16 @@ class ColumnSampler:
             solutions = inverse_solutions(problem.cell, frames, t[block])
             for own, placement in of_passes(there.pass_index[block], placements):
                 q[block][own] = self._placed(solutions[own, :, placement.family], placement)
-        free = ~np.isnan(q[..., 0]) & ~problem.cuts_at(places, there, t)
+        free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
         free &= _allowed(places, there.pass_index, placements, t)
         free[free] = image_within_limits(problem.cell.robot, self.flips, q[free])
         if self.collisions:
             self._leave_out_leads(places, there, placements, t, free)
         return Columns(places, there, tuple(placements), t, q, free)
+
+    def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
+        """Return where the part would sink too deep into the wheel, shape (n, m)."""
+        return self._problem.cuts_at(places, there, t, self.doubts.at(there.pass_index, t))
 
     def spared(self, columns: Columns, spare: Array) -> Columns:
         """Leave out postures that leave less than some depth of that allowed, by place in [m]."""

@@ -21,7 +21,7 @@ from opl.least.sinking import (
     past_help,
     places_between,
     struck_between,
-    sunk_at_ends,
+    sunk_at,
     until_sunk,
 )
 from opl.planning.costs import PushAway, track_cost
@@ -211,7 +211,7 @@ class BoxNodes:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free.
 
         One that sinks is the last: others do so as well. `sunk_between` of it, if it does; and
-        whether something was learnt of where motions collide instead.
+        whether something was learnt of where motions collide, or sink at a place, instead.
         """
         search, places, problem = self._search, self._columns.places, self.problem
         scene, robot = problem.scene, problem.cell.robot
@@ -229,10 +229,14 @@ class BoxNodes:
                 search.stopped = Counter()
                 return outcome.plan.at_places(places), None, False
             search.stopped = self._stopped()
-            sunk = first_sunk(problem, hits)
+            sunk, deep = first_sunk(problem, hits), sunk_at(hits)
+            passes, t = problem.points.pass_index[list(deep)], np.array(list(deep.values()))
+            if deep and search.sampler.doubts.note(passes, t):
+                return None, None, True
             shut = too_near
             if sunk is not None:
-                shut = past_help(places, sunk) & ~sunk_at_ends(problem, hits)
+                at_ends = np.isin(np.arange(len(places)), list(deep))
+                shut = past_help(places, sunk) & ~(at_ends[:-1] | at_ends[1:])
             if sunk is not None and not shut.any():
                 return None, sunk, False
             search.collided += int(sunk is None)

@@ -84,7 +84,7 @@ class Motions:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
         if box is None or self._tracks.tried(columns, passages, box):
             return False
-        learnt = False
+        learnt, doubts = False, self._search.sampler.doubts.count
 
         def learn(bulges: Sequence[Bulge]) -> bool:
             nonlocal learnt
@@ -94,6 +94,7 @@ class Motions:
         room = self._settings.room(box.size)
         found = self._tracks.plan(columns, passages, box, room, learn, self.worth)
         self.keep(found)
+        learnt = learnt or self._search.sampler.doubts.count > doubts
         return learnt or (found is None and learn(passages.narrow))
 
     def look_about(self, box: JointBox, placements: Sequence[Placement]) -> bool:

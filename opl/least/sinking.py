@@ -99,16 +99,16 @@ def past_help(places: Array, sunk: Array) -> np.ndarray:
     )
 
 
-def sunk_at_ends(problem: GrindingProblem, collided: Mapping[Same, Collides]) -> np.ndarray:
-    """Return between which columns a motion sinks too deep at one of both, shape (n - 1,)."""
-    deep = np.zeros(len(problem.points), dtype=bool)
+def sunk_at(collided: Mapping[Same, Collides]) -> dict[int, float]:
+    """Return the columns at which a motion sinks too deep, and at which contact positions."""
+    deep = {}
     for blocked in collided.values():
         motion = blocked.motion
         for fault in blocked.faults:
-            place = motion.cutter_point[fault.move]
+            place, t = motion.cutter_point[fault.move], motion.contact_position[fault.move]
             if fault.at_end and fault.pair == (PART, WHEEL) and place == np.rint(place):
-                deep[int(place)] = True
-    return np.asarray(deep[:-1] | deep[1:])
+                deep[int(place)] = float(t)
+    return deep
 
 
 def passed_where_struck(collided: Mapping[Same, Collides]) -> set[tuple[int, float]]:

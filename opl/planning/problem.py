@@ -90,7 +90,9 @@ class GrindingProblem:
         """Where the part would sink too deep into the wheel, shape (N, M)."""
         return np.asarray(self.wheel_distance < -self.cell.planned_penetration)
 
-    def cuts_at(self, places: Array, points: CutterPoints, t: Array) -> np.ndarray:
+    def cuts_at(
+        self, places: Array, points: CutterPoints, t: Array, doubted: np.ndarray | bool = False
+    ) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m).
 
         Where all nodes of the field around a place and contact position agree, so does what lies
@@ -100,13 +102,14 @@ class GrindingProblem:
             places: Fractional cutter points, shape (n,).
             points: The same as points of their own.
             t: Contact positions in belt units, shape (n, m).
+            doubted: What is measured though all around it are free, shape (n, m) or one for all.
         """
         field, cuts = self.field.contact_positions, self.cuts
         after = np.clip(np.searchsorted(field, t), 1, len(field) - 1)
         near = np.zeros(t.shape, dtype=int)
         for column in (np.floor(places).astype(int), np.ceil(places).astype(int)):
             near += cuts[column[:, None], after - 1].astype(int) + cuts[column[:, None], after]
-        unsure = (near > 0) & (near < 4)
+        unsure = ((near > 0) | doubted) & (near < 4)
         return np.asarray(nearer_nodes(self.scene, points, t, unsure) | (near == 4))
 
     def solutions(self, columns: np.ndarray) -> Array:

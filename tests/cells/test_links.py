@@ -191,9 +191,28 @@ def test_what_is_joined_to_an_end_sought_in_vain_is_not_sought_again(monkeypatch
 
     monkeypatch.setattr("opl.motion.sampling.sample_path", searched)
     near = AWAY + np.deg2rad([2.0, 0.0, 0.0, 0.0, 0.0, 5.0])
-    with pytest.raises(BlockedMoveError) as second:
-        search.find(near, HOME)
-    assert second.value.pair == first.value.pair
+    beside = HOME + np.deg2rad([0.0, 0.0, 0.0, 0.0, 0.0, 0.5])  # in the cage as well
+    assert search.joined(HOME, beside)
+    for ends in ((near, HOME), (AWAY, beside), (beside, near)):
+        with pytest.raises(BlockedMoveError) as second:
+            search.find(*ends)
+        assert second.value.pair == first.value.pair
+
+
+def test_a_path_is_led_on_from_one_that_is_known(monkeypatch):
+    search = search_in(blocked_cell())
+    known = search.find(HOME, AWAY)
+
+    def searched(*arguments):
+        raise AssertionError("searched again")
+
+    monkeypatch.setattr("opl.motion.sampling.sample_path", searched)
+    near = AWAY + np.deg2rad([2.0, 0.0, 0.0, 0.0, 0.0, 5.0])
+    beside = HOME + np.deg2rad([-2.0, 0.0, 1.0, 0.0, 0.0, 3.0])
+    for ends in ((HOME, near), (near, HOME), (beside, AWAY), (near, beside)):
+        via = search.find(*ends)
+        assert 1 <= len(via) <= len(known) + 2
+        assert margin_along(blocked_cell(), np.stack([ends[0], *via, ends[1]])) > 0.0
 
 
 # sampling in the plane, where the answer is known

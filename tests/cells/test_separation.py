@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opl.cell import separation as separation_module
-from opl.cell.collision import CollisionScene
+from opl.cell.collision import A_CALL, TOLD, CollisionScene
 from opl.cell.nearest import nearest_pairs
 from opl.cell.robot_loading import load_robot
 from opl.cell.separation import Bodies, Separation
@@ -102,18 +102,40 @@ def test_collisions_in_parts_are_the_same_in_threads_and_without_any(monkeypatch
     np.testing.assert_array_equal(scene.collides(q), hit)
 
 
-def test_the_first_that_collides_is_the_one_asked_one_by_one_and_so_are_the_queries():
+def test_the_first_that_collides_is_the_one_asked_one_by_one_and_most_behind_it_are_not_asked(
+    monkeypatch,
+):
     cell = crowded("mh24", seed=5)
     scene = CollisionScene(cell)
     q = configurations(cell.robot, seed=6, n=80)
     hit = scene.collides(q)
     free, shut = q[~hit], q[hit]
+    asked = []
+    look = CollisionScene._look
+    monkeypatch.setattr(
+        CollisionScene, "_look", lambda self, q: asked.append(len(q)) or look(self, q)
+    )
     for count in (0, 1, 7, 8, 9, 30):
-        for some in (free[:count], np.concatenate([free[:count], shut[:2], free[:3]])):
-            before = scene.queries
-            first = scene.first_colliding(some)
-            assert first == count
-            assert scene.queries - before == min(count + 1, len(some))
+        for some in (free[:count], np.concatenate([free[:count], shut[:2], free[:3], free])):
+            asked.clear()
+            assert scene.first_colliding(some) == count
+            # eight at first, then twice as many each time
+            assert sum(asked) <= min(max(8, 3 * (count + 1)), len(some))
+
+
+def test_work_of_queries_is_counted_for_all_scenes_made_of_one():
+    cell = crowded("mh24", seed=5)
+    scene = CollisionScene(cell)
+    q = configurations(cell.robot, seed=6, n=80)
+    before = scene.queries
+    hit = scene.collides(q)
+    one = scene.queries - before
+    # a call, all that are told without coal, and what coal looks at: all that collide but for those
+    # that are surely deep in each other
+    assert A_CALL + TOLD * len(q) <= one <= A_CALL + (TOLD + 1.0) * len(q)
+    assert hit.any()
+    scene.wider(0.01).collides(q)
+    assert scene.queries - before >= 2.0 * (A_CALL + TOLD * len(q))
 
 
 def test_configurations_may_be_read_only():
