@@ -12,12 +12,20 @@ from opl.planning.symmetry import everywhere
 from tests.support.planned import v_job
 
 
+def reached(cell, q, count):
+    """Whether each joint has a posture of every place within its limits, so many turns away."""
+    turned = q + 2.0 * np.pi * count
+    within = (turned >= cell.robot.lower - 1e-6) & (turned <= cell.robot.upper + 1e-6)
+    return within.any(axis=1).all(axis=0)
+
+
 def every_count(cell, q, chosen, flips):
     """Nearness to the limits and postures of each matrix, every count of full turns tried."""
     found = []
     for number, (_, sign, shift) in enumerate(flips):
         moved = np.where(chosen[..., None], q * sign + shift, np.nan)
-        for count in itertools.product(range(-3, 4), repeat=6):
+        counts = [[c for c in range(-3, 4) if reached(cell, moved, c)[k]] for k in range(6)]
+        for count in itertools.product(*counts):
             turned = moved + 2.0 * np.pi * np.array(count)
             within = cell.within_limits(turned)
             if within.any(axis=1).all():
