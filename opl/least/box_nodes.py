@@ -231,7 +231,7 @@ class BoxNodes:
             search.stopped = self._stopped()
             sunk, deep = first_sunk(problem, hits), sunk_at(hits)
             passes, t = problem.points.pass_index[list(deep)], np.array(list(deep.values()))
-            if deep and search.sampler.doubts.note(passes, t):
+            if search.sampler.doubts.note(passes, t):
                 return None, None, True
             shut = too_near
             if sunk is not None:

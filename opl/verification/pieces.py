@@ -2,8 +2,8 @@
 
 PyBullet hands over what it finds between two bodies in blocks of 8 MiB, 47 661 points. With more of
 them it reads a second block beyond its memory: distances of any size were seen, and the end of the
-process, for a part of 12 800 triangles 13 cm from a link. Of two triangles Bullet finds four points
-at the most, so of two pieces no more than fit in a block. And the pieces that cannot be the nearest
+process, for a part of 12 800 triangles 13 cm from a link. There it found 3.7 points of a triangle;
+two pieces of 50 triangles leave room for 19 of each two. And the pieces that cannot be the nearest
 need not be measured.
 """
 
@@ -25,6 +25,9 @@ class Pieces:
         patches: Which triangles each has.
         bodies: Bullet's number of each.
         place: Brings a body to a pose.
+
+    Attributes:
+        T_base_mesh: Where the mesh is, shape (4, 4), once it was moved there.
     """
 
     def __init__(
