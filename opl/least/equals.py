@@ -84,14 +84,21 @@ def quickest_of_equals(
             break
         if best is not plan and problem.scene.work - begun > MOST_WORK:
             break
-        found = check_path(problem, path)
-        if not isinstance(found, Free):
+        if (motion := _free_motion(problem, plan, path)) is None:
             continue
-        seconds = air_seconds(found.motion, problem.cell.robot, problem.process)
+        seconds = air_seconds(motion, problem.cell.robot, problem.process)
         if (unnamed, choice.near_limit, seconds + SAME_TIME) < least:
-            best = replace(plan, path=path, motion=found.motion)
+            best = replace(plan, path=path, motion=motion)
             least = unnamed, choice.near_limit, seconds
     return best
+
+
+def _free_motion(problem: GrindingProblem, plan: Plan, path: GrindingPath) -> Motion | None:
+    """Return the free motion of an image of the path of a plan; that of this path is known."""
+    if np.array_equal(path.q, plan.path.q):
+        return plan.motion
+    found = check_path(problem, path)
+    return found.motion if isinstance(found, Free) else None
 
 
 def _image(problem: GrindingProblem, path: GrindingPath, choice: _Choice) -> GrindingPath:
