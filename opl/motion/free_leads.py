@@ -9,6 +9,8 @@ from which one may.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from opl.cell.collision import CollisionScene
@@ -51,10 +53,9 @@ class FreeLeads:
         Raises:
             UnreachableApproachError: As `find` does.
         """
-        return [
-            (self.find(points, process, first), self.find(points, process, last))
-            for first, last in path.pass_ends()
-        ]
+        ends = [end for both in path.pass_ends() for end in both]
+        leads = self._found(points, process, ends)
+        return list(zip(leads[::2], leads[1::2], strict=True))
 
     def find(self, points: CutterPoints, process: ProcessSettings, end: PassEnd) -> Array:
         """Return configurations from just off the wheel to the far end of a lead, shape (k, 6).
@@ -71,36 +72,63 @@ class FreeLeads:
         Raises:
             UnreachableApproachError: If nothing of it is free and it leaves reach or limits.
         """
-        key = (
-            process.lead_shape(), end.kind, end.ik_branch,
-            points.Ts_workpiece_cutter[end.cutter_point].tobytes(),
-            points.direction_at(end.cutter_point), end.cutter_point, end.contact_position,
-            end.q.tobytes(),
-        )  # fmt: skip
-        if key not in self._known:
-            best, farthest = None, 0.0
-            for run in np.array(SHARES) * process.approach_run:
-                q, cause = reachable_lead(self._cell, points, process, end, run)
-                free = self._free_moves_of(end, q)
+        return self._found(points, process, [end])[0]
+
+    def _found(
+        self, points: CutterPoints, process: ProcessSettings, ends: Sequence[PassEnd]
+    ) -> list[Array]:
+        """Return the leads of some ends of passes, as `find` does, all checked at once."""
+        keys = [_key(points, process, end) for end in ends]
+        left = {key: end for key, end in zip(keys, ends, strict=True) if key not in self._known}
+        parts: dict[object, tuple[float, Array]] = {}  # how far it comes, and as much of the lead
+        for run in np.array(SHARES) * process.approach_run:
+            places = process.lead_shape(run).places()
+            tried = {
+                key: reachable_lead(self._cell, points, process, end, run)
+                for key, end in left.items()
+            }
+            free_moves = self._free_moves_of(list(left.values()), [q for q, _ in tried.values()])
+            for (key, (q, cause)), free in zip(tried.items(), free_moves, strict=True):
                 while free and self._free_moves.blocked_at(q[free - 1]) is not None:
                     free -= 1
                 if cause is None and free == len(q):
-                    best = q
-                    break
-                away = process.lead_shape(run).places()[free - 1] if free else 0.0
-                if away > farthest:
-                    best, farthest = q[:free], float(away)
-            if best is None:
-                shortest = SHARES[-1] * process.approach_run
-                best = lead(self._cell, points, process, end, shortest)
-            self._known[key] = best
-        return self._known[key]
+                    self._known[key] = q
+                    del left[key]
+                elif free and places[free - 1] > parts.get(key, (0.0, q))[0]:
+                    parts[key] = float(places[free - 1]), q[:free]
+        for key, end in left.items():
+            shortest = SHARES[-1] * process.approach_run
+            part = parts.get(key)
+            self._known[key] = part[1] if part else lead(self._cell, points, process, end, shortest)
+        return [self._known[key] for key in keys]
 
-    def _free_moves_of(self, end: PassEnd, q: Array) -> int:
-        """Return how many moves of a lead are free before one is not."""
-        if not len(q):
-            return 0
+    def _free_moves_of(self, ends: Sequence[PassEnd], leads: Sequence[Array]) -> list[int]:
+        """Return how many moves of each lead from its end of a pass are free before one is not."""
+        if not ends:
+            return []
         # the same configurations either way round
-        motion = Motion.off_wheel(np.vstack([end.q, q]), end.kind, 0)
-        faults = colliding_moves(self._cell, self._scene, self._part, motion)
-        return max(faults[0].move - 1, 0) if faults else len(q)
+        motion = Motion.joined(
+            [
+                Motion.off_wheel(np.vstack([end.q, q]), end.kind, index)
+                for index, (end, q) in enumerate(zip(ends, leads, strict=True))
+            ]
+        )
+        first = np.cumsum([0, *(1 + len(q) for q in leads[:-1])])
+        chosen = np.ones(len(motion), dtype=bool)
+        chosen[first] = False  # no move leads from lead to lead
+        free = np.array([len(q) for q in leads])
+        free[self._scene.collides(motion.q[first])] = 0
+        for fault in colliding_moves(self._cell, self._scene, self._part, motion, chosen):
+            index = int(motion.pass_index[fault.move])
+            free[index] = min(free[index], fault.move - int(first[index]) - 1)
+        return [int(count) for count in free]
+
+
+def _key(points: CutterPoints, process: ProcessSettings, end: PassEnd) -> tuple[object, ...]:
+    """Return what tells the lead of an end of a pass from others."""
+    return (
+        process.lead_shape(), end.kind, end.ik_branch,
+        points.Ts_workpiece_cutter[end.cutter_point].tobytes(),
+        points.direction_at(end.cutter_point), end.cutter_point, end.contact_position,
+        end.q.tobytes(),
+    )  # fmt: skip

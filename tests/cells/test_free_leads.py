@@ -77,3 +77,18 @@ def test_a_lead_of_which_nothing_is_free_is_refused():
     shut = with_lower_limit(problem, 2, whole[0, 2] + 1e-6)
     checked = check_path(shut, path)
     assert str(checked.error).endswith("limits of U")
+
+
+def test_leads_of_a_path_are_those_of_each_end_alone():
+    problem, path = small_problem(), small_plan().path
+    whole = whole_of(problem, path)
+    # leads are cut short there
+    shut = with_lower_limit(problem, 2, whole[-1, 2] + 0.3 * (whole[0, 2] - whole[-1, 2]))
+    together = shut.scene.free_leads.of_path(shut.points, path, shut.process)
+    lengths = set()
+    for pair, ends in zip(together, path.pass_ends(), strict=True):
+        for found, end in zip(pair, ends, strict=True):
+            alone = with_problem_cell(problem, shut.cell).scene.free_leads
+            np.testing.assert_array_equal(found, alone.find(shut.points, shut.process, end))
+            lengths.add(len(found))
+    assert 0 < min(lengths) < max(lengths) < len(whole)
