@@ -15,7 +15,7 @@ from opl.cell.workcell import WorkCell
 from opl.geometry.frames import Array
 from opl.planning.nodes import NodeMatrix
 from opl.planning.open_matrix import OpenMatrix, Track
-from opl.planning.turned import Kept
+from opl.planning.turned import Moved
 
 ROUNDING = 1e-9  # of full turns
 SAME_SUM = 1e-6  # [rad] two tracks whose joint range sums differ by less are equally good
@@ -54,16 +54,22 @@ def everywhere(
         first = np.ceil((robot.lower - high) / (2.0 * np.pi) - ROUNDING)
         last = np.floor((robot.upper - low) / (2.0 * np.pi) + ROUNDING)
         counts = [np.arange(a, b + 1) for a, b in zip(first, last, strict=True)]
+        farthest = moved.min(axis=0), moved.max(axis=0)
         for count in np.stack(np.meshgrid(*counts, indexing="ij"), axis=-1).reshape(-1, 6):
-            turned = moved + 2.0 * np.pi * count
-            within = cell.within_limits(turned)
-            if not np.logical_or.reduceat(within, begin).all():
-                continue
-            at = np.full(q.shape, np.nan)
-            at[chosen] = np.where(within[:, None], turned, np.nan)
-            margin = np.minimum(turned - robot.lower, robot.upper - turned).min(axis=0)
+            turns = 2.0 * np.pi * count
+            margin = np.minimum(
+                farthest[0] + turns - robot.lower, robot.upper - (farthest[1] + turns)
+            )
+            exists = chosen
+            if cell.limits or (margin < 0.0).any():
+                within = cell.within_limits(moved + turns)
+                if not np.logical_or.reduceat(within, begin).all():
+                    continue
+                exists = chosen.copy()
+                exists[chosen] = within
             near = float((1.0 / np.maximum(margin, 1e-3)).sum())
-            found.append((near, len(found), NodeMatrix(ik_branch, Kept(at), t, index)))
+            made = Moved(q, exists, sign, shift, turns)
+            found.append((near, len(found), NodeMatrix(ik_branch, made, t, index)))
     return [nodes for _, _, nodes in sorted(found, key=lambda entry: entry[:2])]
 
 

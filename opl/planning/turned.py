@@ -42,6 +42,41 @@ class Kept:
 
 
 @dataclass(frozen=True)
+class Moved:
+    """Configurations that others make at another place of joint space.
+
+    Attributes:
+        q: The others in [rad], shape (n_columns, n_rows, 6).
+        exists: Which of them are made, shape (n_columns, n_rows).
+        sign: 1 or -1 by joint, shape (6,).
+        shift: What is added then in [rad], shape (6,).
+        turns: Full turns added to that in [rad], shape (6,).
+    """
+
+    q: Array
+    exists: np.ndarray
+    sign: Array
+    shift: Array
+    turns: Array
+
+    def whole(self) -> Array:
+        """Return all, NaN where there is no node, shape (n_columns, n_rows, 6)."""
+        return self._made
+
+    def at(self, columns: np.ndarray | int, rows: np.ndarray | int) -> Array:
+        """Return those of some nodes in [rad], NaN where there is none, shape (..., 6)."""
+        return self._of(self.q[columns, rows], self.exists[columns, rows])
+
+    @cached_property
+    def _made(self) -> Array:
+        return self._of(self.q, self.exists)
+
+    def _of(self, q: Array, exists: np.ndarray) -> Array:
+        made = q * self.sign + self.shift + self.turns
+        return np.where(exists[..., None], made, np.nan)
+
+
+@dataclass(frozen=True)
 class Turned:
     """Angles of an IK branch, and the full turns that each row adds to them.
 
@@ -81,7 +116,7 @@ class Turned:
         return np.asarray(q)
 
 
-Configurations = Kept | Turned
+Configurations = Kept | Moved | Turned
 
 
 def unroll(q: Array, start: Array) -> None:

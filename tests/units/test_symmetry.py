@@ -59,6 +59,7 @@ def test_matrices_are_those_of_every_count_of_full_turns(robot, spread):
         assert len(found) == len(wanted) > 0
         for matrix, at in zip(found, wanted, strict=True):
             np.testing.assert_array_equal(matrix.q, at)
+            np.testing.assert_array_equal(matrix.at(np.arange(5), 3), at[:, 3])
             assert matrix.ik_branch[0] in (2, 3)
 
 
