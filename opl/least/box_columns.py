@@ -21,7 +21,7 @@ from opl.search.joint_limits import about
 from opl.walls.cut_cells import shut_along
 from opl.walls.families import GROWN, grown
 from opl.walls.images import Seams, image_within_limits, wrist_flips
-from opl.walls.placement import Placement, of_passes
+from opl.walls.placement import Placement, of_passes, placed
 from opl.walls.shut_leads import RESERVE, ShutLeads
 
 FINE = 33  # contact positions of a place at which a box is held against it
@@ -77,8 +77,8 @@ class ColumnSampler:
 
         Args:
             box: The box.
-            placements: The image that each pass uses.
-            places: Fractional cutter points, the cutter points among them, shape (n,).
+            placements: The image that each pass uses, of passes with one of the places.
+            places: Fractional cutter points, shape (n,).
             spare: Depth in [m] that they leave of what is allowed, shape (n,); none if not given.
         """
         problem, spare = self._problem, np.zeros(len(places)) if spare is None else spare
@@ -89,7 +89,7 @@ class ColumnSampler:
         cuts |= self._spends(there, grid, ~cuts, spare)
         t = np.empty((len(places), FINE))
         for block in blocks_of(*grid.shape):
-            coarse = self._coarse(places[block], placements)
+            coarse = self._coarse(places[block], there.pass_index[block], placements)
             free = ~cuts[block] & ~np.isnan(coarse[..., 0])
             free &= _allowed(places[block], there.pass_index[block], placements, grid[block])
             t[block], _ = sampled(grid[block], coarse, free, box, FINE, whole=True)
@@ -162,13 +162,16 @@ class ColumnSampler:
         free = columns.free & about(box, self.limits).holds(columns.q)
         return replace(columns, free=free)
 
-    def _coarse(self, places: Array, placements: Sequence[Placement]) -> Array:
+    def _coarse(
+        self, places: Array, pass_index: np.ndarray, placements: Sequence[Placement]
+    ) -> Array:
         """Return postures of places at the field's contact positions, shape (n, M, 6)."""
-        pass_index = self._problem.points.pass_index[places.astype(int)]
-        found = np.empty((len(places), len(self._problem.field.contact_positions), 6))
-        for own, placement in of_passes(pass_index, placements):
-            found[own] = self._placed(self._field.at(places[own], placement.family), placement)
-        return found
+        angles = np.empty((len(places), len(self._problem.field.contact_positions), 6))
+        families = _families(pass_index, placements)
+        for family in np.unique(families).tolist():
+            own = np.flatnonzero(families == family)
+            angles[own] = self._field.at(places[own], family)
+        return placed(angles, self._seams.start, pass_index, placements)
 
     def _leave_out_collisions(self, columns: Columns, box: JointBox) -> None:
         """Leave postures that collide out of columns, until those nearest to a box are free."""
@@ -196,8 +199,9 @@ class ColumnSampler:
         for block in blocks_of(*t.shape):
             frames = there.Ts_workpiece_cutter[block, None]
             solutions = inverse_solutions(problem.cell, frames, t[block])
-            for own, placement in of_passes(there.pass_index[block], placements):
-                q[block][own] = self._placed(solutions[own, :, placement.family], placement)
+            passes = there.pass_index[block]
+            own = np.arange(len(passes)), slice(None), _families(passes, placements)
+            q[block] = placed(solutions[own], self._seams.start, passes, placements)
         free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
         free &= _allowed(places, there.pass_index, placements, t)
         free[free] = image_within_limits(problem.cell.robot, self.flips, q[free])
@@ -264,16 +268,16 @@ class ColumnSampler:
             self._shut.update(zip(asked, found.tolist(), strict=True))
         return np.array([self._shut[edge] for edge in edges], dtype=bool)
 
-    def _placed(self, angles: Array, placement: Placement) -> Array:
-        """Return postures as placed, of principal angles of their family, shape (n, m, 6)."""
-        start = self._seams.start[placement.family]
-        return placement.of(start + np.remainder(angles - start, 2.0 * np.pi))
-
 
 def _size(columns: Columns, box: JointBox) -> float:
     """Return the size of a box grown until it holds a posture of each column, in [rad]."""
     larger = grown(columns.q, columns.free, box)
     return np.inf if larger is None else larger.size
+
+
+def _families(pass_index: np.ndarray, placements: Sequence[Placement]) -> np.ndarray:
+    """Return the family of each place, shape (n,)."""
+    return np.asarray(np.array([placement.family for placement in placements])[pass_index])
 
 
 def _allowed(

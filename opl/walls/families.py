@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -27,7 +28,7 @@ STARTS = 8  # nodes from which one is grown
 MOST_PASSES = 8  # in which families are ruled out before the proof begins
 MOST_GROWN = 200  # times that a box is grown for a column
 NODES_OF_WORK = 15000  # that cost a unit of work to hold against a box
-MOST_KNOWN = 64  # passes in one image each that are kept at hand
+MOST_KNOWN = 2_000_000  # placed nodes that are kept at hand: 49 bytes each
 GROWN = 1e-7  # [rad] less need not be grown for
 
 
@@ -116,9 +117,11 @@ class Families:
         self._sides = sides
         self._places = few = few_columns(pass_index)
         cuts, pass_index = cuts[few], pass_index[few]
-        self._pass_index = pass_index
+        begins = [0, *(np.flatnonzero(np.diff(pass_index)) + 1).tolist(), len(pass_index)]
+        self._passes = [slice(*ends) for ends in pairwise(begins)]  # columns of each pass
         self._unrolled = {}
         self._known: dict[tuple[object, ...], tuple[Array, np.ndarray]] = {}
+        self._known_nodes = 0
         self.work = 0.0
         for family in images.families:
             start = images.seams.start[family]
@@ -133,7 +136,7 @@ class Families:
         best: JointBox | None = None
         if any(len(of_pass) > 1 for of_pass in self._sides):
             return None  # it might be on either side of a barrier
-        step = max(len(self._pass_index) // FEW_COLUMNS, 1)
+        step = max(len(self._places) // FEW_COLUMNS, 1)
         for family, (unrolled, free) in self._unrolled.items():
             if not free.any(axis=1).all():
                 continue
@@ -153,35 +156,36 @@ class Families:
     def unreached(self) -> list[float]:
         """Return a cutter point of each pass that rules out each family that does not grind all."""
         places: list[float] = []
-        for index in range(min(int(self._pass_index[-1]) + 1, MOST_PASSES)):
-            columns = np.flatnonzero(self._pass_index == index)
+        for columns in self._passes[:MOST_PASSES]:
             left = [~free[columns].any(axis=1) for _, free in self._unrolled.values()]
             left = [lacks for lacks in left if lacks.any()]
             while left:
                 worst = int(np.argmax(np.sum(left, axis=0)))
-                places.append(float(self._places[columns[worst]]))
+                places.append(float(self._places[columns][worst]))
                 left = [lacks for lacks in left if not lacks[worst]]
         return places
 
     def grown(self, box: JointBox, placements: Sequence[Placement]) -> JointBox | None:
         """Return a box grown for all columns at the field's contact positions, as `grown` does."""
         for index, placement in enumerate(placements):
-            larger = _grown(*self._placed(index, placement, box), box)
+            limits = about(box, self._images.limits)
+            larger = _grown(*self._placed(index, placement, limits), box)
             if larger is None:
                 return None
             box = larger
         return box
 
-    def _placed(self, index: int, placement: Placement, box: JointBox) -> tuple[Array, np.ndarray]:
+    def _placed(
+        self, index: int, placement: Placement, limits: JointBox
+    ) -> tuple[Array, np.ndarray]:
         """Return the nodes of a pass as placed, shape (n, 6, m), and which are free, (n, m).
 
-        Those beyond the limits where a box is within them are not.
+        Those beyond limits are not.
         """
-        limits = about(box, self._images.limits)
         key = index, placement.key, limits.lower.tobytes(), limits.upper.tobytes()
         found = self._known.get(key)
         if found is None:
-            columns = self._pass_index == index
+            columns = self._passes[index]
             unrolled, free = self._unrolled[placement.family]
             placed = placement.of(unrolled[columns])
             allowed = placement.side.holds(self._places[columns], self._contact_positions)
@@ -189,9 +193,11 @@ class Families:
             q = np.ascontiguousarray(np.moveaxis(placed, 1, 2))
             found = q, np.ascontiguousarray(free[columns] & allowed)
             if not placement.loose.any():
-                if len(self._known) >= MOST_KNOWN:
+                if self._known_nodes > MOST_KNOWN:
                     self._known.clear()
+                    self._known_nodes = 0
                 self._known[key] = found
+                self._known_nodes += found[1].size
         self.work += found[1].size / NODES_OF_WORK
         return found
 
@@ -209,7 +215,7 @@ class Families:
                     flipped = flip, self._images.flips[flip]
                     yield Placement(family, *flipped, shift, loose, center, side)
                 continue
-            columns = self._pass_index == index
+            columns = self._passes[index]
             q, open_now = unrolled[columns], free[columns]
             mean = q[open_now].mean(axis=0) if open_now.any() else center
             for flip, (sign, shift) in enumerate(self._images.flips):
@@ -220,9 +226,9 @@ class Families:
 
     def _fits(self, index: int, box: JointBox, keys: Sequence[Key] | None) -> list[Fit]:
         """Return how the images that a pass may use fit into a box."""
-        found = []
+        found, limits = [], about(box, self._images.limits)
         for placement in self._placements(index, (box.lower + box.upper) / 2.0, keys):
-            q, free = self._placed(index, placement, box)
+            q, free = self._placed(index, placement, limits)
             missing, row = np.empty(len(q)), np.empty(len(q))
             outside(q, free, box.lower, box.upper, JUMP, missing, row)
             found.append(Fit(placement, missing, row))
@@ -248,9 +254,9 @@ class Families:
             worst of all first.
         """
         placements, missed = [], []
-        for index in range(int(self._pass_index[-1]) + 1):
+        for index, of_pass in enumerate(self._passes):
             fits = self._fits(index, box, keys.get(index))
-            columns = self._places[self._pass_index == index]
+            columns = self._places[of_pass]
             there = np.array([float(column) in known for column in columns])
             if not fits:
                 return [], []

@@ -11,9 +11,11 @@ from functools import cached_property
 
 import numpy as np
 
+from opl.cell.full_turns import FULL_TURN
 from opl.cell.inverse_kinematics import Arm
 from opl.cell.robot import Robot
 from opl.cell.spherical_wrist import SphericalWristArm
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 from opl.planning.nodes import SEAM_GAP
 from opl.search.box import JointBox
@@ -185,9 +187,26 @@ def image_within_limits(robot: Robot, flips: list[tuple[Array, Array]], q: Array
 
     The flips are as of `wrist_flips`.
     """
-    allowed = np.zeros(len(q), dtype=bool)
-    for sign, shift in flips:
-        moved = q * sign + shift
-        up = 2.0 * np.pi * np.ceil((robot.lower - moved) / (2.0 * np.pi))
-        allowed |= (moved + up <= robot.upper).all(axis=1)
+    allowed = np.empty(len(q), dtype=bool)
+    sign, shift = (np.array(given) for given in zip(*flips, strict=True))
+    # compiled for arrays that can be written to
+    lower, upper, q = np.array(robot.lower), np.array(robot.upper), np.require(q, None, ["C", "W"])
+    _keep_limits(q, sign, shift, lower, upper, allowed)
     return allowed
+
+
+@kernel(
+    "void(float64[:,::1],float64[:,::1],float64[:,::1],float64[::1],float64[::1],boolean[::1])",
+    early=True,
+)
+def _keep_limits(q, sign, shift, lower, upper, allowed):  # type: ignore[no-untyped-def]
+    """Set which postures, shape (n, 6), any of k flips and full turns bring within limits, (n,)."""
+    for k in range(len(q)):
+        allowed[k] = False
+        for flip in range(len(sign)):
+            kept = True
+            for joint in range(q.shape[1]):
+                moved = q[k, joint] * sign[flip, joint] + shift[flip, joint]
+                turns = np.ceil((lower[joint] - moved) / FULL_TURN)
+                kept = kept and moved + FULL_TURN * turns <= upper[joint]
+            allowed[k] = allowed[k] or kept

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from opl.cell.full_turns import FULL_TURN
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 from opl.walls.sides import ANY_SIDE, Side
 
@@ -50,6 +52,52 @@ class Placement:
             return np.asarray(placed)
         turns = 2.0 * np.pi * np.round((self.center - placed) / (2.0 * np.pi))
         return np.asarray(np.where(self.loose, placed + turns, placed))
+
+
+def placed(
+    angles: Array, starts: Array, pass_index: np.ndarray, placements: Sequence[Placement]
+) -> Array:
+    """Return postures of places as the placements of their passes place them, shape (n, m, 6).
+
+    Args:
+        angles: Principal angles of the families of these in [rad], shape (n, m, 6).
+        starts: Where the angles of each family are cut open in [rad], shape (8, 6).
+        pass_index: Pass of each place, shape (n,).
+        placements: The placement of every pass.
+    """
+    q = np.require(angles, requirements=["C", "W", "E"])
+    start = starts[[one.family for one in placements]]
+    sign, shift = (np.array([one.flip[k] for one in placements]) for k in (0, 1))
+    turns = np.array([one.shift for one in placements])
+    center = np.array([np.where(one.loose, one.center, np.nan) for one in placements])
+    _place(q, np.require(pass_index, None, ["C", "W"]), start, sign, shift, turns, center)
+    return q
+
+
+@kernel(
+    "void(float64[:,:,::1],int64[::1],float64[:,::1],float64[:,::1],float64[:,::1],float64[:,::1],"
+    "float64[:,::1])",
+    early=True,
+)
+def _place(q, pass_index, start, sign, shift, turns, center):  # type: ignore[no-untyped-def]
+    """Place angles, shape (n, m, 6), as `Placement.of` does once they are unrolled.
+
+    All but the pass of each place is by pass and joint; the center is NaN of joints not loose.
+    """
+    for column in range(len(q)):
+        own = pass_index[column]
+        for row in range(q.shape[1]):
+            for joint in range(q.shape[2]):
+                beyond = q[column, row, joint] - start[own, joint]
+                if -FULL_TURN <= beyond < 0.0:  # what a remainder is, found sooner
+                    beyond += FULL_TURN
+                elif not beyond < FULL_TURN or beyond < 0.0:
+                    beyond = np.remainder(beyond, FULL_TURN)
+                at = (start[own, joint] + beyond) * sign[own, joint] + shift[own, joint]
+                at += turns[own, joint]
+                if not np.isnan(center[own, joint]):
+                    at += FULL_TURN * np.rint((center[own, joint] - at) / FULL_TURN)
+                q[column, row, joint] = at
 
 
 def of_passes(
