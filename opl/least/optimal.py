@@ -15,6 +15,7 @@ from opl.files.beside import Beside
 from opl.least.box_nodes import TrackSearch
 from opl.least.holders import holders
 from opl.least.hope import Hope
+from opl.least.missed import Missed
 from opl.least.motions import Motions
 from opl.least.passages import Passages
 from opl.least.postures import Columns
@@ -29,7 +30,6 @@ from opl.search.forbidden import Forbidden, crossed_by_any
 from opl.search.least_box import BoxProof
 from opl.search.smooth import Travel
 from opl.search.walls import Chain
-from opl.walls.families import few_columns
 from opl.walls.images import Seams
 from opl.walls.obstructed import Obstructions
 from opl.walls.placement import Placement
@@ -79,7 +79,7 @@ class OptimalSearch:
         if not untried and (fallback is None or fallback.checks > 1):  # the first is not free
             self._leave_out_collisions()
         self.proof = self._new_proof(largest)
-        self._places: set[float] = set()
+        self._missed = Missed(space.sampler, points.pass_index)
         self._work = Work(problem.scene, self._walls, self._families, tracks)
         # boxes grown know nothing of collisions
         self._hope(None if self._sampler.collisions else self._families.smallest_grown())
@@ -131,7 +131,7 @@ class OptimalSearch:
         box, most = JointBox(candidate.low, candidate.high), self.proof.threshold
         self._sampler.mirrored = candidate.mirrored
         allowed = self._settings.missed(most) if candidate.settled else CLEARLY_MISSED * most
-        placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
+        placements, missed = self._families.hold(box, candidate.keys, self._missed.known, allowed)
         if not candidate.settled:
             self._go_into(box, placements, missed[:MOST_ADDED])
             return
@@ -184,9 +184,13 @@ class OptimalSearch:
         if barred:
             self._add([], barred)
             return True
+        allowed = self._settings.missed(self.proof.threshold)
+        if again := self._missed.again(box, placements, allowed):
+            self._add(again[:MOST_ADDED])
+            return True
         columns, passages, inner = self._space.look(box, placements, self._settings)
         self._hope(inner)
-        known, new = columns.missed(box, self._places, self._settings.missed(self.proof.threshold))
+        known, new = self._missed.of(columns, box, allowed)
         if not missed and (self.proof.clear(known) or self.proof.split_keys(known)):
             return True
         missed = missed or new[:MOST_ADDED]
@@ -212,12 +216,8 @@ class OptimalSearch:
 
     def _shut(self, box: JointBox, placements: Sequence[Placement]) -> bool:
         """Look at walls that seem shut all over a box; return whether any part of one surely is."""
-        if not self._sampler.collisions:
-            return False
-        few = few_columns(self._problem.points.pass_index)  # of every pass, so that each has some
-        columns = self._sampler.columns(box, placements, np.union1d(list(self._places), few))
-        known, _ = columns.missed(box, self._places, CLEARLY_MISSED * self.proof.threshold)
-        return self.proof.clear(known)
+        shut = self._missed.shut(box, placements, CLEARLY_MISSED * self.proof.threshold)
+        return self.proof.clear(shut)
 
     def _look_for_more(self, box: JointBox, placements: Sequence[Placement]) -> None:
         """Grow a box that is not settled until it holds all; look for a motion in it, if small."""
@@ -245,7 +245,7 @@ class OptimalSearch:
     def _mind_collisions(self) -> None:
         """Begin again without what collides: the robot does wherever a motion might have been."""
         self._leave_out_collisions()
-        self._places.clear()
+        self._missed.known.clear()
         self.proof.put_back()  # before what is proven is noted
         self._hoped = Hope(self.plan is not None)
         minding = self._new_proof(hoped := self._hoped.guess(self.lower_bound, self.motions.value))
@@ -282,7 +282,7 @@ class OptimalSearch:
             self.proof.add(wall)
         for wall in self._walls.columns(places):
             self.proof.add(wall)
-            self._places.add(wall.place)
+            self._missed.known.add(wall.place)
 
     def _learn_in(self, columns: Columns, passages: Passages, box: JointBox | None) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
