@@ -157,8 +157,7 @@ class WorkCell:
         paper, in column-vector order).
         """
         Ts_base_contact = self.wheel.T_base_contact(t)
-        Ts_cutter_flange = inverse(Ts_workpiece_cutter) @ inverse(self.T_flange_workpiece)
-        return Ts_base_contact @ Ts_cutter_flange  # one product for each t, not two
+        return Ts_base_contact @ inverse(Ts_workpiece_cutter) @ inverse(self.T_flange_workpiece)
 
     def Ts_contact0_workpiece(self, Ts_base_flange: Array) -> Array:
         """Return where the part is, seen from contact frame 0 of the wheel, shape (..., 4, 4)."""

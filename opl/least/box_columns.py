@@ -16,7 +16,7 @@ from opl.planning.nodes import inverse_solutions
 from opl.planning.problem import GrindingProblem, nearer_nodes
 from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
-from opl.search.in_box import hidden, missing, nearest_points, sampled
+from opl.search.in_box import about_nearest, hidden, missing, nearest_points, sampled
 from opl.search.joint_limits import about
 from opl.walls.cut_cells import shut_along
 from opl.walls.families import GROWN, grown
@@ -146,10 +146,7 @@ class ColumnSampler:
         if not (own := np.flatnonzero(poor)).size:
             return columns
         t, q, free = columns.t.copy(), columns.q.copy(), columns.free.copy()
-        last = t.shape[1] - 1
-        low = t[own, np.maximum(np.floor(row[own]).astype(int) - 1, 0)]
-        high = t[own, np.minimum(np.ceil(row[own]).astype(int) + 1, last)]
-        t[own] = np.linspace(low, high, last + 1, axis=1)
+        t[own] = about_nearest(t[own], row[own], free[own], missing(q[own], box))
         places, passes = columns.places[own], np.unique(columns.points.pass_index[own])
         placements = [columns.placements[index] for index in passes.tolist()]
         found = self.at(places, self.there(places), placements, t[own])

@@ -255,9 +255,8 @@ class OptimalSearch:
 
     def _leave_out_collisions(self) -> None:
         """Leave out where the robot collides from now on: of walls, and of what is sampled."""
-        scene, sampler = self._problem.scene.collision, self._sampler
-        self.forbidden = Obstructions(scene, sampler.leads, self._walls)
-        sampler.collisions = True
+        self.forbidden = Obstructions(self._problem, self._sampler.leads, self._walls)
+        self._sampler.collisions = True
 
     def _new_proof(self, threshold: float) -> BoxProof:
         """Return a proof without walls, for boxes below a size."""

@@ -80,6 +80,39 @@ def hidden(q: Array, row: Array) -> Array:
     return np.asarray(BEND * most.sum(axis=-1) / 8.0)
 
 
+def about_nearest(t: Array, row: Array, free: np.ndarray, away: Array) -> Array:
+    """Return contact positions closer about what is nearest to a box, shape (n, m).
+
+    About the nearest samples that are free. Where those beside them that are not are nearer, the
+    other end of these may be the nearest, though the next sample beyond it is farther: half of them
+    are about that.
+
+    Args:
+        t: Contact positions of the samples, increasing, shape (n, m).
+        row: Fractional row of what is nearest and free, shape (n,).
+        free: Which samples are, shape (n, m).
+        away: By what the box misses each in [rad], shape (n, m).
+    """
+    every, rows, last = np.arange(len(t)), np.arange(t.shape[1]), t.shape[1] - 1
+    low = np.maximum(np.floor(row).astype(int) - 1, 0)
+    high = np.minimum(np.ceil(row).astype(int) + 1, last)
+    found = np.linspace(t[every, low], t[every, high], last + 1, axis=1)
+    before = np.maximum.accumulate(np.where(free, rows, -1), axis=1)[every, low]
+    reversed_rows = np.where(free, rows, last + 1)[:, ::-1]
+    after = np.minimum.accumulate(reversed_rows, axis=1)[every, last - high]
+    missed = np.where(free, away, np.inf).min(axis=1)
+    half = len(rows) // 2
+    for end, inside, beside in ((before, before + 1, low), (after, after - 1, high)):
+        own = np.flatnonzero((end != beside) & (end >= 0) & (end <= last))
+        own = own[away[own, inside[own]] < missed[own]]
+        beyond = np.clip(2 * end - inside, 0, last)[own]
+        ends = np.sort([beyond, inside[own], low[own], high[own]], axis=0)
+        least, at, on, most = (t[own, one] for one in ends)
+        found[own, :half] = np.linspace(least, at, half, axis=1)
+        found[own, half:] = np.linspace(on, most, last + 1 - half, axis=1)
+    return found
+
+
 def nearest(q: Array, free: np.ndarray, box: JointBox) -> np.ndarray:
     """Return which free postures are in a box, or the nearest of a column, shape (n, m)."""
     away = np.where(free, missing(q, box), np.inf)

@@ -20,6 +20,8 @@ from opl.geometry import frames
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import MM_PER_M, ContactWheel
+from opl.planning.problem import GrindingProblem
+from opl.search.walls import Line
 
 CELL = 1.0  # belt units that a cell covers at first
 MOST_HALVINGS = 12  # of a cell where something begins
@@ -181,6 +183,24 @@ def surely_nearer(
         Ts = Ts_contact0_workpiece[slid]
         surely[slid] = signed_wheel_distance(part, narrower, Ts, distance, nearer) < nearer
     return surely, clearance < distance
+
+
+def surely_cuts_on(
+    problem: GrindingProblem, line: Line, low: Array, high: Array
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return in which cells on a line the part cuts into the wheel all over, and at the middle.
+
+    Args:
+        problem: The cell, the part, and the cutter points.
+        line: At a place, or at a contact position.
+        low: Least contact position of each, or first place, as below, shape (n,).
+        high: Greatest, or last.
+    """
+    cell, part = problem.cell, problem.scene.part
+    if line.T_workpiece_cutter is None:
+        t = np.full(len(low), line.contact_position)
+        return surely_cuts_along(cell, part, problem.points, t, low, high)
+    return _surely_cuts(cell, part, np.tile(line.T_workpiece_cutter, (len(low), 1, 1)), low, high)
 
 
 def surely_cuts_along(

@@ -1,7 +1,7 @@
 """Where along a wall the robot surely collides, whatever the posture within the pads of a cell.
 
 A cell counts as forbidden only if at its middle bodies are nearer than allowed by more than they
-can come apart within the cell.
+can come apart within the cell. Looked at closer, so does one in which the part cuts into the wheel.
 """
 
 from __future__ import annotations
@@ -10,15 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opl.cell.collision import CollisionScene
 from opl.geometry.frames import Array
+from opl.planning.problem import GrindingProblem
 from opl.search.walls import Piece
 from opl.walls.columns import ColumnWalls
-from opl.walls.cut_cells import halved
+from opl.walls.cut_cells import halved, surely_cuts_on
 from opl.walls.shut_leads import ShutLeads
 
-# halvings of a cell all in collision, but not deep enough to be sure, at each look
-WITHIN = (2, 6, 10)
+# into how many parts a cell is cut at each look, and halvings of what is all in collision then, but
+# not deep enough to be sure
+PARTS, WITHIN = (1, 4, 16), (2, 4, 6)
 AROUND = 16  # cells on either side of those asked about that are looked at as well, at first
 
 
@@ -39,13 +40,13 @@ class Obstructions:
     """Leaves out of walls where the robot collides.
 
     Args:
-        collision: The scene; motions that come nearer than its clearances do not count.
+        problem: Motions that come nearer than the clearances of its scene do not count.
         leads: Where passes cannot begin or end; such motions do not count either.
         walls: Where the pieces are from. Those with the wrist flipped collide elsewhere.
     """
 
-    def __init__(self, collision: CollisionScene, leads: ShutLeads, walls: ColumnWalls) -> None:
-        self._collision = collision
+    def __init__(self, problem: GrindingProblem, leads: ShutLeads, walls: ColumnWalls) -> None:
+        self._problem, self._collision = problem, problem.scene.collision
         self._leads = leads
         self._walls = walls
         self._flips = walls.images.flips
@@ -77,7 +78,11 @@ class Obstructions:
         step = np.diff(piece.corners, axis=0)
 
         def surely(_: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
-            shut, shut_there = self._leads.surely(piece, flip, *(along(end) for end in (low, high)))
+            ends = along(low), along(high)
+            shut, shut_there = self._leads.surely(piece, flip, *ends)
+            if looks > 1:  # walls were held against the wheel in larger cells
+                cut, cut_there = surely_cuts_on(self._problem, piece.line, *ends)
+                shut, shut_there = shut | cut, shut_there | cut_there
             left = ~shut
             shut[left], near = collides(low[left], high[left])
             shut_there[left] |= near
@@ -100,9 +105,11 @@ class Obstructions:
             return self._collide(q * sign + shift, turned)
 
         # the cells beside tell where collisions begin
-        cells = np.arange(max(first - 1, 0), min(end + 1, len(pads)), dtype=float)
-        run = np.zeros(len(cells), dtype=int)
-        _, low, high, hit = halved(run, cells, cells + 1.0, surely, WITHIN[looks - 1])
+        parts = PARTS[looks - 1]
+        begin, last = max(first - 1, 0), min(end + 1, len(pads))
+        ends = np.linspace(begin, last, (last - begin) * parts + 1)
+        run = np.zeros(len(ends) - 1, dtype=int)
+        _, low, high, hit = halved(run, ends[:-1], ends[1:], surely, WITHIN[looks - 1])
         cell = ((low + high) / 2.0).astype(int)
         new = np.zeros(len(pads), dtype=bool)
         new[first:end] = known.looks[first:end] < looks

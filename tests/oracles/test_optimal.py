@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import dijkstra
 from opl.cell.collision import CollisionScene
 from opl.cell.full_turns import full_turns
 from opl.cell.inverse_kinematics import inverse_kinematics
+from opl.job.load import load_job
 from opl.least.least_cost import least_cost
 from opl.least.least_range import NoMotionError, plan_optimal
 from opl.least.optimal import OptimalSearch
@@ -26,6 +27,7 @@ from opl.motion.path import PassEnd
 from opl.motion.whole_motion import UnreachableApproachError
 from opl.planning import plan as plan_module
 from opl.planning.multi_start import plan_recursive
+from opl.planning.problem import nearer_nodes
 from opl.planning.settings import ObjectiveWeights
 from opl.planning.so_far import ENDED
 from opl.planning.track_check import NoMotion
@@ -36,8 +38,16 @@ from opl.walls.obstructed import Obstructions
 from opl.walls.shut_leads import ShutLeads
 from tests.support.bare_cells import Ghosts
 from tests.support.fcl_scene import FclScene
-from tests.support.jobs import opl, write_job
-from tests.support.planned import problem_of, small_job, timed, v_job, with_positions, with_scene
+from tests.support.jobs import opl, write_job, write_trough
+from tests.support.planned import (
+    problem_of,
+    small_job,
+    timed,
+    v_job,
+    with_positions,
+    with_problem_cell,
+    with_scene,
+)
 
 SETTINGS = v_job().search.optimal
 ONLY_TRAVEL = ObjectiveWeights(joint_range=0.0, travel=1.0, time=0.0)
@@ -304,8 +314,8 @@ def test_what_is_left_out_of_a_wall_collides_all_over():
     images = Images(cell.robot, seams_of(problem.solutions(np.arange(len(problem.points)))), 10.0)
     walls = ColumnWalls(cell, problem.scene.part, problem.points, images)
     wall = walls.columns([7.0])[0]
-    scene = CollisionScene(cell.widened(0.036))
-    obstructions = Obstructions(scene, ShutLeads(problem), walls)
+    narrow = with_problem_cell(problem, cell.widened(0.036))
+    obstructions = Obstructions(narrow, ShutLeads(problem), walls)
     T_workpiece_cutter = problem.points.Ts_workpiece_cutter[7]
     left_out, kept = [], 0
     for piece in wall.pieces:
@@ -323,7 +333,33 @@ def test_what_is_left_out_of_a_wall_collides_all_over():
             kept += int(inside.sum())
     left_out = np.concatenate(left_out)
     assert kept > 50 and len(left_out) > 100
-    assert scene.collides(left_out).all()
+    assert narrow.scene.collision.collides(left_out).all()
+
+
+def test_what_is_left_out_of_a_wall_on_a_closer_look_is_too_deep_in_the_wheel(tmp_path):
+    problem = problem_of(load_job(write_trough(tmp_path, width_mm=80.0, depth_mm=5.0)))
+    cell, place, n = problem.cell, 1.0, len(problem.points)
+    points = problem.points.at_places(np.array([place]))
+    images = Images(cell.robot, seams_of(problem.solutions(np.arange(n))), 10.0)
+    # walls of a belt into which the part may sink as deep as it likes
+    soft = replace(cell, max_belt_penetration=0.02)
+    walls = ColumnWalls(soft, problem.scene.part, problem.points, images)
+    obstructions = Obstructions(problem, ShutLeads(problem), walls)
+    left_out, left = np.zeros(3), np.zeros(3)
+    for piece in walls.columns([place])[0].pieces:
+        t = np.linspace(piece.at[0], piece.at[-1], 5000)
+        deep = nearer_nodes(problem.scene, points, t[None], np.ones((1, len(t)), dtype=bool))[0]
+        cells = np.minimum(np.searchsorted(piece.at, t, side="right") - 1, len(piece.pad_low) - 1)
+        share = (t - piece.at[cells]) / np.diff(piece.at)[cells]
+        for looks in (1, 2, 3):
+            low, high = obstructions.clear(piece, 0, 0, len(piece.pad_low), looks)
+            inside = (share >= low[cells]) & (share <= high[cells])
+            assert deep[~inside].all()
+            left_out[looks - 1] += np.count_nonzero(~inside)
+            left[looks - 1] += np.count_nonzero(inside & deep)
+    # the first look does not ask about the wheel, the others leave hardly anything that is too deep
+    assert left_out[0] == 0 and left[0] > 1000
+    assert left[2] <= left[1] < 0.01 * left[0]
 
 
 def in_a_narrow_cell(problem):

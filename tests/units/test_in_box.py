@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opl.search.box import JointBox
-from opl.search.in_box import clipped, hidden, nearest_points, sampled
+from opl.search.in_box import about_nearest, clipped, hidden, nearest_points, sampled
 
 ROWS = np.linspace(-1.0, 1.0, 9)
 some = st.lists(st.integers(-200, 200).map(lambda k: k / 1000.0), min_size=6, max_size=6)
@@ -71,3 +71,35 @@ def test_what_hides_beside_the_last_row_is_that_of_the_last_chord():
     q[:, :, 0] = 0.01 * np.arange(5) ** 2
     at = hidden(q, np.array([0.0, 3.5, 4.0]))
     assert at[1] == at[2] > 0.0
+
+
+def test_past_samples_that_are_not_free_the_other_end_is_looked_at_too():
+    t, away = np.arange(12.0), np.abs(np.arange(12) - 5.2) + 0.1
+    free = np.ones((4, 12), dtype=bool)
+    free[1, 4:7] = free[2, 4:] = False
+    free[3, [4, 5, 6, 8]] = False  # the last is farther than what is nearest
+    row = np.array([5.0, 3.0, 3.0, 7.0])
+    found = about_nearest(np.tile(t, (4, 1)), row, free, np.tile(away, (4, 1)))
+    assert found[0] == pytest.approx(np.linspace(4.0, 6.0, 12))
+    assert found[1] == pytest.approx([*np.linspace(2, 4, 6), *np.linspace(6, 8, 6)])
+    assert found[2] == pytest.approx(np.linspace(2.0, 4.0, 12))
+    assert found[3] == pytest.approx([*np.linspace(2, 4, 6), *np.linspace(6, 8, 6)])
+
+
+@given(st.floats(0.03, 0.97), st.floats(0.01, 0.4), st.floats(0.0, 1.0))
+def test_zooming_in_finds_the_nearest_end_of_what_is_not_free(middle, width, at):
+    """A box met in a stretch that is not free, on a straight column: one end is nearest."""
+    begin, end = middle - width / 2.0, middle + width / 2.0
+    target, last = begin + at * width, 40
+    t = np.linspace(0.0, 1.0, last + 1)
+    wanted = min(target - begin if begin > 0.0 else 9.0, end - target if end < 1.0 else 9.0)
+    if wanted > 8.0:
+        return
+    for _ in range(6):
+        away, free = np.abs(t - target), (t < begin) | (t > end)
+        if free.all():
+            return  # too narrow to be seen
+        row = np.array([np.argmin(np.where(free, away, np.inf))], dtype=float)
+        t = about_nearest(t[None], row, free[None], away[None])[0]
+    away = np.where((t < begin) | (t > end), np.abs(t - target), np.inf).min()
+    assert away == pytest.approx(wanted, abs=1e-5)
