@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from opl.geometry.frames import Array
 from opl.search.bounding import distances
 from opl.search.box import JointBox
-from opl.search.cells import END, FIRST, SOURCE, WALL, Cells
+from opl.search.cells import END, FIRST, KEY, SOURCE, WALL, Cells
 from opl.search.hulls import missed, nearest_end
 from opl.search.joint_limits import torn
 from opl.search.subproblems import Relaxation, Subproblem
@@ -35,8 +36,9 @@ def where_to_split(
     assert found is not None
     if np.count_nonzero(walls == 0) > 1:
         return 0
+    of_spans = distances(table, cells.shifts, node.spans, found.low, found.high)
     away = np.full(node.n_walls, np.inf)
-    np.minimum.at(away, walls, distances(table, cells.shifts, node.spans, found.low, found.high))
+    np.minimum.at(away, walls, of_spans)
     first, end = node.spans[:, FIRST], node.spans[:, END]
     tiny = walls[(end == first + 1) & (table[first, 25] - table[first, 24] < SMALLEST)]
     score = np.maximum(away, found.lost)
@@ -44,12 +46,32 @@ def where_to_split(
     np.maximum.at(score, walls, torn(table, cells.shifts, node.spans, box, limits, settled))
     score[tiny] = 0.0
     if (score <= settled).all():
-        return None
+        return _met_with_several_keys(node, cells, of_spans, settled)
     pressed = 1.0 + np.minimum(found.pressed, 1.0)  # a wall that holds a face up counts twice
     score = np.where(score > settled, score * pressed, 0.0)
     best = np.argsort(-score, kind="stable")[:MOST_TRIED]
     gains = [pressed[wall] * _gain(node, cells, wall) for wall in best[score[best] > 0.0].tolist()]
     return int(best[np.argmax(gains)])
+
+
+def _met_with_several_keys(
+    node: Subproblem, cells: Cells, away: Array, settled: float
+) -> int | None:
+    """Return a wall of a pass all of whose walls a box meets, but not with one key.
+
+    None if there is none; ``away`` is how far each span is from the box, in [rad].
+    """
+    keys, key = np.unique(node.spans[:, KEY], return_inverse=True)
+    of_keys = np.full((len(keys), node.n_walls), np.inf)
+    np.minimum.at(of_keys, (key, node.spans[:, WALL]), away)
+    for index in np.unique(cells.pass_index[: node.n_walls]).tolist():
+        own = np.flatnonzero(cells.pass_index[: node.n_walls] == index)
+        missed = of_keys[:, own]
+        best = int(np.argmin(missed.max(axis=1)))
+        worst = int(np.argmax(missed[best]))
+        if missed[best, worst] > settled and np.isfinite(missed[:, worst]).sum() > 1:
+            return int(own[worst])
+    return None
 
 
 def parts(node: Subproblem, cells: Cells, wall: int) -> list[np.ndarray]:

@@ -1,5 +1,8 @@
 """The least box over walls that are added while the proof goes on, held against samples of them."""
 
+from copy import deepcopy
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -169,3 +172,62 @@ def test_without_a_wall_the_others_are_proven_as_if_it_had_never_been_there(seed
         assert found <= least * (1.0 + GAP)
     assert len(whole.walls) == len(walls)
     assert closed_at(whole.again(20.0)) == pytest.approx(least, rel=GAP)
+
+
+def before_a_pass(seed):
+    """Return a wall, and those of a pass that two families cross; curves, what cuts their cells.
+
+    They are straight, and the same but for a joint, which is far off in one family at one wall.
+    """
+    random = np.random.default_rng(seed)
+    at, curves, of_line, walls = np.linspace(-1.0, 1.0, CELLS + 1), {}, {}, []
+    for place in range(4):
+        pieces, straight = [], Bent(random)
+        straight._q[2] = 0.0
+        for family in (0, 1) if place else (0,):
+            curve = curves[family, place] = deepcopy(straight)
+            curve._q[0, 3] = 2.0 * (place == family + 1)
+            piece = replace(curve.piece(at), family=family)
+            of_line[id(piece.line)] = curve
+            pieces.append(piece)
+        walls.append(Wall(min(place, 1), float(place), tuple(pieces)))
+
+    def cut(piece, cell):
+        finer = of_line[id(piece.line)].piece(np.linspace(*piece.at[cell : cell + 2], 4))
+        return (replace(finer, family=piece.family, line=piece.line),)
+
+    return walls, curves, cut
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_box_is_settled_where_a_pass_meets_it_with_one_family(seed):
+    walls, curves, cut = before_a_pass(seed)
+    proof = BoxProof(lambda _: SAME, cut, 20.0, GAP)
+    for wall in walls:
+        proof.add(wall)
+    fine, settled = np.linspace(-1.0, 1.0, 4001), 0
+    while not proof.closed:
+        candidate = proof.take_next()
+        if candidate is None:
+            continue
+        if candidate.settled:
+            settled += 1
+            missed = dict.fromkeys(curves, 0.0)
+            for key, curve in curves.items():
+                q = curve.at(fine)
+                away = np.maximum(q - candidate.high, 0.0) + np.maximum(candidate.low - q, 0.0)
+                missed[key] = away.sum(axis=1).min()
+            size = float((candidate.high - candidate.low).sum())
+            worst = [max(missed[family, place] for place in (1, 2, 3)) for family in (0, 1)]
+            assert min(worst) < 0.02 * size
+        take(proof, candidate)
+    assert settled
+    samples = [
+        grown(
+            np.stack(
+                [curves[key].at(fine[::500]) for key in ((0, 0), *((n, k) for k in (1, 2, 3)))]
+            )
+        )
+        for n in (0, 1)
+    ]
+    assert proof.lower_bound <= min(samples)
