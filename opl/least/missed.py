@@ -14,7 +14,6 @@ from opl.geometry.frames import Array
 from opl.least.box_columns import ColumnSampler
 from opl.least.postures import Columns
 from opl.search.box import JointBox
-from opl.walls.families import few_columns
 from opl.walls.placement import Placement
 
 
@@ -31,29 +30,34 @@ class Missed:
 
     def __init__(self, sampler: ColumnSampler, pass_index: np.ndarray) -> None:
         self._sampler, self._pass_index = sampler, pass_index
-        self._last: list[float] = []  # others, by the box looked at last
+        self._last: list[float] = []  # others, by the box looked at last, if it missed nothing else
         self.known: set[float] = set()
 
     def of(
         self, columns: Columns, box: JointBox, allowed: float
     ) -> tuple[list[float], list[float]]:
         """Return the places that a box misses, known ones and others, as `Columns.missed`."""
-        known, self._last = columns.missed(box, self.known, allowed)
-        return known, self._last
+        known, others = columns.missed(box, self.known, allowed)
+        self._last = [] if known else others
+        return known, others
 
-    def again(self, box: JointBox, placements: Sequence[Placement], allowed: float) -> list[float]:
-        """Return which of the others that a box missed last this one misses, the worst first."""
-        if self._last:
-            columns = self._columns(box, placements, np.unique(self._last))
-            self.of(columns, box, allowed)
-        return self._last
+    def first(
+        self, box: JointBox, placements: Sequence[Placement], allowed: float
+    ) -> tuple[list[float], list[float]]:
+        """Return which known places a box misses, and which others that one missed last, as `of`.
+
+        These are looked at before all others are.
+        """
+        if not (places := {*self.known, *self._last}):
+            return [], []
+        return self.of(self._columns(box, placements, np.unique(list(places))), box, allowed)
 
     def shut(self, box: JointBox, placements: Sequence[Placement], allowed: float) -> list[float]:
         """Return which known places a box misses where collisions are left out: all may collide."""
-        if not self._sampler.collisions:
+        if not (self._sampler.collisions and self.known):
             return []
-        places = np.union1d(list(self.known), few_columns(self._pass_index))
-        return self._columns(box, placements, places).missed(box, self.known, allowed)[0]
+        columns = self._columns(box, placements, np.unique(list(self.known)))
+        return columns.missed(box, self.known, allowed)[0]
 
     def _columns(self, box: JointBox, placements: Sequence[Placement], places: Array) -> Columns:
         passes = np.unique(self._pass_index[places.astype(int)])

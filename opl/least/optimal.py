@@ -67,8 +67,7 @@ class OptimalSearch:
             largest = fallback.path.joint_range_sum
             most = Travel(fallback.path.joint_travel, fallback.path.contact_travel)
         self._space = space = SearchSpace.of(problem, seams or seams_in(problem), largest)
-        self._walls, self._families = space.walls, space.families
-        self._sampler, self._rectangles = space.sampler, space.rectangles
+        self._walls, self._families, self._sampler = space.walls, space.families, space.sampler
         push_away = PushAway(problem.cell, settings.costs)
         tracks = TrackSearch(problem, self._sampler, settings.costs, most, push_away)
         self.motions = Motions(space, tracks, settings, fallback, largest)
@@ -145,7 +144,7 @@ class OptimalSearch:
             return
         elif not self._sampler.collisions:
             self._mind_collisions()
-        # costly: only where the search would end, as walls of other boxes may tell more before
+        # costly: only where the search would end
         elif self.proof.look_closer() or (
             self._given_up + 1 == MOST_GIVEN_UP and self.motions.look_about(box, placements)
         ):
@@ -162,9 +161,10 @@ class OptimalSearch:
             if self._in_vain >= MOST_IN_VAIN and not self._sampler.collisions:
                 self._mind_collisions()
                 return
+        most = CLEARLY_MISSED * self.proof.threshold
         if missed:
             self._add(missed)
-        elif not placements or not self._shut(box, placements):
+        elif not (placements and self.proof.clear(self._missed.shut(box, placements, most))):
             self.proof.split()
             return
         self.proof.show_soon()
@@ -185,7 +185,10 @@ class OptimalSearch:
             self._add([], barred)
             return True
         allowed = self._settings.missed(self.proof.threshold)
-        if again := self._missed.again(box, placements, allowed):
+        known, again = self._missed.first(box, placements, allowed)
+        if not missed and (self.proof.clear(known) or self.proof.split_keys(known)):
+            return True
+        if again and not known:
             self._add(again[:MOST_ADDED])
             return True
         columns, passages, inner = self._space.look(box, placements, self._settings)
@@ -214,11 +217,6 @@ class OptimalSearch:
             self._hope(larger)
         return larger
 
-    def _shut(self, box: JointBox, placements: Sequence[Placement]) -> bool:
-        """Look at walls that seem shut all over a box; return whether any part of one surely is."""
-        shut = self._missed.shut(box, placements, CLEARLY_MISSED * self.proof.threshold)
-        return self.proof.clear(shut)
-
     def _look_for_more(self, box: JointBox, placements: Sequence[Placement]) -> None:
         """Grow a box that is not settled until it holds all; look for a motion in it, if small."""
         threshold, larger = self.proof.threshold, self._grown(box, placements)
@@ -226,6 +224,8 @@ class OptimalSearch:
             return
         if self._work.left_for_unsettled(self.plan is not None):
             with self._work.early():
+                if self._missed.shut(larger, placements, CLEARLY_MISSED * threshold):
+                    return
                 columns, _, inner = self._space.look(larger, placements, self._settings)
                 if inner is not None:
                     self._hope(inner)
@@ -277,7 +277,7 @@ class OptimalSearch:
         self._work.begin_again(self.proof)
 
     def _add(self, places: list[float], chains: Sequence[Chain] = ()) -> None:
-        for wall in self._walls.walls(self._rectangles.take_in(chains[:MOST_ADDED])):
+        for wall in self._walls.walls(self._space.rectangles.take_in(chains[:MOST_ADDED])):
             self.proof.add(wall)
         for wall in self._walls.columns(places):
             self.proof.add(wall)

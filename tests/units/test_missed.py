@@ -27,12 +27,12 @@ def test_the_box_that_follows_is_held_against_what_was_missed_alone(missed, monk
 
     monkeypatch.setattr(sampler, "columns", counted)
     # one that is hardly larger misses hardly less of them, and of nothing else
-    again = missed.again(box.widened(-0.09 * box.size), columns.placements, 1e-4)
+    _, again = missed.first(box.widened(-0.09 * box.size), columns.placements, 1e-4)
     assert asked == [sorted(others)]
     assert 0 < len(again) <= len(others) and set(again) <= set(others)
     # one that holds all misses none of them, and nothing is looked at for the next
-    assert missed.again(box.widened(1e-3), columns.placements, 1e-4) == []
-    assert missed.again(small, columns.placements, 1e-4) == []
+    assert missed.first(box.widened(1e-3), columns.placements, 1e-4) == ([], [])
+    assert missed.first(small, columns.placements, 1e-4) == ([], [])
     assert len(asked) == 2
 
 
@@ -41,6 +41,9 @@ def test_what_is_a_wall_is_not_missed_again(missed):
     small = box.widened(-0.1 * box.size)
     _, others = missed.of(columns, small, 1e-4)
     missed.known.add(others[0])
-    assert others[0] not in missed.again(small, columns.placements, 1e-4)
+    known, again = missed.first(small, columns.placements, 1e-4)
+    assert known == others[:1] and others[0] not in again
+    # more is to be learnt of that first
+    assert missed.first(small, columns.placements, 1e-4) == (known, [])
     # nothing is shut where nothing was said to collide
     assert missed.shut(small, columns.placements, 1e-4) == []
