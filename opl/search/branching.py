@@ -10,7 +10,7 @@ from opl.geometry.frames import Array
 from opl.search.bounding import distances
 from opl.search.box import JointBox
 from opl.search.cells import END, FIRST, KEY, SOURCE, WALL, Cells
-from opl.search.hulls import missed, nearest_end
+from opl.search.hulls import nearest_point
 from opl.search.joint_limits import torn
 from opl.search.subproblems import Relaxation, Subproblem
 
@@ -121,18 +121,10 @@ def _halves(node: Subproblem, cells: Cells, wall: int) -> list[np.ndarray]:
 
 
 def _nearest(cells: Cells, spans: np.ndarray, found: Relaxation) -> tuple[float, float, float]:
-    """Return how far the hull of a wall is from a box in [rad], and where it is nearest.
-
-    Along the wall, and at which source: means over the points of the hull that it lies between. The
-    spans are those of the wall; without any it is infinitely far.
-    """
-    if not len(spans):
-        return np.inf, 0.0, 0.0
-    at = cells.table, cells.shifts, spans, found.low, found.high
-    point, place = np.zeros(12), np.zeros(2)
-    nearest_end(*at, point, place)
-    away, _ = missed(*at, np.empty(12), point, place)
-    return away, float(place[0]), float(place[1])
+    """Return what `nearest_point` does for spans of a wall and the box found."""
+    at: tuple[float, float, float]
+    at = nearest_point(cells.table, cells.shifts, spans, found.low, found.high)
+    return at
 
 
 def _between(starts: np.ndarray, place: float) -> int:

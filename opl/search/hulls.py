@@ -174,3 +174,21 @@ def missed(cells, shifts, spans, low, high, prices, point, place):  # type: igno
     point += left * points[0]
     place += left * places[0]
     return most, work
+
+
+@kernel(
+    "UniTuple(float64,3)(float64[:,::1],float64[:,::1],int64[:,::1],float64[::1],float64[::1])",
+    early=True,
+)
+def nearest_point(cells, shifts, spans, low, high):  # type: ignore[no-untyped-def]
+    """Return how far the hull of a wall is from a box in [rad], and where it is nearest.
+
+    Along the wall, and at which source: means over the points of the hull that it lies between.
+    What is given is as of `missed`; without spans it is infinitely far.
+    """
+    if len(spans) == 0:
+        return np.inf, 0.0, 0.0
+    point, place = np.zeros(12), np.zeros(2)
+    nearest_end(cells, shifts, spans, low, high, point, place)
+    away, _ = missed(cells, shifts, spans, low, high, np.empty(12), point, place)
+    return away, place[0], place[1]

@@ -251,7 +251,7 @@ class Families:
 
         Returns:
             The images, none if a pass has none left, and the worst cutter point of each pass, the
-            worst of all first.
+            worst of all first; of those it misses by less than a known one there is no need yet.
         """
         placements, missed = [], []
         for index, of_pass in enumerate(self._passes):
@@ -265,7 +265,7 @@ class Families:
             placements.append(best.placement)
             missing = np.where(there, -1.0, best.missing)
             worst = int(np.argmax(missing))
-            if missing[worst] > allowed:
+            if missing[worst] > max(allowed, best.missing[there].max(initial=0.0)):
                 missed.append((float(missing[worst]), float(columns[worst])))
         missed.sort(reverse=True)
         return placements, list(dict.fromkeys(place for _, place in missed))
