@@ -1,9 +1,11 @@
 """Places that boxes miss, held against the box that follows."""
 
+import numpy as np
 import pytest
 
 from opl.least.missed import Missed
-from tests.support.boxes import near_a_box
+from opl.search.in_box import missing_chords
+from tests.support.boxes import near_a_box, small_families
 from tests.support.planned import small_problem
 
 
@@ -47,3 +49,20 @@ def test_what_is_a_wall_is_not_missed_again(missed):
     assert missed.first(small, columns.placements, 1e-4) == (known, [])
     # nothing is shut where nothing was said to collide
     assert missed.shut(small, columns.placements, 1e-4) == []
+
+
+def test_a_cutter_point_is_missed_by_more_than_known_ones_or_need_not_be_taken():
+    box, _, columns = near_a_box()
+    families, _ = small_families()
+    small = box.widened(-0.1 * box.size)
+    worst = families.hold(small, {}, set(), 1e-4)[1]
+    pass_index = small_problem().points.pass_index
+    assert len(worst) == small_problem().points.n_passes == 2
+    assert families.hold(small, {}, set(worst), 1e-4)[1] == []
+    # of either pass for itself
+    assert families.hold(small, {}, {worst[0]}, 1e-4)[1] == worst[1:]
+    away = missing_chords(columns.q, columns.free, small)
+    away[pass_index != pass_index[int(worst[0])]] = np.inf
+    mild = float(columns.places[np.argmin(np.where(away > 1e-3, away, np.inf))])
+    assert mild != worst[0]
+    assert families.hold(small, {}, {mild}, 1e-4)[1] == worst
