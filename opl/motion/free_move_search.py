@@ -23,6 +23,9 @@ from opl.motion.straight_moves import StraightMoves
 MOST_CHECKED = 60_000  # configurations, of one search
 MOST_IN_VAIN = 4  # searches from one configuration before it is taken to be shut in
 MOST_LIKE = 4  # searches, by the nearest ends, that a move is held against before it is searched
+# a search that was in vain is begun anew, with other random numbers, when it has stood for so many
+# others beside it: what sampling finds is chance
+ANEW = (8, 64, 512)
 MOST_NAMED = 100  # refused moves whose first colliding pair is looked up
 # [rad] that a path may lead beyond both of its ends; less than half a turn of a wrist axis never
 # was seen to be too little, and the whole of its limits is much to search
@@ -56,6 +59,7 @@ class FreeMoveSearch:
         # what blocked it
         self._paths: list[Array] = []
         self._in_vain: list[tuple[Array, Array, Blocker]] = []
+        self._stood_for = Counter[int]()  # by their index: how many others were given up for them
 
     @cached_property
     def _moves(self) -> StraightMoves:
@@ -91,10 +95,14 @@ class FreeMoveSearch:
                 raise BlockedMoveError(near, end)
         path = self._like_a_known_one(start, goal)
         if path is None:
-            pair = self._shut_in(start) or self._shut_in(goal) or self._hopeless(start, goal)
+            pair, seed = self._shut_in(start) or self._shut_in(goal), 0
+            if pair is None and (like := self._like_one_in_vain(start, goal)) is not None:
+                self._stood_for[like] += 1
+                seed = self._stood_for[like]
+                pair = None if seed in ANEW else self._in_vain[like][2]
             if pair is not None:
                 raise BlockedMoveError(pair)
-            path = self._sample(start, goal)
+            path = self._sample(start, goal, seed)
             self._paths.append(path)
         return path[1:-1]
 
@@ -112,12 +120,12 @@ class FreeMoveSearch:
                 return fewest(np.concatenate([before, ways[k], after]), self.joined)
         return None
 
-    def _hopeless(self, start: Array, goal: Array) -> Blocker | None:
-        """Return what blocks a move, if its ends are joined to two that were searched in vain."""
+    def _like_one_in_vain(self, start: Array, goal: Array) -> int | None:
+        """Return which search was in vain between two ends that those of a move are joined to."""
         ends = [way for a, b, _ in self._in_vain for way in ((a, b), (b, a))]
         for k in _nearest(ends, start, goal):
             if self._beside(start, ends[k][0]) and self._beside(ends[k][1], goal):
-                return self._in_vain[k // 2][2]
+                return int(k) // 2
         return None
 
     def _beside(self, first: Array, second: Array) -> bool:
@@ -131,8 +139,11 @@ class FreeMoveSearch:
         ]
         return Counter(pairs).most_common(1)[0][0] if len(pairs) >= MOST_IN_VAIN else None
 
-    def _sample(self, start: Array, goal: Array) -> Array:
-        """Search a path in coordinates in which a metre is the farthest that a point can move."""
+    def _sample(self, start: Array, goal: Array, seed: int) -> Array:
+        """Search a path in coordinates in which a metre is the farthest that a point can move.
+
+        With random numbers of a seed; one that is not 0 begins what was in vain anew.
+        """
         from opl.motion.sampling import sample_path  # with OMPL, which most jobs do without
 
         robot, moves = self.cell.robot, self._moves
@@ -147,6 +158,7 @@ class FreeMoveSearch:
             high * scale,
             lambda a, b: moves.free(a / scale, b / scale),
             lambda: moves.checked >= end,
+            seed,
         )
         if found.path is not None:
             return np.concatenate([start[None], found.path[1:-1] / scale, goal[None]])
@@ -155,7 +167,8 @@ class FreeMoveSearch:
         met = Counter(pair for pair in pairs if pair is not None)
         limits = " ".join(self.cell.broken_limits(refused[:, 1]))
         pair: Blocker = met.most_common(1)[0][0] if met else (f"limits of {limits}",)
-        self._in_vain.append((start, goal, pair))
+        if not seed:
+            self._in_vain.append((start, goal, pair))
         raise BlockedMoveError(pair)
 
 

@@ -76,6 +76,7 @@ def sample_path(
     high: Array,
     free: Callable[[Array, Array], bool],
     give_up: Callable[[], bool],
+    seed: int = 0,
 ) -> Sampled:
     """Search a path between two places in a box of free and other places.
 
@@ -87,9 +88,10 @@ def sample_path(
         free: Whether the straight move between two places is free.
         give_up: Called again and again; whether to end the search, and no more to shorten a path
             that was found; must not look at a clock.
+        seed: Other random numbers are drawn with another.
     """
     util.setLogLevel(util.LogLevel.LOG_NONE)
-    util.RNG.setSeed(SEED)
+    util.RNG.setSeed(SEED + seed)
     space = base.RealVectorStateSpace(len(start))
     bounds = base.RealVectorBounds(len(start))
     for k, (lowest, highest) in enumerate(zip(low.tolist(), high.tolist(), strict=True)):

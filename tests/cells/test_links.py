@@ -13,7 +13,8 @@ from opl.cell.part_tree import part_tree
 from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import pose, transform
 from opl.geometry.shapes import Body, Box
-from opl.motion.free_move_search import BlockedMoveError, FreeMoveSearch
+from opl.motion import sampling
+from opl.motion.free_move_search import ANEW, BlockedMoveError, FreeMoveSearch
 from opl.motion.joint_lines import RESOLUTION, densify
 from opl.motion.sampling import fewest, sample_path
 from opl.motion.straight_moves import StraightMoves
@@ -197,6 +198,30 @@ def test_what_is_joined_to_an_end_sought_in_vain_is_not_sought_again(monkeypatch
         with pytest.raises(BlockedMoveError) as second:
             search.find(*ends)
         assert second.value.pair == first.value.pair
+
+
+def test_what_was_in_vain_is_begun_anew_once_it_stood_for_many(monkeypatch):
+    search, seeds = search_in(blocked_cell()), []
+    sample_path = sampling.sample_path
+
+    def unlucky(*arguments):
+        seeds.append(arguments[-1])
+        no_path = sampling.Sampled(None, np.stack([arguments[:2]]))
+        return sample_path(*arguments) if arguments[-1] == ANEW[1] else no_path
+
+    monkeypatch.setattr(sampling, "sample_path", unlucky)
+    for k in range(1 + ANEW[1]):
+        near = AWAY + np.deg2rad([0.01 * k, 0.0, 0.0, 0.0, 0.0, 0.0])
+        if k < ANEW[1]:
+            with pytest.raises(BlockedMoveError):
+                search.find(HOME, near)
+            continue
+        via = search.find(HOME, near)
+    assert seeds == [0, *ANEW[:2]]
+    assert margin_along(blocked_cell(), np.stack([HOME, *via, near])) > 0.0
+    # and serves those beside it
+    assert len(search.find(HOME, AWAY)) >= 1
+    assert len(seeds) == 3
 
 
 def test_a_path_is_led_on_from_one_that_is_known(monkeypatch):
