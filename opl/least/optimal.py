@@ -144,7 +144,7 @@ class OptimalSearch:
             return
         elif not self._sampler.collisions:
             self._mind_collisions()
-        # costly: only where the search would end
+        # costly: only where the search would end, as walls of other boxes may tell more before
         elif self.proof.look_closer() or (
             self._given_up + 1 == MOST_GIVEN_UP and self.motions.look_about(box, placements)
         ):

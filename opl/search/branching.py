@@ -122,9 +122,9 @@ def _halves(node: Subproblem, cells: Cells, wall: int) -> list[np.ndarray]:
 
 def _nearest(cells: Cells, spans: np.ndarray, found: Relaxation) -> tuple[float, float, float]:
     """Return what `nearest_point` does for spans of a wall and the box found."""
-    at: tuple[float, float, float]
-    at = nearest_point(cells.table, cells.shifts, spans, found.low, found.high)
-    return at
+    at = cells.table, cells.shifts, spans, found.low, found.high
+    away, place, source = nearest_point(*at)
+    return away, place, source
 
 
 def _between(starts: np.ndarray, place: float) -> int:
