@@ -20,6 +20,8 @@ from opl.planning.settings import Interpolation
 from opl.planning.turned import blocks_of
 from opl.search.ladder import Ladder
 
+CLOSE = 1e-3  # [m] between places: what is shut at both is shut between them, as far as seen
+
 
 @dataclass(frozen=True)
 class GrindingProblem:
@@ -52,18 +54,34 @@ class GrindingProblem:
         return self.scene.cell
 
     @cached_property
+    def shut(self) -> np.ndarray:
+        """Between which cutter points the part cuts in all the way, as far as seen, (N - 1, M).
+
+        On one contact position of the field. On a flat between two walls the wheel fits in at one
+        contact position after the other, at none at two cutter points: so places between are looked
+        at until they are close together.
+        """
+        shut = self.cuts[:-1] & self.cuts[1:] & ~self.off_wheel[:, None]
+        length, parts = np.abs(np.diff(self.points.arc_length)), 1
+        while len(edges := np.flatnonzero(shut.any(axis=1) & (length > parts * CLOSE))):
+            parts *= 2
+            t = np.broadcast_to(self.field.contact_positions, (len(edges), shut.shape[1]))
+            for share in np.arange(1, parts, 2) / parts:
+                between = self.points.at_places(edges + share)
+                shut[edges] = nearer_nodes(self.scene, between, t, shut[edges])
+        return np.asarray(shut)
+
+    @cached_property
     def sides(self) -> np.ndarray | None:
         """Between which shut contact positions nodes lie, as `Ladder.sides`, (N - 1, 2, M).
 
-        A motion does not pass a contact position at which the part cuts into the wheel at two
-        neighbouring cutter points on its way between the two. None where nothing is shut.
+        None where nothing is shut.
         """
         if self.known_sides is not None:
             return self.known_sides
-        shut = self.cuts[:-1] & self.cuts[1:]
-        if not shut.any():
+        if not self.shut.any():
             return None
-        below = np.cumsum(shut, axis=1, dtype=np.int16)
+        below = np.cumsum(self.shut, axis=1, dtype=np.int16)
         return np.stack([below, below], axis=1)
 
     def sides_at(self, places: Array, t: Array) -> np.ndarray | None:
@@ -95,8 +113,9 @@ class GrindingProblem:
     ) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m).
 
-        Where all nodes of the field around a place and contact position agree, so does what lies
-        between them: a motion that is not free for all that is refused when it is checked.
+        Where all nodes of the field around a place and contact position are free, so is what lies
+        between them: a motion that is not free for all that is refused when it is checked. Where
+        all of them cut in, so does what lies between them if the ways from place to place are shut.
 
         Args:
             places: Fractional cutter points, shape (n,).
@@ -106,11 +125,14 @@ class GrindingProblem:
         """
         field, cuts = self.field.contact_positions, self.cuts
         after = np.clip(np.searchsorted(field, t), 1, len(field) - 1)
+        before = np.floor(places).astype(int)[:, None]
         near = np.zeros(t.shape, dtype=int)
-        for column in (np.floor(places).astype(int), np.ceil(places).astype(int)):
-            near += cuts[column[:, None], after - 1].astype(int) + cuts[column[:, None], after]
-        unsure = ((near > 0) | doubted) & (near < 4)
-        return np.asarray(nearer_nodes(self.scene, points, t, unsure) | (near == 4))
+        for column in (before, np.ceil(places).astype(int)[:, None]):
+            near += cuts[column, after - 1].astype(int) + cuts[column, after]
+        on_way, shut = (places % 1.0 > 0.0)[:, None], np.pad(self.shut, ((0, 1), (0, 0)))
+        cut = (near == 4) & (~on_way | (shut[before, after - 1] & shut[before, after]))
+        unsure = ((near > 0) | doubted) & ~cut
+        return np.asarray(nearer_nodes(self.scene, points, t, unsure) | cut)
 
     def solutions(self, columns: np.ndarray) -> Array:
         """Solve all IK branches at some cutter points, at the contact positions of the field.

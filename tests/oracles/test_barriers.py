@@ -16,6 +16,7 @@ from opl.search.walls import Line, Piece
 from opl.walls.barriers import all_sides, barriers
 from opl.walls.cut_cells import cells_of, rows_of
 from opl.walls.sides import ANY_SIDE, Barrier, sides_of
+from tests.support.jobs import write_trough
 from tests.support.planned import problem_of, small_problem
 
 
@@ -81,6 +82,28 @@ def test_what_is_left_out_of_a_column_is_too_deep_in_the_wheel(tmp_path):
             part, cell.wheel, cell.wheel.T_contact0_contact(some) @ inverse(T), 0.0
         )
         assert (distance < -cell.planned_penetration).all()
+
+
+@pytest.mark.parametrize("depth_mm", [1.5, 5.0])
+def test_a_wheel_that_fits_between_two_walls_comes_from_one_to_the_other(tmp_path, depth_mm):
+    # 5 mm of room on either side of the wheel, and cutter points 16 mm apart
+    job = load_job(write_trough(tmp_path, width_mm=60.0, depth_mm=depth_mm))
+    problem = problem_of(job)
+    both = problem.cuts[:-1] & problem.cuts[1:]
+    assert both.any(axis=1).all() and problem.shut.any() and not problem.shut[both].all()
+    assert not problem.shut[~both].any()
+    points, t = problem.points, np.linspace(-25.0, 25.0, 501)
+    room = 5.0 + 1e3 * job.cell.planned_penetration
+    for place in np.linspace(0.0, len(points) - 1, 31):
+        at = np.array([place])
+        cuts = problem.cuts_at(at, points.at_places(at), t[None])[0]
+        # how far the middle of the wheel is from that of the trough
+        along = np.interp(place, np.arange(len(points)), 1e3 * points.arc_length)
+        off = np.abs(24.0 - along - t)
+        assert not cuts[off < room - 0.05].any()
+        assert cuts[off > room + 0.05].all()
+    plan = search_path(job.search, problem).plan
+    assert plan.path.joint_range_sum < 0.02
 
 
 def test_a_part_that_touches_the_wheel_everywhere_has_no_barrier():
