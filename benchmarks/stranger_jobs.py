@@ -8,6 +8,7 @@ as the YAML, JSON, STEP and STL files of a user; `opl run` takes them.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -58,7 +59,12 @@ class _Placed:
 
 
 def draw_job(
-    seed: int, index: int, attempt: int, folder: Path, objective: str = "range"
+    seed: int,
+    index: int,
+    attempt: int,
+    folder: Path,
+    objective: str = "range",
+    families: Sequence[str] = tuple(FAMILIES),
 ) -> Stranger | None:
     """Draw a job and write its files.
 
@@ -68,6 +74,7 @@ def draw_job(
         attempt: Which draw of it; each is another.
         folder: Where its files are written, empty.
         objective: What the search keeps small.
+        families: Of parts, one of which is drawn.
 
     Returns:
         The job; None if the arm did not reach the part however both were placed.
@@ -77,9 +84,9 @@ def draw_job(
     robot = opl.load_robot(name)
     size = np.round(random.uniform(60.0, 200.0)), np.round(random.uniform(12.0, 60.0))
     roll = float(random.choice([0.0, *random.uniform(10.0, 60.0, 5)]).round())
-    family = str(random.choice(list(FAMILIES)))
-    part = draw_part(family, random, size[0])
-    across = family == "box" or random.random() < 0.7
+    family = str(random.choice(list(families)))
+    part = draw_part(family, random, size)
+    across = family == "box" or part.walls is not None or random.random() < 0.7
     normal = np.array([1.0, 0.0, 0.0] if across else [0.0, 1.0, 0.0])
     if not across and random.random() < 0.5:
         angle = random.uniform(0.0, np.pi)

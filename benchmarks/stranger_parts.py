@@ -20,6 +20,8 @@ from scipy.interpolate import BSpline, make_interp_spline
 SAMPLES = (13, 25)  # of a surface, along a and b
 FACETS = (32, 96)  # of a solid
 DEPTH = 20.0  # [mm] of a solid below the lowest place of its surface
+UPRIGHT = 0.01  # [mm] that a wall leans outwards
+THICKNESS = 12.0  # [mm] of walls
 
 Array = NDArray[np.float64]
 Function = Callable[[Array, Array], Array]
@@ -36,6 +38,8 @@ class Part:
         thickness: Of a thin part, whose underside follows the surface, in [mm]; else None: the
             underside is flat.
         fillet: Radius of the edges of a box in [mm], which is written as STEP; else None.
+        walls: Of a floor between walls, how high they are at its beginning and its end, and how far
+            beyond the surface that is ground, in [mm]; else None.
     """
 
     family: str
@@ -43,6 +47,7 @@ class Part:
     half: tuple[float, float]
     thickness: float | None = None
     fillet: float | None = None
+    walls: tuple[float, float, float] | None = None
 
     def frames(self, normal: Array, count: tuple[int, int]) -> Array:
         """Return cutter frames on a grid of the surface, shape (n, 4, 4), origins in [m].
@@ -78,6 +83,8 @@ class Part:
             "weights": np.ones(net.shape[:2]).tolist(),
         }
         (folder / "surface.json").write_text(json.dumps(surface) + "\n", encoding="utf-8")
+        if self.walls is not None:
+            sheet = _between_walls(self.at, self.half[1], *self.walls)
         solid(sheet, self.thickness).export(folder / "part.stl")
         return "surface.json"
 
@@ -121,6 +128,22 @@ def solid(sheet: Array, thickness: float | None) -> trimesh.Trimesh:
     assert (bottom.ravel()[ring] == low).all()
     corners = np.concatenate([sheet.reshape(-1, 3), below.reshape(-1, 3)])
     return trimesh.Trimesh(corners, np.concatenate(faces), process=False)
+
+
+def _between_walls(at: Function, half: float, first: float, last: float, room: float) -> Array:
+    """Return a sheet over a floor and the walls at its ends, as high as told; 0 for none."""
+    fine_a, fine_b = (np.linspace(-1.0, 1.0, n + 1) for n in FACETS)
+    edge = 1.0 + room / half
+    floor = at(*np.meshgrid(fine_a, edge * fine_b, indexing="ij"))
+    sheet = [floor]
+    for height, end, outward in ((first, 0, -1.0), (last, -1, 1.0)):
+        if height == 0.0:
+            continue
+        steps = [(UPRIGHT, height), (THICKNESS, height)]
+        wall = [floor[:, end] + np.array([0.0, outward * y, z]) for y, z in steps]
+        wall = wall[::-1] if end == 0 else wall
+        sheet.insert(len(sheet) if end else 0, np.stack(wall, axis=1))
+    return np.concatenate(sheet, axis=1)
 
 
 def _write_box(folder: Path, part: Part) -> None:
@@ -181,11 +204,13 @@ def _graph(z: Function, half: tuple[float, float]) -> Function:
     return at
 
 
-def draw_part(family: str, random: np.random.Generator, wheel_radius: float) -> Part:
-    """Draw a part of a family; hollow ones can be ground by a wheel of a radius in [mm]."""
+def draw_part(family: str, random: np.random.Generator, wheel: tuple[float, float]) -> Part:
+    """Draw a part of a family that a wheel of a radius and width in [mm] may grind."""
     half = _between(random, 8.0, 30.0), _between(random, 20.0, 70.0)
     height = _between(random, 30.0, 80.0)
-    return FAMILIES[family](random, half, height, wheel_radius)
+    if family in WALLED:
+        return WALLED[family](random, half, height, wheel[1])
+    return FAMILIES[family](random, half, height, wheel[0])
 
 
 def _torus(random: np.random.Generator, half: tuple[float, float], height: float, _: float) -> Part:
@@ -337,6 +362,40 @@ def _box(random: np.random.Generator, half: tuple[float, float], height: float, 
     return Part("filleted box", at, half, fillet=fillet)
 
 
+def _channel(
+    random: np.random.Generator, half: tuple[float, float], height: float, width: float
+) -> Part:
+    """A floor between two walls, with room for the wheel and little more."""
+    inner = 0.5 * width + _between(random, 0.5, 12.0)
+    ground = _between(random, 0.6, 0.97) * inner
+    return _floor("channel", random, (half[0], ground), height, (1.0, 1.0), inner - ground)
+
+
+def _step(random: np.random.Generator, half: tuple[float, float], height: float, _: float) -> Part:
+    """A floor with a wall at its end."""
+    room = _between(random, 0.5, 15.0)
+    return _floor("step", random, half, height, (0.0, 1.0), room)
+
+
+def _floor(
+    family: str,
+    random: np.random.Generator,
+    half: tuple[float, float],
+    height: float,
+    walls: tuple[float, float],
+    room: float,
+) -> Part:
+    """Draw how a floor bends along the rows and across, and how high its walls are."""
+    along, across = (
+        float(random.choice([0.0, 1.0 / _between(random, 150.0, 900.0)])) for _ in range(2)
+    )
+    first, last = (wall * _between(random, 1.0, 25.0) for wall in walls)
+    at = _graph(lambda x, y: height - 0.5 * (along * y**2 + across * x**2), half)
+    return Part(family, at, half, walls=(first, last, room))
+
+
+# whose solid rises beside the surface that is ground
+WALLED: dict[str, Callable[..., Part]] = {"channel": _channel, "step": _step}
 FAMILIES: dict[str, Callable[..., Part]] = {
     "torus": _torus,
     "sphere": _sphere,

@@ -117,8 +117,11 @@ def revision() -> str:
     ).stdout.strip()  # fmt: skip
 
 
-def page(seed: int, outcomes: Sequence[Outcome], objective: str = "range") -> str:
-    """Return the results of a seed and an objective as a page of Markdown."""
+def page(seed: int, outcomes: Sequence[Outcome], objective: str = "range", chosen: str = "") -> str:
+    """Return the results of a seed and an objective as a page of Markdown.
+
+    `chosen` are the options beside the seed that draw the same jobs.
+    """
     searched = [one for one in outcomes if one.status in SEARCHED]
     closed = [one for one in searched if one.closed]
     quick = [one for one in closed if one.search_s <= QUICK]
@@ -126,7 +129,6 @@ def page(seed: int, outcomes: Sequence[Outcome], objective: str = "range") -> st
     unproven = [one for one in searched if one.bound is None]
     gaps = [100.0 * one.gap for one in searched if one.gap is not None]
     half, most = np.quantile(gaps, (0.5, 0.95)).tolist() if gaps else (np.nan, np.nan)
-    chosen = "" if objective == "range" else f" --objective {objective}"
     again = Counter(one.status for one in outcomes if one.status not in SEARCHED)
     slowest = max((one.search_s for one in outcomes), default=0.0)
     versions = ", ".join(f"{name} {version(name)}" for name in LIBRARIES)

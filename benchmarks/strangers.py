@@ -5,7 +5,8 @@ path, or to its program with --whole, in a process that is ended when it takes t
 side by side as --workers says, which share the cores. A job that is refused before its search, or
 has no path, counts with its cause and is drawn again, until as many as asked for were searched. The
 same seed draws the same jobs, which --cases picks from: `--cases 3.0 17.2`; they are searched for
-the least of --objective. With --write the table goes into STRANGERS.md.
+the least of --objective. Parts are of all --families but those between walls, unless it names some.
+With --write the table goes into STRANGERS.md.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ import numpy as np
 
 import opl
 from benchmarks.stranger_jobs import Stranger, draw_job
+from benchmarks.stranger_parts import FAMILIES, WALLED
 from benchmarks.stranger_table import HEAD, SEARCHED, UNITS, Outcome, page, row
 from opl.files.kernels import use_threads
 from opl.geometry.frames import Array
@@ -178,6 +180,7 @@ def run_strangers(
     done: Callable[[Outcome], None],
     begin: Callable[[], None] | None = None,
     objective: str = "range",
+    families: Sequence[str] = tuple(FAMILIES),
 ) -> None:
     """Draw jobs and run them side by side.
 
@@ -190,6 +193,7 @@ def run_strangers(
         done: Called with each draw as it ends, never twice at once.
         begin: Called in each worker before any job, if given.
         objective: What the searches keep small.
+        families: Of the parts.
     """
     idle: SimpleQueue[Worker] = SimpleQueue()
     for _ in range(workers):
@@ -202,7 +206,7 @@ def run_strangers(
             own = folder / f"{seed}_{index}_{attempt}"
             shutil.rmtree(own, ignore_errors=True)
             own.mkdir(parents=True)
-            drawn = draw_job(seed, index, attempt, own, objective)
+            drawn = draw_job(seed, index, attempt, own, objective, families)
             outcome = _outcome(index, attempt, drawn, worker)
             if drawn is None:
                 own.rmdir()
@@ -234,6 +238,10 @@ def main() -> None:
     parser.add_argument("--cases", nargs="+", help="draws to be run alone, such as 3.0")
     parser.add_argument("--workers", type=int, default=1, help="jobs run at once")
     parser.add_argument("--objective", choices=UNITS, default="range", help="kept small")
+    parser.add_argument(
+        "--families", nargs="+", choices=[*FAMILIES, *WALLED], default=list(FAMILIES),
+        help="of parts that are drawn from",
+    )  # fmt: skip
     parser.add_argument("--folder", type=Path, default=Path("strangers"), help="of the jobs")
     parser.add_argument("--whole", action="store_true", help="replay, program and files as well")
     parser.add_argument("--write", action="store_true", help=f"the table into {TABLE.name}")
@@ -254,14 +262,16 @@ def main() -> None:
     if arguments.cases:
         pairs = [case.split(".") for case in arguments.cases]
         draws = [[(int(index), int(attempt))] for index, attempt in pairs]
-    objective = arguments.objective
-    run_strangers(
-        seed, draws, folder, arguments.workers, arguments.whole, done, objective=objective
-    )
+    objective, families = arguments.objective, arguments.families
+    given = seed, draws, folder, arguments.workers, arguments.whole, done
+    run_strangers(*given, objective=objective, families=families)
     # what earlier runs of the same seed found counts too, the last of each draw
     lines = log.read_text(encoding="utf-8").splitlines()
     known = {(one.index, one.attempt): one for one in (Outcome(**json.loads(x)) for x in lines)}
-    text = page(seed, [known[key] for key in sorted(known)], arguments.objective)
+    chosen = "" if objective == "range" else f" --objective {objective}"
+    if families != list(FAMILIES):
+        chosen += f" --families {' '.join(families)}"
+    text = page(seed, [known[key] for key in sorted(known)], objective, chosen)
     for path in [folder / f"{name}.md", *([TABLE] if arguments.write else [])]:
         path.write_text(text, encoding="utf-8")
     print(text.split("\n")[4])

@@ -125,8 +125,8 @@ def line(name: str, lines: int, outcomes: Mapping[Draw, Outcome], among: set[Dra
     return "| " + " | ".join(map(str, cells)) + " |"
 
 
-def page(seed: int, found: Mapping[str, Mapping[Draw, Outcome]]) -> str:
-    """Return the table as a page of Markdown; what was found with everything comes first."""
+def page(seed: int, measured: str, found: Mapping[str, Mapping[Draw, Outcome]]) -> str:
+    """Return the table of a revision as Markdown; what was found with everything comes first."""
     everything, *others = found
     among = {key for key, one in found[everything].items() if one.closed}
     count = 1 + max(index for index, _ in found[everything])
@@ -135,7 +135,7 @@ def page(seed: int, found: Mapping[str, Mapping[Draw, Outcome]]) -> str:
             f"# The proof without one of its parts, seed {seed}",
             "",
             f"Written by `python -m benchmarks.without --seed {seed} --count {count}`, opl "
-            f"{opl.__version__} at {revision()}. Of the {len(among)} random jobs that are closed "
+            f"{opl.__version__} at {measured}. Of the {len(among)} random jobs that are closed "
             "with everything: how many still are without a part, how many of the others have no "
             f"motion at all (or took more than {LONGEST:g} s), the largest gap of the rest, and "
             "the processor time of "
@@ -165,6 +165,7 @@ def main() -> None:
         [(index, attempt) for attempt in range(MOST_DRAWS)] for index in range(arguments.count)
     ]
     found: dict[str, dict[Draw, Outcome]] = {}
+    measured = revision()  # before the table is written anew
     for name in ("nothing left out", *PARTS):
         outcomes = found[name] = {}
 
@@ -177,7 +178,7 @@ def main() -> None:
         if name not in PARTS:  # the others search the same draws
             draws = [[key] for key, one in sorted(outcomes.items()) if one.status in SEARCHED]
         print(name, sum(one.closed for one in outcomes.values()), flush=True)
-        TABLE.write_text(page(arguments.seed, found), encoding="utf-8")
+        TABLE.write_text(page(arguments.seed, measured, found), encoding="utf-8")
 
 
 if __name__ == "__main__":

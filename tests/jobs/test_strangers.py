@@ -6,15 +6,15 @@ import trimesh
 
 import opl
 from benchmarks.stranger_jobs import draw_job
-from benchmarks.stranger_parts import FAMILIES, draw_part
+from benchmarks.stranger_parts import FAMILIES, WALLED, draw_part
 from opl.geometry.mesh import load_mesh
 from opl.run.searches import search_path
 from tests.support.planned import problem_of
 
 
-@pytest.mark.parametrize("family", list(FAMILIES))
+@pytest.mark.parametrize("family", [*FAMILIES, *WALLED])
 def test_a_drawn_surface_lies_on_its_closed_solid(family, tmp_path):
-    part = draw_part(family, np.random.default_rng(5), 120.0)
+    part = draw_part(family, np.random.default_rng(5), (120.0, 40.0))
     part.write(tmp_path)
     mesh = load_mesh(tmp_path / "part.stl", "mm")  # refused unless closed and free of crossings
     corners = 1e3 * mesh.vertices[mesh.faces]
