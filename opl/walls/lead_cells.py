@@ -52,6 +52,7 @@ class LeadCells:
         high: Greatest; those of no width are looked at where they are.
         collision: In which a lead collides.
         begun: In which it does not, links and all that stands still, where a free move may begin.
+        spare: Depth in the wheel that a lead leaves of what is allowed, in [m].
         seen: What was seen of these contact positions before, whatever the posture; grows.
     """
 
@@ -64,9 +65,10 @@ class LeadCells:
         high: Array,
         collision: CollisionScene,
         begun: CollisionScene,
+        spare: float,
         seen: dict[bytes, Seen] | None = None,
     ) -> None:
-        self._collision, self._begun = collision, begun
+        self._collision, self._begun, self._spare = collision, begun, spare
         self._cell, self._scene = problem.cell, problem.scene
         self._family, self._flip = family, flip
         self._low, self._high = low, high
@@ -163,7 +165,8 @@ class LeadCells:
     @property
     def _distances(self) -> tuple[float, float]:
         """Nearer to the wheel than these in [m] the part is too deep, or no free move may begin."""
-        return -self._cell.planned_penetration, self._cell.part_from_wheel + WHERE_BEGUN
+        deep = self._spare - self._cell.planned_penetration
+        return deep, self._cell.part_from_wheel + WHERE_BEGUN
 
     def _beside_wheel(
         self, Ts_workpiece_cutter: Array, asked: np.ndarray

@@ -25,6 +25,8 @@ CELLS_OF_WORK = 15  # enclosed along a lead, that cost a unit of work
 NODES_OF_WORK = 100  # looked at along a lead, likewise
 PARTS, ROUNDS = 8, 3  # into which the way between two contact positions is cut, how often
 RESERVE = 3e-4  # [m] of clearance: a motion may come nearer between two samples than at both
+# of it in depth: between two configurations of a lead the part sinks a few micrometres deeper
+SPARE = 0.1
 # places of the part that each lead goes through as if they were ground, shape (k, 4, 4)
 Leads = tuple[Array, ...]
 
@@ -46,7 +48,7 @@ class ShutLeads:
         self._scenes: dict[float, tuple[CollisionScene, CollisionScene]] = {}  # by the reserve
         self._leads: dict[bytes, list[Leads]] = {}  # by the place
         self._known: dict[tuple[bytes, int, int, float], tuple[bool, Array]] = {}
-        self._over_field: dict[bytes, Seen] = {}  # by places of a lead
+        self._over_field: dict[float, dict[bytes, Seen]] = {}  # by the reserve and places of a lead
         points = problem.points
         for index in range(points.n_passes):
             own = np.flatnonzero(points.pass_index == index)
@@ -103,7 +105,8 @@ class ShutLeads:
     def _where_shut(self, T: Array, family: int, flip: int, reserve: float) -> tuple[bool, Array]:
         """Return whether leads are shut at the least contact position, and where that changes."""
         t = self._problem.field.contact_positions
-        shut = self._shut(T, family, flip, t, t, reserve, self._over_field)
+        seen = self._over_field.setdefault(reserve, {})
+        shut = self._shut(T, family, flip, t, t, reserve, seen)
         before = np.flatnonzero(shut[1:] != shut[:-1])
         low, high = t[before], t[before + 1]
         for _ in range(ROUNDS if len(before) else 0):
@@ -139,7 +142,8 @@ class ShutLeads:
             left = np.flatnonzero(~shut)
             for lead in leads:
                 scenes, posture = self._scenes[reserve], (family, self._flips[flip])
-                cells = LeadCells(self._problem, *posture, low, high, *scenes, seen)
+                given = *posture, low, high, *scenes, SPARE * reserve
+                cells = LeadCells(self._problem, *given, seen)
                 self.work += len(left) / (CELLS_OF_WORK if (low < high).any() else NODES_OF_WORK)
                 left = left[cells.shut(T, lead, left)]
             shut[left] = True

@@ -62,6 +62,14 @@ def test_passes_end_where_leads_leave_the_clearance_and_hardly_more(tmp_path):
     assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)
 
 
+def test_leads_that_sink_between_their_configurations_are_not_tried_one_by_one(tmp_path):
+    """A channel that is bowed: its leads run along a wall, as deep in the belt as is allowed."""
+    draw_job(20262601, 38, 0, tmp_path, families=["channel", "step"])
+    job = opl.load_job(tmp_path / "job.yaml")
+    plan = search_path(job.search, problem_of(job)).plan
+    assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)
+
+
 @pytest.mark.parametrize(
     ("seed", "index", "attempt"),
     [
