@@ -102,7 +102,7 @@ class BoxTracks:
                 break
             if (sunk > DEEP).any() and learn(places_for(places, np.where(sunk > DEEP, sunk, 0.0))):
                 return None
-            spare = spare_for(sampled.spare, sunk)
+            spare = spare_for(places, sampled.spare, sunk)
             # where the box holds no posture that leaves so much, the nearest that does
             columns = self._search.sampler.columns(box, columns.placements, places, spare)
             larger = grown(columns.q, columns.free, box)

@@ -31,6 +31,7 @@ USELESS = 0.5  # of what was too deep: where so much still is, sparing depth is 
 MORE = 1.25  # times what was too deep: what is spared for it
 HARDLY = 1e-6  # [m] too deep: what can be spared nearly anywhere
 NEAR, SHUT = 0.25, 1e-4  # cutter points, and [m] too deep: what so near places is shut
+BESIDE = 0.1  # cutter points: places so near are as deep
 DEEP = 2e-5  # [m] too deep: what had better not be spared where places help
 
 
@@ -151,15 +152,23 @@ def shallower(sunk: Array, before: Array | None) -> bool:
     return before is None or not ((before > 0.0) & (sunk > USELESS * before)).any()
 
 
-def spare_for(spare: Array, sunk: Array) -> Array:
+def spare_for(places: Array, spare: Array, sunk: Array) -> Array:
     """Return what columns leave of the depth allowed, (n,), after what was spared was too little.
 
+    Where places are close together, those beside leave as much: else the motion sinks there next.
+
     Args:
+        places: Fractional cutter points of the columns, shape (n,).
         spare: What they left in [m], shape (n,).
         sunk: As of `sunk_between`.
     """
     here = np.maximum(np.append(sunk, 0.0), np.append(0.0, sunk))
-    return np.asarray(spare + np.where(here > 0.0, np.maximum(MORE * here, HARDLY), 0.0))
+    more = np.where(here > 0.0, np.maximum(MORE * here, HARDLY), 0.0)
+    around = more.copy()
+    for column in np.flatnonzero(more).tolist():
+        first, end = np.searchsorted(places, places[column] + np.array([-BESIDE, BESIDE]))
+        around[first:end] = np.maximum(around[first:end], more[column])
+    return np.asarray(spare + around)
 
 
 def places_for(places: Array, sunk: Array) -> Sequence[Bulge]:

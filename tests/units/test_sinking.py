@@ -88,12 +88,15 @@ def test_bodies_are_struck_between_two_columns_not_at_them_and_not_off_the_wheel
 
 def test_depth_is_spared_at_both_ends_and_where_it_is_of_no_use_places_are_taken_in():
     sunk = np.array([0.0, 4e-6, 0.0, 0.0])
-    spare = spare_for(np.zeros(5), sunk)
+    places = np.array([0.0, 1.0, 1.5, 2.0, 3.0])
+    spare = spare_for(places, np.zeros(5), sunk)
     np.testing.assert_allclose(spare, [0.0, 5e-6, 5e-6, 0.0, 0.0])
+    # places beside, close together, would be next
+    close = np.array([0.94, 1.0, 1.01, 1.08, 1.2])
+    np.testing.assert_allclose(spare_for(close, spare, sunk), 5e-6 * np.array([1, 2, 2, 1, 0]))
     assert shallower(sunk, None)
     assert shallower(np.array([3e-6, 1e-6, 0.0, 0.0]), sunk)
     assert not shallower(np.array([0.0, 4e-6, 0.0, 0.0]), sunk)
-    places = np.array([0.0, 1.0, 1.5, 2.0, 3.0])
     assert [(one.first, one.last, one.parts) for one in places_for(places, sunk)] == [(1.0, 1.5, 2)]
     assert not places_for(np.array([0.0, 1.0, 1.001, 2.0, 3.0]), sunk)
 
@@ -105,7 +108,7 @@ def test_what_sinks_deeper_is_cut_into_more_parts_and_what_hardly_does_is_spared
     struck = np.array([False, True, False, True])
     told = [(one.first, one.last, one.parts) for one in places_between(places, struck)]
     assert told == [(1.0, 2.0, 2), (3.0, 4.0, 2)]
-    spare = spare_for(np.zeros(5), sunk[:1].repeat(4) * [1, 0, 0, 0])
+    spare = spare_for(places, np.zeros(5), sunk[:1].repeat(4) * [1, 0, 0, 0])
     np.testing.assert_allclose(spare, [HARDLY, HARDLY, 0.0, 0.0, 0.0])
 
 
@@ -171,7 +174,7 @@ def test_where_a_box_leaves_no_depth_to_spare_tracks_are_sought_in_the_next_that
     edge, needed = 29, 402.5e-6  # of depth, more than there is near the box at both its places
     sunk = np.zeros(len(problem.points) - 1)
     sunk[edge] = needed / MORE
-    spare = spare_for(np.zeros(len(columns.places)), sunk)
+    spare = spare_for(columns.places, np.zeros(len(columns.places)), sunk)
     assert not sampler.spared(columns, spare).free[edge].any()
     checked = []
 
