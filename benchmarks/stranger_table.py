@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import opl
+from benchmarks.stranger_parts import FAMILIES
 from opl.planning.plan import AT_REST
 
 CLOSED = 0.002  # gap that counts as closed
@@ -117,11 +118,16 @@ def revision() -> str:
     ).stdout.strip()  # fmt: skip
 
 
-def page(seed: int, outcomes: Sequence[Outcome], objective: str = "range", chosen: str = "") -> str:
-    """Return the results of a seed and an objective as a page of Markdown.
-
-    `chosen` are the options beside the seed that draw the same jobs.
-    """
+def page(
+    seed: int,
+    outcomes: Sequence[Outcome],
+    objective: str = "range",
+    families: Sequence[str] = tuple(FAMILIES),
+) -> str:
+    """Return the results of a seed, an objective and families of parts as a page of Markdown."""
+    chosen = "" if objective == "range" else f" --objective {objective}"
+    if tuple(families) != tuple(FAMILIES):
+        chosen += f" --families {' '.join(families)}"
     searched = [one for one in outcomes if one.status in SEARCHED]
     closed = [one for one in searched if one.closed]
     quick = [one for one in closed if one.search_s <= QUICK]

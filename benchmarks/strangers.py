@@ -268,10 +268,7 @@ def main() -> None:
     # what earlier runs of the same seed found counts too, the last of each draw
     lines = log.read_text(encoding="utf-8").splitlines()
     known = {(one.index, one.attempt): one for one in (Outcome(**json.loads(x)) for x in lines)}
-    chosen = "" if objective == "range" else f" --objective {objective}"
-    if families != list(FAMILIES):
-        chosen += f" --families {' '.join(families)}"
-    text = page(seed, [known[key] for key in sorted(known)], objective, chosen)
+    text = page(seed, [known[key] for key in sorted(known)], objective, families)
     for path in [folder / f"{name}.md", *([TABLE] if arguments.write else [])]:
         path.write_text(text, encoding="utf-8")
     print(text.split("\n")[4])

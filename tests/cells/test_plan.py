@@ -23,6 +23,7 @@ from opl.planning.multi_start import (
 )
 from opl.planning.open_matrix import open_matrices
 from opl.planning.plan import Exhausted, Found, OutOfBudget, Pause, propose_and_check
+from opl.planning.problem import CLOSE
 from opl.planning.reasons import explain, unreachable_points
 from opl.planning.settings import Start
 from opl.planning.survey import NodeState, survey_nodes
@@ -235,11 +236,15 @@ def test_what_a_proof_that_ends_early_leaves_over_goes_to_the_recursive_search(m
     np.testing.assert_array_equal(found.recursive.path.q, wanted.path.q)
 
 
-def test_no_track_passes_a_contact_position_that_is_shut_on_the_way():
+def test_no_track_passes_a_contact_position_that_is_shut_on_the_way(monkeypatch):
     problem = one_row_problem()
     n, m = problem.wheel_distance.shape
     layer = problem.wheel_distance.copy()
     layer[:, m // 2] = -1.0
+    # told to be shut at cutter points alone, it is open between them, where the part is measured
+    assert (np.diff(problem.points.arc_length) > CLOSE).all()
+    assert replace(problem, wheel_distance=layer).sides is None
+    monkeypatch.setattr("opl.planning.problem.CLOSE", 1.0)
     shut = replace(problem, wheel_distance=layer)
     matrices = open_matrices(shut)
     tracks = list(islice(tracks_from_best_start(matrices), 5))

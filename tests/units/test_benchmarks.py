@@ -62,6 +62,7 @@ def test_a_page_of_strangers_counts_what_is_closed_and_what_has_no_bound():
     assert "half of the gaps are below 0.10 %, 95 of 100 below 0.91 %, all below 1.00 %" in text
     assert "Found: joint travel on the wheel in rad." in page(7, outcomes, "travel")
     assert "--seed 7 --objective travel`" in page(7, outcomes, "travel")
+    assert "--seed 7 --families channel step`" in page(7, outcomes, families=["channel", "step"])
     assert (
         "2 without a path, 1 without a bound; slowest 31.0 s of all drawn. Drawn again: 1 no_path."
         in text
@@ -85,8 +86,10 @@ def test_a_page_without_a_part_counts_what_was_closed_with_everything():
         return {(one.index, one.attempt): one for one in found}
 
     text = page_without(
-        7, {"nothing": outcomes(0.0, 0.001, 0.0, 0.3), "hope": outcomes(0.0, None, 0.05, 0.0)}
+        7,
+        "abc1234",
+        {"nothing": outcomes(0.0, 0.001, 0.0, 0.3), "hope": outcomes(0.0, None, 0.05, 0.0)},
     )
-    assert "Of the 3 random jobs" in text
+    assert "at abc1234. Of the 3 random jobs" in text
     assert "| nothing | - | 3 | 0 | - | 6 | - |" in text
     assert f"| {PARTS['hope'].lines} | 1 | 1 | 5.0 % | 6 | 1.0, 2.0 |" in text
