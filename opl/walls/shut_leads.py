@@ -25,8 +25,8 @@ CELLS_OF_WORK = 15  # enclosed along a lead, that cost a unit of work
 NODES_OF_WORK = 100  # looked at along a lead, likewise
 PARTS, ROUNDS = 8, 3  # into which the way between two contact positions is cut, how often
 RESERVE = 3e-4  # [m] of clearance: a motion may come nearer between two samples than at both
-# of it in depth: between two configurations of a lead the part sinks a few micrometres deeper
-SPARE = 0.1
+# of it in depth: between two configurations of a lead the part sinks some micrometres deeper
+SPARE = 0.2
 # places of the part that each lead goes through as if they were ground, shape (k, 4, 4)
 Leads = tuple[Array, ...]
 
