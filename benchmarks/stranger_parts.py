@@ -21,7 +21,7 @@ SAMPLES = (13, 25)  # of a surface, along a and b
 FACETS = (32, 96)  # of a solid
 DEPTH = 20.0  # [mm] of a solid below the lowest place of its surface
 UPRIGHT = 0.01  # [mm] that a wall leans outwards
-THICKNESS = 12.0  # [mm] of walls
+WALL = 12.0  # [mm] thickness of a wall
 
 Array = NDArray[np.float64]
 Function = Callable[[Array, Array], Array]
@@ -131,7 +131,15 @@ def solid(sheet: Array, thickness: float | None) -> trimesh.Trimesh:
 
 
 def _between_walls(at: Function, half: float, first: float, last: float, room: float) -> Array:
-    """Return a sheet over a floor and the walls at its ends, as high as told; 0 for none."""
+    """Return a sheet over a floor and the walls at its ends, shape (m, n, 3), in [mm].
+
+    Args:
+        at: Points of the floor at (a, b).
+        half: Half of the length along the rows that is ground.
+        first: Height of the wall at its beginning; 0 for none.
+        last: Height of the wall at its end; 0 for none.
+        room: From what is ground to the walls.
+    """
     fine_a, fine_b = (np.linspace(-1.0, 1.0, n + 1) for n in FACETS)
     edge = 1.0 + room / half
     floor = at(*np.meshgrid(fine_a, edge * fine_b, indexing="ij"))
@@ -139,10 +147,12 @@ def _between_walls(at: Function, half: float, first: float, last: float, room: f
     for height, end, outward in ((first, 0, -1.0), (last, -1, 1.0)):
         if height == 0.0:
             continue
-        steps = [(UPRIGHT, height), (THICKNESS, height)]
+        steps = [(UPRIGHT, height), (WALL, height)]
         wall = [floor[:, end] + np.array([0.0, outward * y, z]) for y, z in steps]
-        wall = wall[::-1] if end == 0 else wall
-        sheet.insert(len(sheet) if end else 0, np.stack(wall, axis=1))
+        if end == 0:
+            sheet.insert(0, np.stack(wall[::-1], axis=1))
+        else:
+            sheet.append(np.stack(wall, axis=1))
     return np.concatenate(sheet, axis=1)
 
 
@@ -368,13 +378,13 @@ def _channel(
     """A floor between two walls, with room for the wheel and little more."""
     inner = 0.5 * width + _between(random, 0.5, 12.0)
     ground = _between(random, 0.6, 0.97) * inner
-    return _floor("channel", random, (half[0], ground), height, (1.0, 1.0), inner - ground)
+    return _floor("channel", random, (half[0], ground), height, (True, True), inner - ground)
 
 
 def _step(random: np.random.Generator, half: tuple[float, float], height: float, _: float) -> Part:
-    """A floor with a wall at its end."""
+    """A floor with a wall at its end alone."""
     room = _between(random, 0.5, 15.0)
-    return _floor("step", random, half, height, (0.0, 1.0), room)
+    return _floor("step", random, half, height, (False, True), room)
 
 
 def _floor(
@@ -382,10 +392,13 @@ def _floor(
     random: np.random.Generator,
     half: tuple[float, float],
     height: float,
-    walls: tuple[float, float],
+    walls: tuple[bool, bool],
     room: float,
 ) -> Part:
-    """Draw how a floor bends along the rows and across, and how high its walls are."""
+    """Draw how a floor bends along the rows and across, and how high its walls are.
+
+    `walls` says whether there is one at its beginning and at its end.
+    """
     along, across = (
         float(random.choice([0.0, 1.0 / _between(random, 150.0, 900.0)])) for _ in range(2)
     )
