@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from opl.files.kernels import kernel
-from opl.search.ladder import Ladder, allowed
+from opl.search.ladder import EDGE_RULE, Ladder, allowed
 from opl.search.recursive import add_dead_ends
 
 
@@ -22,7 +22,7 @@ def impasses(ladder: Ladder, blocked: np.ndarray) -> list[tuple[int, int]]:
     free = ladder.free
 
     def edges(column: int) -> np.ndarray:
-        rule = _edges(ladder.q_by_joint, *ladder.edge_rule, blocked, column)
+        rule = _edges(ladder.edge_rule, blocked, column)
         return np.asarray(rule & free[column][:, None] & free[column + 1])
 
     found = []
@@ -65,29 +65,12 @@ def passable(ladder: Ladder, blocked: np.ndarray, first: int, last: int) -> bool
     return bool((part.free & ~dead)[0].any())
 
 
-@kernel(
-    "boolean[:,::1](float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
-    "int16[:,:,::1],int64[::1],int64)"
-)
-def _edges(  # type: ignore[no-untyped-def]
-    q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked, column
-):
+@kernel(f"boolean[:,::1]({EDGE_RULE},int64[::1],int64)")
+def _edges(edge_rule, blocked, column):  # type: ignore[no-untyped-def]
     """Return which rows of a column lead to which of the next, were they all free."""
-    n_rows = q.shape[2]
+    n_rows = edge_rule[0].shape[2]
     edges = np.empty((n_rows, n_rows), dtype=np.bool_)
     for here in range(n_rows):
         for row in range(n_rows):
-            edges[here, row] = allowed(
-                q,
-                t,
-                off_wheel,
-                max_t_step,
-                max_t_change,
-                max_q_step,
-                sides,
-                blocked,
-                column,
-                here,
-                row,
-            )
+            edges[here, row] = allowed(edge_rule, blocked, column, here, row)
     return edges

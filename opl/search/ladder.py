@@ -10,6 +10,14 @@ import numpy as np
 from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 
+EdgeRule = tuple[Array, Array, np.ndarray, float, Array, float, np.ndarray]
+# as the inner loops take it: joint positions, t, off the wheel, most of steps and changes of t and
+# of steps of joints, sides
+EDGE_RULE = (
+    "Tuple((float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
+    "int16[:,:,::1]))"
+)
+
 
 @dataclass(frozen=True)
 class Ladder:
@@ -56,23 +64,20 @@ class Ladder:
         """Joint positions as the inner loop reads them, shape (n_columns, 6, n_rows)."""
         return np.ascontiguousarray(np.moveaxis(self.q, 1, 2))
 
-    @property
-    def edge_rule(self) -> tuple[Array, np.ndarray, float, Array, float, np.ndarray]:
-        """What makes an edge small enough, in the order in which the inner loops take it."""
+    @cached_property
+    def edge_rule(self) -> EdgeRule:
+        """The nodes, and what makes an edge small enough, in the order of `EDGE_RULE`."""
+        n_columns, n_rows = self.q.shape[:2]
+        nothing = np.zeros((n_columns - 1, 2, n_rows), dtype=np.int16)
         return (
+            self.q_by_joint,
             self.t_of_nodes,
             self.off_wheel,
             self.max_contact_step,
             self.contact_changes,
             self.max_joint_step,
-            self._sides,
+            nothing if self.sides is None else self.sides,
         )
-
-    @cached_property
-    def _sides(self) -> np.ndarray:
-        n_columns, n_rows = self.q.shape[:2]
-        nothing = np.zeros((n_columns - 1, 2, n_rows), dtype=np.int16)
-        return nothing if self.sides is None else self.sides
 
     def edge_key(self, column: int, row: int, next_row: int) -> int:
         """Return the number under which an edge is remembered as blocked."""
@@ -88,14 +93,10 @@ def middle_count(contact_step: float, max_contact_step: float) -> int:
     return max(int(np.ceil(abs(contact_step) / max_contact_step - 1e-9)) - 1, 0)
 
 
-@kernel(
-    "boolean(float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
-    "int16[:,:,::1],int64,int64,int64)"
-)
-def continuous(  # type: ignore[no-untyped-def]
-    q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, column, here, row
-):
+@kernel(f"boolean({EDGE_RULE},int64,int64,int64)")
+def continuous(edge_rule, column, here, row):  # type: ignore[no-untyped-def]
     """Return whether an edge to a row of the next column is small in t and in every joint."""
+    q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides = edge_rule
     if off_wheel[column]:
         return True
     t_step = abs(t[column + 1, row] - t[column, here])
@@ -117,15 +118,10 @@ def contains(keys, key):  # type: ignore[no-untyped-def]
     return place < len(keys) and keys[place] == key
 
 
-@kernel(
-    "boolean(float64[:,:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
-    "int16[:,:,::1],int64[::1],int64,int64,int64)"
-)
-def allowed(  # type: ignore[no-untyped-def]
-    q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked, column, here, row
-):
+@kernel(f"boolean({EDGE_RULE},int64[::1],int64,int64,int64)")
+def allowed(edge_rule, blocked, column, here, row):  # type: ignore[no-untyped-def]
     """Return whether an edge to a row of the next column is small enough and not blocked."""
-    n_rows = q.shape[2]
-    return continuous(
-        q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, column, here, row
-    ) and not contains(blocked, (column * n_rows + here) * n_rows + row)
+    n_rows = edge_rule[0].shape[2]
+    return continuous(edge_rule, column, here, row) and not contains(
+        blocked, (column * n_rows + here) * n_rows + row
+    )

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opl.files.kernels import kernel
-from opl.search.ladder import Ladder, contains, continuous
+from opl.search.ladder import EDGE_RULE, Ladder, allowed, contains, continuous
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def descend(
     """
     rows = np.full(len(ladder.q), -1, dtype=np.int64)
     outcome, total, reached = _descend(
-        ladder.q_by_joint, ladder.free, *ladder.edge_rule, blocked, dead, start, bound, rows
+        ladder.edge_rule, ladder.free, blocked, dead, start, bound, rows
     )
     return Descent(rows if outcome == _COMPLETE else None, total, reached)
 
@@ -64,22 +64,17 @@ def add_dead_ends(ladder: Ladder, blocked: np.ndarray, dead: np.ndarray) -> None
 
     New ones are added to `dead`, shape (n_columns, n_rows).
     """
-    _add_dead_ends(ladder.q_by_joint, ladder.free, *ladder.edge_rule, blocked, dead)
+    _add_dead_ends(ladder.edge_rule, ladder.free, blocked, dead)
 
 
 _COMPLETE, _FAILED, _GIVEN_UP = 1, 0, 2
 
-_FIELD = (
-    "float64[:,:,::1],boolean[:,::1],float64[:,::1],boolean[::1],"
-    "float64,float64[::1],float64,int16[:,:,::1],int64[::1]"
-)
+_FIELD = f"{EDGE_RULE},boolean[:,::1],int64[::1],boolean[:,::1]"
 
 
-@kernel(f"void({_FIELD},boolean[:,::1])", early=True)
-def _add_dead_ends(  # type: ignore[no-untyped-def]
-    q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked, dead
-):
-    n_columns, _, n_rows = q.shape
+@kernel(f"void({_FIELD})", early=True)
+def _add_dead_ends(edge_rule, free, blocked, dead):  # type: ignore[no-untyped-def]
+    n_columns, n_rows = free.shape
     for column in range(n_columns - 2, -1, -1):
         for here in range(n_rows):
             if not free[column, here] or dead[column, here]:
@@ -89,34 +84,15 @@ def _add_dead_ends(  # type: ignore[no-untyped-def]
                 row = (here + k) % n_rows  # the row it is on leads on most often
                 if not free[column + 1, row] or dead[column + 1, row]:
                     continue
-                if not continuous(
-                    q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, column, here, row
-                ):
-                    continue
-                if not contains(blocked, (column * n_rows + here) * n_rows + row):
+                if allowed(edge_rule, blocked, column, here, row):
                     leads_on = True
                     break
             dead[column, here] = not leads_on
 
 
-@kernel(
-    f"Tuple((int64,float64,int64))({_FIELD},boolean[:,::1],int64,float64,int64[::1])", early=True
-)
-def _descend(  # type: ignore[no-untyped-def]
-    q,
-    free,
-    t,
-    off_wheel,
-    max_t_step,
-    max_t_change,
-    max_q_step,
-    sides,
-    blocked,
-    dead,
-    start,
-    bound,
-    rows,
-):
+@kernel(f"Tuple((int64,float64,int64))({_FIELD},int64,float64,int64[::1])", early=True)
+def _descend(edge_rule, free, blocked, dead, start, bound, rows):  # type: ignore[no-untyped-def]
+    q = edge_rule[0]
     n_columns, n_joints, n_rows = q.shape
     sums = np.empty(n_rows)
     low = np.empty((n_columns, n_joints))
@@ -150,9 +126,7 @@ def _descend(  # type: ignore[no-untyped-def]
                 continue
             if ranges == tried_sum[following] and row <= tried_row[following]:
                 continue
-            if not continuous(
-                q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, column, here, row
-            ):
+            if not continuous(edge_rule, column, here, row):
                 continue
             best_sum = ranges
             best_row = row

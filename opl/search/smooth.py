@@ -12,7 +12,7 @@ import numpy as np
 
 from opl.files.kernels import kernel
 from opl.geometry.frames import Array
-from opl.search.ladder import Ladder, allowed
+from opl.search.ladder import EDGE_RULE, Ladder, allowed
 
 DEARER = 2.0 ** np.arange(1, 6)  # times the price of moving t
 LEAST_CONTACT_WEIGHT = 0.01  # where t may move for nothing
@@ -80,9 +80,8 @@ def smoothest(
     """
     rows = np.empty(len(ladder.q), dtype=np.int64)
     total = _cheapest(
-        ladder.q_by_joint,
+        ladder.edge_rule,
         ladder.free & inside,
-        *ladder.edge_rule,
         np.asarray(blocked, dtype=np.int64),
         np.array(cost.joint_weights),
         cost.contact_weight,
@@ -126,16 +125,15 @@ def smoothest_within(
 
 
 @kernel(
-    "float64(float64[:,:,::1],boolean[:,::1],float64[:,::1],boolean[::1],float64,float64[::1],float64,"
-    "int16[:,:,::1],int64[::1],float64[::1],float64,float64,float64[::1],float64[::1],float64,float64[:,::1],"
-    "int64[::1])",
+    f"float64({EDGE_RULE},boolean[:,::1],int64[::1],float64[::1],float64,float64,float64[::1],"
+    "float64[::1],float64,float64[:,::1],int64[::1])",
     early=True,
 )
 def _cheapest(  # type: ignore[no-untyped-def]
-    q, free, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked,
-    joint_weights, contact_weight, time_weight, edge_seconds, max_speed, contact_speed, node_cost,
-    rows,
+    edge_rule, free, blocked, joint_weights, contact_weight, time_weight, edge_seconds, max_speed,
+    contact_speed, node_cost, rows,
 ):  # fmt: skip
+    q, t, off_wheel = edge_rule[:3]
     n_columns, n_joints, n_rows = q.shape
     best = np.full(n_rows, np.inf)
     following = np.empty(n_rows)
@@ -181,18 +179,14 @@ def _cheapest(  # type: ignore[no-untyped-def]
                     cheapest = here
             if cheapest < 0:
                 continue
-            if allowed(
-                q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked,
-                column - 1, cheapest, row,
-            ):  # fmt: skip
+            if allowed(edge_rule, blocked, column - 1, cheapest, row):
                 following[row] = least
                 before[column, row] = cheapest
             else:
                 for here in range(n_rows):
                     if price[here] < following[row] and allowed(
-                        q, t, off_wheel, max_t_step, max_t_change, max_q_step, sides, blocked,
-                        column - 1, here, row,
-                    ):  # fmt: skip
+                        edge_rule, blocked, column - 1, here, row
+                    ):
                         following[row] = price[here]
                         before[column, row] = here
             following[row] += node_cost[column, row]
