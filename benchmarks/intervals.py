@@ -39,6 +39,10 @@ class Interval:
         apart = np.where((other.low > 0.0) | (other.high < 0.0), 1.0, np.nan)
         return self * outwards(apart / other.high, apart / other.low)
 
+    def part(self, cells: slice) -> Interval:
+        """Return those of some cells."""
+        return Interval(self.low[cells], self.high[cells])
+
     def root(self) -> Interval:
         """Return the square roots; not a number where there may be none."""
         with np.errstate(invalid="ignore"):
@@ -62,6 +66,10 @@ class Jet:
     value: Interval
     first: Interval
     second: Interval
+
+    def part(self, cells: slice) -> Jet:
+        """Return what it is over some of the cells."""
+        return Jet(self.value.part(cells), self.first.part(cells), self.second.part(cells))
 
     def __add__(self, other: Jet) -> Jet:
         return Jet(self.value + other.value, self.first + other.first, self.second + other.second)

@@ -29,6 +29,10 @@ class Posture:
     q: list[Jet]
     out_of_reach: Flags
 
+    def part(self, cells: slice) -> Posture:
+        """Return those over some of the cells."""
+        return Posture([joint.part(cells) for joint in self.q], self.out_of_reach[cells])
+
 
 @dataclass(frozen=True)
 class Heading:

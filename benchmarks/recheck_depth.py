@@ -26,7 +26,7 @@ from benchmarks.recheck_arms import SURE, Flags
 
 TRIED = 64  # triangles of the part that are sought to be deep in the wheel
 WITNESSES = 12  # points of one
-CLOSER = 16  # times that the deepest point is looked for, each time twice as near
+CLOSER = 6  # times that the deepest point is looked for, each time six times as near
 GRID = np.array([(i, j, 12 - i - j) for i in range(13) for j in range(13 - i)]) / 12.0
 
 
@@ -154,7 +154,7 @@ class Wheel:
             radial, ends = self._ways(x, x, np.hypot(y, z))
             depth = np.cos(tilt) * radial + np.sin(tilt) * ends[end]
             deepest = int(np.argmax(depth))
-            middle, size = shares[deepest], size * 0.5
+            middle, size = shares[deepest], size / 6.0
         return np.asarray(middle), float(depth[deepest])
 
     def _ways(self, x_low: Array, x_high: Array, away: Array) -> tuple[Array, Array]:

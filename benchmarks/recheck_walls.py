@@ -188,12 +188,11 @@ class Machine:
         """Return the cells of a run; those whose pads are wide are cut further."""
         found = []
         for halving in range(HALVINGS + 1):
-            whole, starts, ends = (
-                list(self.arm.postures(*flange(a, b)))
-                for a, b in ((low, high), (low, low), (high, high))
-            )
-            families, wide = [], np.zeros(len(low), dtype=bool)
-            for family, (over, first, last) in enumerate(zip(whole, starts, ends, strict=True)):
+            n, families, wide = len(low), [], np.zeros(len(low), dtype=bool)
+            # all over the cells, and where they begin and end
+            every = flange(np.concatenate([low, low, high]), np.concatenate([high, low, high]))
+            for family, known in enumerate(self.arm.postures(*every)):
+                over, first, last = (known.part(slice(k * n, (k + 1) * n)) for k in range(3))
                 cells = chords(family, over, first, last, low, high)
                 cells = replace(cells, sides=sides(low, high))
                 here = ~over.out_of_reach & self._within_limits(cells)
@@ -205,8 +204,8 @@ class Machine:
             if not wide.any():
                 break
             low, high = halves(low[wide], high[wide], wide[wide])
-        every = joined(found)
-        return every.pick(np.lexsort([every.place, every.family]))
+        kept = joined(found)
+        return kept.pick(np.lexsort([kept.place, kept.family]))
 
     def _within_limits(self, cells: Cells) -> Flags:
         """Return which some full turns, with the wrist to either side, bring within the limits."""
