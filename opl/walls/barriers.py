@@ -8,6 +8,8 @@ the next.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from opl.geometry.frames import Array
@@ -19,13 +21,14 @@ MOST_LOOKED_AT = 8  # runs of cutter points of a pass, the longest
 MOST_SIDES = 8  # of a pass
 WITHIN = 7  # halvings of the way between cutter points that is too deep in the wheel, but hardly
 SHORTEST = 3  # cutter points
-NEARLY = 0.8  # of the longest run: the deepest of those is taken
+NEARLY = 0.8  # of the run that parts most: the deepest of those is taken
 
 
 def all_sides(problem: GrindingProblem) -> list[list[Side]]:
     """Return the sides of each pass; one that excludes nothing where there are no barriers."""
     cell, part, points = problem.cell, problem.scene.part, problem.points
 
+    @cache
     def shut(place: float, low: float, high: float) -> bool:
         Ts = points.frames_at(np.array([place]))
         return bool(cells_of(cell, part, Ts, np.array([low]), np.array([high]))[1][0].all())
@@ -38,12 +41,12 @@ def barriers(problem: GrindingProblem, index: int) -> list[Barrier]:
     """Return the barriers of a pass, the longest first.
 
     Runs of cutter points at which the part cuts into the wheel on one contact position of the
-    field, as far as it surely does between them as well. Of what is shut around a run no more is
-    looked at, but past its ends.
+    field, as far as it surely does between them as well: those that part contact positions at which
+    it does not, on either side.
     """
     own = np.flatnonzero(problem.points.pass_index == index)
     depth = np.where(problem.cuts[own], -problem.wheel_distance[own], 0.0)
-    left, found = depth > 0.0, []
+    left, found = _parting(depth > 0.0), []
     for _ in range(MOST_LOOKED_AT):
         row, first, last = _deepest(depth, left)
         if last - first + 1 < SHORTEST:
@@ -52,22 +55,34 @@ def barriers(problem: GrindingProblem, index: int) -> list[Barrier]:
         places = own[first : last + 1].astype(float)
         at = places[:-1], places[1:], np.full(last - first, t)
         shut = shut_along(problem.cell, problem.scene.part, problem.points, *at, WITHIN)
-        found += [Barrier(places[a], places[b], t) for a, b in _runs(shut)]
-        left[first : last + 1, row] = False
-        # where it ends, what is shut may go on at another contact position
-        for column in range(first + (first > 0), last + (last == len(own) - 1)):
+        parts = left[first : last + 1, row]
+        runs = [(a, b) for a, b in _runs(shut) if parts[a : b + 1].any()]
+        found += [Barrier(places[a], places[b], t) for a, b in runs]
+        # of what is shut around a run no more is looked at
+        for column in range(first, last + 1):
             left[column] &= ~_around(depth[column] > 0.0, row)
     return sorted(found, key=lambda one: one.first - one.last)
 
 
-def _deepest(depth: Array, left: np.ndarray) -> tuple[int, int, int]:
-    """Return contact position, first and last column of a run that is left.
+def _parting(shut: np.ndarray) -> np.ndarray:
+    """Return which shut nodes have free ones on either side, there or at a neighbouring column."""
+    free = ~shut
+    free[1:] |= ~shut[:-1]
+    free[:-1] |= ~shut[1:]
+    below = np.logical_or.accumulate(free, axis=1)
+    above = np.logical_or.accumulate(free[:, ::-1], axis=1)[:, ::-1]
+    return np.asarray(shut & below & above)
 
-    Of the longest runs that where the part is deepest in the wheel all along.
+
+def _deepest(depth: Array, left: np.ndarray) -> tuple[int, int, int]:
+    """Return contact position, first and last column of a run in which most columns are left.
+
+    Of these runs that where the part is deepest in the wheel all along.
     """
-    runs = [(row, a, b - 1) for row, now in enumerate(left.T) for a, b in _runs(now)]
-    longest = max((b - a for _, a, b in runs), default=-1)
-    some = [run for run in runs if run[2] - run[1] >= NEARLY * longest]
+    runs = [(row, a, b - 1) for row, now in enumerate(depth.T) for a, b in _runs(now > 0.0)]
+    parted = [int(left[a : b + 1, row].sum()) for row, a, b in runs]
+    most = max(parted, default=0)
+    some = [run for run, n in zip(runs, parted, strict=True) if n > 0 and n >= NEARLY * most]
     return max(some, key=lambda run: depth[run[1] : run[2] + 1, run[0]].min(), default=(0, 0, -1))
 
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from benchmarks.stranger_jobs import draw_job
 from opl.cell.wheel_distance import signed_wheel_distance
+from opl.errors import NoPathError
 from opl.geometry.frames import inverse, transform
 from opl.job.load import load_job
 from opl.run.searches import search_path
@@ -40,6 +41,29 @@ def test_a_concave_part_is_too_deep_in_the_wheel_all_along_each_barrier(tmp_path
                 T = T @ inverse(points.frames_at(np.array([place]))[0])
                 deepest = wheel.signed_distance(transform(T, corners)).min()
                 assert deepest < -job.cell.planned_penetration
+
+
+def test_a_pass_that_comes_in_on_one_side_and_leaves_on_the_other_is_proven_to_have_no_motion(
+    tmp_path,
+):
+    draw_job(20262301, 27, 0, tmp_path)
+    job = load_job(tmp_path / "job.yaml")
+    problem = problem_of(job)
+    points, wheel = problem.points, job.cell.wheel
+    # from pocket to pocket of contact positions at which no vertex is too deep, place by place
+    corners = np.unique(problem.scene.part.triangles.reshape(-1, 3), axis=0)
+    t = np.linspace(-1.0, 1.0, 401) * wheel.last_position
+    reached = np.ones(len(t), dtype=bool)
+    for place in np.arange(40.0, 58.0):
+        Ts = wheel.T_contact0_contact(t) @ inverse(points.frames_at(np.array([place]))[0])
+        deepest = np.array([wheel.signed_distance(transform(T, corners)).min() for T in Ts])
+        free = deepest >= -job.cell.planned_penetration
+        assert free.any()
+        pocket = np.cumsum(np.diff(free, prepend=False))
+        reached = free & np.isin(pocket, pocket[free & reached])
+    assert not reached.any()
+    with pytest.raises(NoPathError, match="proven: no motion along these passes"):
+        search_path(job.search, problem)
 
 
 def test_what_is_left_out_along_a_row_is_too_deep_in_the_wheel(tmp_path):
