@@ -17,6 +17,7 @@ from opl.least.postures import Columns
 from opl.least.rows import SMALLEST_EDGE, Bulge, Row, broken_at, bulging, shut_edges
 from opl.least.sinking import (
     first_sunk,
+    leads_are_deep,
     passed_where_struck,
     past_help,
     places_between,
@@ -237,6 +238,10 @@ class BoxNodes:
             if sunk is not None:
                 at_ends = np.isin(np.arange(len(places)), list(deep))
                 shut = past_help(places, sunk) & ~(at_ends[:-1] | at_ends[1:])
+            # leads that are shut are left out with what collides
+            if not search.sampler.collisions and leads_are_deep(problem, hits):
+                search.collided += 1
+                return None, None, False
             if sunk is not None and not shut.any():
                 return None, sunk, False
             search.collided += int(sunk is None)

@@ -26,7 +26,8 @@ from opl.planning.problem import GrindingProblem
 from opl.planning.track_check import Collides
 
 LOOKS = 8  # along a move that sinks too deep
-ALONG = Phase.APPROACHING, Phase.GRINDING, Phase.RETRACTING
+LEADS = Phase.APPROACHING, Phase.RETRACTING
+ALONG = *LEADS, Phase.GRINDING
 USELESS = 0.5  # of what was too deep: where so much still is, sparing depth is of no use
 MORE = 1.25  # times what was too deep: what is spared for it
 HARDLY = 1e-6  # [m] too deep: what can be spared nearly anywhere
@@ -35,7 +36,9 @@ BESIDE = 0.1  # cutter points: places so near are as deep
 DEEP = 2e-5  # [m] too deep: what had better not be spared where places help
 
 
-def sunk_between(problem: GrindingProblem, blocked: Collides) -> Array:
+def sunk_between(
+    problem: GrindingProblem, blocked: Collides, along: Sequence[Phase] = ALONG
+) -> Array:
     """Return by how much the part is too deep between columns in [m], 0 elsewhere, (n - 1,).
 
     What it is too deep by on a lead counts between the two columns at that end of the pass.
@@ -43,6 +46,7 @@ def sunk_between(problem: GrindingProblem, blocked: Collides) -> Array:
     Args:
         problem: What is to be planned, of n columns.
         blocked: A motion, and its moves that collide.
+        along: What is looked at of it.
     """
     cell, motion = problem.cell, blocked.motion
     sunk = np.zeros(len(problem.points) - 1)
@@ -50,7 +54,7 @@ def sunk_between(problem: GrindingProblem, blocked: Collides) -> Array:
     moves = [
         fault.move
         for fault in blocked.faults
-        if fault.pair == (PART, WHEEL) and phases[fault.move] in ALONG
+        if fault.pair == (PART, WHEEL) and phases[fault.move] in along
     ]
     if not moves:
         return sunk
@@ -132,6 +136,11 @@ def first_sunk(problem: GrindingProblem, collided: Mapping[Same, Collides]) -> A
         if sunk.any():
             return sunk
     return None
+
+
+def leads_are_deep(problem: GrindingProblem, collided: Mapping[Same, Collides]) -> bool:
+    """Return whether some motion sinks so deep on its leads that places are of no help."""
+    return any((sunk_between(problem, one, LEADS) > DEEP).any() for one in collided.values())
 
 
 def until_sunk(

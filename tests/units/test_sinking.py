@@ -7,13 +7,14 @@ import numpy as np
 from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import inverse
-from opl.least import box_nodes
+from opl.least import box_nodes, sinking
 from opl.least.box_nodes import BoxNodes, TrackSearch
 from opl.least.box_track import BoxTracks
 from opl.least.passages import NO_PASSAGES
 from opl.least.sinking import (
     HARDLY,
     MORE,
+    leads_are_deep,
     passed_where_struck,
     past_help,
     places_between,
@@ -67,6 +68,19 @@ def test_a_lead_that_sinks_counts_beside_its_end_of_the_pass():
     for move, edge in ((grinding[0] - 1, 0), (leaves, last - 1)):
         faults = (CollidingMove(move, (PART, WHEEL), False),)
         assert np.flatnonzero(sunk_between(problem, Collides(motion, faults))).tolist() == [edge]
+
+
+def test_leads_are_deep_where_they_sink_themselves_and_by_more_than_places_help(monkeypatch):
+    problem, motion, grinding = motion_of_a_track()
+
+    def deep(move):
+        fault = CollidingMove(move, (PART, WHEEL), False)
+        return leads_are_deep(problem, {(b"", b""): Collides(motion, (fault,))})
+
+    assert not deep(grinding[0] - 1)
+    monkeypatch.setattr(sinking, "DEEP", 0.0)
+    assert deep(grinding[0] - 1)
+    assert not deep(grinding[1])
 
 
 def test_bodies_are_struck_between_two_columns_not_at_them_and_not_off_the_wheel():
