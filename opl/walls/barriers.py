@@ -17,7 +17,7 @@ from opl.planning.problem import GrindingProblem
 from opl.walls.cut_cells import cells_of, shut_along
 from opl.walls.sides import Barrier, Side, sides_of
 
-MOST_LOOKED_AT = 8  # runs of cutter points of a pass, the longest
+MOST_LOOKED_AT = 8  # runs of cutter points of a pass, those that part most first
 MOST_SIDES = 8  # of a pass
 WITHIN = 7  # halvings of the way between cutter points that is too deep in the wheel, but hardly
 SHORTEST = 3  # cutter points

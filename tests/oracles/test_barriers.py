@@ -50,7 +50,7 @@ def test_a_pass_that_comes_in_on_one_side_and_leaves_on_the_other_is_proven_to_h
     job = load_job(tmp_path / "job.yaml")
     problem = problem_of(job)
     points, wheel = problem.points, job.cell.wheel
-    # from pocket to pocket of contact positions at which no vertex is too deep, place by place
+    # place by place the runs of contact positions at which no vertex is too deep
     corners = np.unique(problem.scene.part.triangles.reshape(-1, 3), axis=0)
     t = np.linspace(-1.0, 1.0, 401) * wheel.last_position
     reached = np.ones(len(t), dtype=bool)
@@ -59,8 +59,8 @@ def test_a_pass_that_comes_in_on_one_side_and_leaves_on_the_other_is_proven_to_h
         deepest = np.array([wheel.signed_distance(transform(T, corners)).min() for T in Ts])
         free = deepest >= -job.cell.planned_penetration
         assert free.any()
-        pocket = np.cumsum(np.diff(free, prepend=False))
-        reached = free & np.isin(pocket, pocket[free & reached])
+        run = np.cumsum(np.diff(free, prepend=False))
+        reached = free & np.isin(run, run[free & reached])
     assert not reached.any()
     with pytest.raises(NoPathError, match="proven: no motion along these passes"):
         search_path(job.search, problem)
