@@ -21,6 +21,7 @@ from opl.motion.line_error import Run, Screws, straight_off
 
 _SHORT = 1 << 20  # what a line shorter in time than the controller follows counts for, in lines
 _NEVER = 1 << 60  # what no chain is as dear as
+_STEPS = np.array([-1, 0, 1])  # to a configuration itself and those next to it
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,7 @@ class Lines:
         self._arm = screws.axes, screws.T_base_flange
         self._values = run.arrays[:-1]
         self._found: dict[bytes, tuple[NDArray[np.int64], NDArray[np.int64], Array]] = {}
+        self._last: NDArray[np.intp] = np.arange(0)
 
     def among(
         self, kept: NDArray[np.intp], barred: NDArray[np.int64]
@@ -73,10 +75,28 @@ class Lines:
         if key not in self._found:
             self._found[key] = _lines(*self._arm, *(value[kept] for value in self._values))
         starts, first, errors = self._found[key]
+        self._last = kept
         ends = np.repeat(np.arange(len(kept)), np.diff(first))
         wanted = ~np.isin(ends * len(kept) + starts, barred[:, 1] * len(kept) + barred[:, 0])
         counts = np.bincount(ends[wanted], minlength=len(kept))
         return starts[wanted], np.append(0, np.cumsum(counts)), errors[wanted]
+
+    def beside(self, lines: NDArray[np.intp]) -> list[tuple[int, int]]:
+        """Return lines both of whose ends are the same as those of some line, or next to them.
+
+        Of those between the configurations that were asked for last (`among`); `lines` are the
+        indices of their ends in the run, shape (n, 2), and so are those returned.
+        """
+        kept = self._last
+        starts, first, _ = self._found[kept.tobytes()]
+        ends = np.repeat(np.arange(len(kept)), np.diff(first))
+        place = np.searchsorted(kept, lines[np.isin(lines, kept).all(axis=1)])
+        # no line starts behind its end, so one beyond the first or last configuration is no line
+        near = (place[:, 1, None] + _STEPS)[:, :, None] * len(kept) + (place[:, 0, None] + _STEPS)[
+            :, None, :
+        ]
+        found = np.isin(ends * len(kept) + starts, near)
+        return list(zip(kept[starts[found]].tolist(), kept[ends[found]].tolist(), strict=True))
 
 
 def fewest(

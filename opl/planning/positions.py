@@ -8,7 +8,7 @@ is what the written positions make of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -23,6 +23,7 @@ from opl.files.beside import Beside
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.motion.bows import bowed_lines, freedom
+from opl.motion.colliding_lines import CollidingLines
 from opl.motion.fewest import ChainRule, Lines
 from opl.motion.gradual import PLANNED_RATIO
 from opl.motion.line_error import Run, Screws, line_errors, screws_of
@@ -142,6 +143,9 @@ def _chosen(
     start = max(first - 1, 0)
     alone = motion.take(np.arange(start, min(first + len(run.q) + 1, len(motion))))
     lines, blocked = Lines(screws, run), frozenset[Rows]()
+    colliding = CollidingLines(
+        scene.moves, alone.take(np.arange(first - start, first - start + len(run.q))), lines
+    )
     while True:
         kept = fewest_of_long(screws, run, rule.chain, blocked, lines)
         if kept is None:
@@ -150,13 +154,10 @@ def _chosen(
         thinned = _thinned(screws, alone, first - start, run, kept)
         corners = [_moved(turn, start) for turn in rule.too_wide(thinned)]
         bowed = bowed_lines(scene.cell, points, thinned, rule.max_contact_error)
-        barred_lines = [_moved(line, start) for line in (*_colliding_lines(scene, thinned), *bowed)]
+        off = [*corners, *(_moved(line, start) for line in bowed)]
+        barred = {*colliding.known_with(kept), *(_moved(rows, -first) for rows in off)}
         # of neighbouring configurations there are none to put in between
-        barred = {
-            _moved(rows, -first)
-            for rows in (*barred_lines, *corners)
-            if rows[-1] - rows[0] > len(rows) - 1
-        }
+        barred = {rows for rows in barred if rows[-1] - rows[0] > len(rows) - 1}
         if barred <= blocked:
             return kept, corners
         blocked |= barred
@@ -217,12 +218,3 @@ def on_wheel_runs(
             rule.tool_points(motion.q[rows]),
         )
         yield int(rows[0]), run
-
-
-def _colliding_lines(scene: PlanningScene, motion: Motion) -> Sequence[tuple[int, int]]:
-    """Return the lines on the wheel that hit something, by the indices of their ends."""
-    written = motion.take(motion.positions)
-    return [
-        (int(motion.positions[fault.move - 1]), int(motion.positions[fault.move]))
-        for fault in scene.moves.colliding(written, written.grinding)
-    ]
