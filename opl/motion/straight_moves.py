@@ -22,10 +22,6 @@ from opl.motion.joint_lines import RESOLUTION, densify
 # a distance beyond the clearance smaller than the last is taken to be too near
 RESERVES = (0.064, 0.016, 0.004, 0.001, 0.00025, 0.00005)
 WHERE_BEGUN = SECOND_OPINION + RESERVES[-1]  # [m] beyond the clearance: there free moves begin
-# the part as spheres around its pieces and as corners of it, to see soon that it is far from the
-# wheel, or near
-MOST_SPHERES = 32
-MOST_CORNERS = 100
 
 
 class StraightMoves:
@@ -42,9 +38,6 @@ class StraightMoves:
         self._cell = cell
         self._scene = scene
         self._part = part
-        self._spheres = _enclosing(part)
-        corners = part.triangles.reshape(-1, 3)
-        self._corners = corners[:: max(len(corners) // MOST_CORNERS, 1)]
         self._wider = {
             reserve: scene.against_surroundings(SECOND_OPINION + reserve) for reserve in RESERVES
         }
@@ -94,45 +87,9 @@ class StraightMoves:
     def _too_near_wheel(self, q: Array, reserve: float) -> np.ndarray:
         """Return at which ``q``, shape (n, 6), the part does not keep away from the wheel."""
         needed = self._cell.part_from_wheel + SECOND_OPINION + reserve
-        wheel = self._cell.wheel
-        Ts_base_flange = forward_kinematics(self._cell.robot, q)
-        Ts_contact0_workpiece = self._cell.Ts_contact0_workpiece(Ts_base_flange)
-        near: np.ndarray = np.zeros(len(q), dtype=bool)
-        x, y, z, radius = self._part.spheres[0]
-        middle = Ts_contact0_workpiece[:, :3, :3] @ np.array([x, y, z])
-        middle += Ts_contact0_workpiece[:, :3, 3]
-        close = np.flatnonzero(wheel.signed_distance(middle) - radius < needed)
-        if not len(close):
-            return near
-        near[close] = self._near_wheel(Ts_contact0_workpiece[close], needed)
-        return near
-
-    def _near_wheel(self, Ts_contact0_workpiece: Array, needed: float) -> np.ndarray:
-        """Return at which poses, shape (n, 4, 4), the part is nearer to the wheel than needed."""
-        wheel = self._cell.wheel
-        R = Ts_contact0_workpiece[:, :3, :3].swapaxes(1, 2)
-        p = Ts_contact0_workpiece[:, None, :3, 3]
-        near = np.asarray((wheel.signed_distance(self._corners @ R + p) < needed).any(axis=1))
-        centres = self._spheres[:, :3] @ R[~near] + p[~near]
-        doubtful = (wheel.signed_distance(centres) - self._spheres[:, 3] < needed).any(axis=1)
-        # few poses are left to be measured
-        unknown = np.flatnonzero(~near)[doubtful]
-        Ts = Ts_contact0_workpiece[unknown]
-        clearance = signed_wheel_distance(self._part, wheel, Ts, needed, enough=needed)
-        near[unknown] = clearance < needed
-        return near
-
-
-def _enclosing(part: PartTree) -> Array:
-    """Return spheres that hold the part between them, centre and radius in [m], shape (n, 4)."""
-    level = [0]
-    while len(level) < MOST_SPHERES and any(part.child[node] for node in level):
-        level = [
-            below
-            for node in level
-            for below in ((part.child[node], part.child[node] + 1) if part.child[node] else (node,))
-        ]
-    return part.spheres[level]
+        Ts = self._cell.Ts_contact0_workpiece(forward_kinematics(self._cell.robot, q))
+        clearance = signed_wheel_distance(self._part, self._cell.wheel, Ts, needed, enough=needed)
+        return np.asarray(clearance < needed)
 
 
 def _cut(pieces: Array, longest: float) -> Array:
