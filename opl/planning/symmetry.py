@@ -12,6 +12,7 @@ import numpy as np
 
 from opl.cell.robot import Robot
 from opl.cell.workcell import WorkCell
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array
 from opl.planning.nodes import NodeMatrix
 from opl.planning.open_matrix import OpenMatrix, Track
@@ -107,19 +108,35 @@ def _followers(nodes: NodeMatrix, positions: np.ndarray) -> Iterator[np.ndarray]
         return
     order = np.argsort(nodes.position_index, kind="stable")
     first, end = np.searchsorted(nodes.position_index[order], [positions, positions + 1])
-    alike = [order[a:b] for a, b in zip(first.tolist(), end.tolist(), strict=True)]
     columns = np.repeat(np.arange(len(positions)), end - first)
-    q = np.split(nodes.at(columns, np.concatenate(alike)), np.cumsum(end - first)[:-1])
-    for start in range(len(alike[0])):
-        rows, before = [alike[0][start]], q[0][start]
-        for own, there in zip(alike[1:], q[1:], strict=True):
-            away = np.abs(there - before).sum(axis=1)
-            away[np.isnan(away)] = np.inf
-            if not (away < np.inf).any():
+    alike = np.concatenate([order[a:b] for a, b in zip(first.tolist(), end.tolist(), strict=True)])
+    begin = np.append(0, np.cumsum(end - first))
+    for followed in _nearest_on(nodes.at(columns, alike), begin):
+        if followed[-1] >= 0:
+            yield alike[followed]
+
+
+@kernel("int64[:,::1](float64[:,::1],int64[::1])", early=True)
+def _nearest_on(q, begin):  # type: ignore[no-untyped-def]
+    """Return the postures that are nearest from column to column, from each of the first on.
+
+    ``begin`` says where those of each column begin in ``q``; those that are not there are NaN, and
+    -1 follows where nothing is near.
+    """
+    found = np.full((begin[1], len(begin) - 1), -1)
+    for start in range(begin[1]):
+        here = start
+        if np.isnan(q[here, 0]):
+            continue
+        found[start, 0] = here
+        for column in range(1, len(begin) - 1):
+            least, nearest = np.inf, -1
+            for there in range(begin[column], begin[column + 1]):
+                away = np.abs(q[there] - q[here]).sum()
+                if away < least:  # never for NaN
+                    least, nearest = away, there
+            if nearest < 0:
                 break
-            nearest = int(np.argmin(away))
-            rows.append(own[nearest])
-            before = there[nearest]
-        else:
-            if nodes.exists[0, rows[0]]:
-                yield np.array(rows)
+            here = nearest
+            found[start, column] = here
+    return found
