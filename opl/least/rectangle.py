@@ -162,11 +162,14 @@ class Rectangle:
     def rows(self, up: Array, room: float) -> list[Row]:
         """Return the contact positions that motions in a box pass between finer places.
 
+        They have no postures where these are known not to be free.
+
         Args:
             up: By how much the box misses the edges from each contact position to the next.
             room: By how much a motion may leave it, in [rad] of its size.
         """
         places, rows = self._places, []
+        q = np.where(self._free[..., None], self._q, np.nan)
         fine = np.diff(places) < 1.0
         ends = np.flatnonzero(np.diff(np.concatenate([[False], fine, [False]]).astype(int)))
         for first, last in ends.reshape(-1, 2).tolist():
@@ -175,7 +178,7 @@ class Rectangle:
                 continue
             for j in range(levels[0], levels[-1] + 2):
                 zone = slice(first, last + 1)
-                rows.append(Row(places[zone], float(self._t[j]), self._q[zone, j]))
+                rows.append(Row(places[zone], float(self._t[j]), q[zone, j]))
         return rows
 
 

@@ -9,6 +9,7 @@ from opl.least.box_track import nearest_about
 from opl.least.field_at_places import FieldAtPlaces
 from opl.least.postures import BESIDE
 from opl.least.rectangle import Rectangle
+from opl.least.rows import shut_edges
 from opl.search.box import JointBox
 from opl.walls.sides import Barrier, Side
 from tests.support.boxes import near_a_box
@@ -66,6 +67,23 @@ def test_lines_on_both_sides_of_what_lies_in_a_box_between_them_are_rows():
     rows = rectangle.rows(up, 1e-6)
     assert [row.contact_position for row in rows] == [0.0, 2.0]
     assert all((row.places == places[:3]).all() for row in rows)
+
+
+def test_no_edge_passes_a_row_where_the_part_cuts_into_the_wheel():
+    _, sampler, columns = near_a_box()
+    side = Side(1, above=(Barrier(20.5, 22.0, 1.0),))
+    image, t = replace(columns.placements[0], side=side), np.linspace(-6.0, 6.0, 7)
+    places = np.array([19.5, 20.0, 20.5, 21.0])
+    everywhere = JointBox(np.full(6, -10.0), np.full(6, 10.0))
+    rectangle = Rectangle(sampler, places, t, image)
+    rows = rectangle.rows(rectangle.missed(everywhere)[0], 1e-6)
+    shut = {row.contact_position: np.isnan(row.q[:, 0]).tolist() for row in rows}
+    assert shut[0.0] == [False, False, True, True]
+    assert shut[2.0] == [False] * 4
+    below, above = np.array([[-1.0]] * 4), np.array([[1.0]] * 4)
+    edges = shut_edges(places, np.hstack([below, above]), rows, everywhere)
+    assert 2 * 4 + 1 in edges  # from below the row at 0 to above it, where it is shut
+    assert not set(range(4)) & set(edges.tolist())  # from place 19.5 to 20 it is not
 
 
 def test_a_way_is_narrow_where_it_slides_past_what_is_shut_at_a_place():
