@@ -62,6 +62,20 @@ def test_passes_end_where_leads_leave_the_clearance_and_hardly_more(tmp_path):
     assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)
 
 
+@pytest.mark.parametrize(
+    "drawn",
+    [
+        (20262302, 7, 0),  # all along a pass, no track gets past where joints turn too far
+        (20262301, 18, 0),  # sweeps lead past where they do, and then no further
+    ],
+)
+def test_the_least_motion_is_found_though_tracks_sweep_over_what_is_shut(drawn, tmp_path):
+    draw_job(*drawn, tmp_path)
+    job = opl.load_job(tmp_path / "job.yaml")
+    plan = search_path(job.search, problem_of(job)).plan
+    assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)
+
+
 def test_leads_that_sink_between_their_configurations_are_not_tried_one_by_one(tmp_path):
     """A channel that is bowed: its leads run along a wall, as deep in the belt as is allowed."""
     draw_job(20262601, 38, 0, tmp_path, families=["channel", "step"])
