@@ -76,6 +76,14 @@ def test_the_least_motion_is_found_though_tracks_sweep_over_what_is_shut(drawn, 
     assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)
 
 
+def test_cells_that_end_at_the_limits_of_joints_prove_that_no_motion_exists(tmp_path):
+    """A filleted box: with what is beyond the limits, its walls would be crossed."""
+    draw_job(20262805, 7, 0, tmp_path)
+    job = opl.load_job(tmp_path / "job.yaml")
+    with pytest.raises(opl.NoPathError, match="it is proven that no motion"):
+        search_path(job.search, problem_of(job))
+
+
 def test_leads_that_sink_between_their_configurations_are_not_tried_one_by_one(tmp_path):
     """A channel that is bowed: its leads run along a wall, as deep in the belt as is allowed."""
     draw_job(20262601, 38, 0, tmp_path, families=["channel", "step"])
