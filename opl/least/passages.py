@@ -125,9 +125,9 @@ class Rectangles:
         What tracks do not get past mostly is as long as a pass: cut finer where the last track met
         it, the next would only go around that.
         """
-        own = np.flatnonzero(self._points.pass_index == self._points.pass_index[int(bulge.first)])
+        begin, end = self._ends_of_pass(bulge.first)
         far = 2.0**self._refined
-        first, last = max(bulge.first - far, own[0]), min(bulge.last + far, own[-1])
+        first, last = max(bulge.first - far, begin), min(bulge.last + far, end)
         self._between = np.union1d(self._between, np.arange(first, last) + 0.5)
 
     def _cut_along(
@@ -206,11 +206,16 @@ class Rectangles:
         apart = (np.diff(cut) > 2 * AROUND) | (np.diff(passes) > 0)
         windows = []
         for group in np.split(cut, np.flatnonzero(apart) + 1):
-            own = np.flatnonzero(self._points.pass_index == self._points.pass_index[int(group[0])])
-            first, last = max(group[0] - AROUND, own[0]), min(group[-1] + 1.0 + AROUND, own[-1])
+            begin, end = self._ends_of_pass(group[0])
+            first, last = max(group[0] - AROUND, begin), min(group[-1] + 1.0 + AROUND, end)
             inside = self._between[(self._between > first) & (self._between < last)]
             windows.append(np.union1d(np.arange(first, last + 1.0), inside))
         return windows
+
+    def _ends_of_pass(self, place: float) -> tuple[int, int]:
+        """Return the first and the last cutter point of the pass that a place is on."""
+        own = np.flatnonzero(self._points.pass_index == self._points.pass_index[int(place)])
+        return int(own[0]), int(own[-1])
 
     def _rectangle(self, places: Array, placements: Sequence[Placement]) -> Rectangle:
         """Return the rectangle of some places of a pass."""

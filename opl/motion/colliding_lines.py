@@ -33,13 +33,16 @@ class CollidingLines:
         self._looked_at: set[Line] = set()
         self._hitting: set[Line] = set()
 
-    def known_with(self, chain: NDArray[np.intp]) -> frozenset[Line]:
-        """Return all lines that are known to hit something, those of a chain looked at.
+    def known_after(self, chain: NDArray[np.intp]) -> frozenset[Line]:
+        """Return all lines that are known to hit something once those of a chain are looked at.
 
-        Where some of it do, lines beside them are looked at, and beside those that do of these,
-        until as many more are found as were known: so few choices are made, and few lines looked
-        at in vain. Lines between neighbours are not: where one of them hits something it is told,
-        but there are no others to take instead.
+        Where some of its lines do, those beside them are looked at, and those beside the ones of
+        them that do, until as many more are found as were known: so few choices are made, and few
+        lines looked at in vain. Lines between neighbouring configurations are looked at in chains
+        only: there is no other to take instead.
+
+        Args:
+            chain: Indices of the configurations that its lines join, in order, shape (k,).
         """
         found = self._look_at(pairwise(chain.tolist()))
         most = 2 * len(self._hitting)

@@ -91,10 +91,9 @@ class Lines:
         starts, first, _ = self._found[kept.tobytes()]
         ends = np.repeat(np.arange(len(kept)), np.diff(first))
         place = np.searchsorted(kept, lines[np.isin(lines, kept).all(axis=1)])
+        begin, end = (place[:, which, None] + _STEPS for which in (0, 1))
         # no line starts behind its end, so one beyond the first or last configuration is no line
-        near = (place[:, 1, None] + _STEPS)[:, :, None] * len(kept) + (place[:, 0, None] + _STEPS)[
-            :, None, :
-        ]
+        near = end[:, :, None] * len(kept) + begin[:, None, :]
         found = np.isin(ends * len(kept) + starts, near)
         return list(zip(kept[starts[found]].tolist(), kept[ends[found]].tolist(), strict=True))
 

@@ -155,7 +155,7 @@ def _chosen(
         corners = [_moved(turn, start) for turn in rule.too_wide(thinned)]
         bowed = bowed_lines(scene.cell, points, thinned, rule.max_contact_error)
         off = [*corners, *(_moved(line, start) for line in bowed)]
-        barred = {*colliding.known_with(kept), *(_moved(rows, -first) for rows in off)}
+        barred = {*colliding.known_after(kept), *(_moved(rows, -first) for rows in off)}
         # of neighbouring configurations there are none to put in between
         barred = {rows for rows in barred if rows[-1] - rows[0] > len(rows) - 1}
         if barred <= blocked:

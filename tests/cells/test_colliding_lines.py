@@ -60,7 +60,7 @@ def test_the_choice_is_that_of_one_chain_at_a_time_with_fewer_choices(depth_mm, 
     colliding = CollidingLines(MoveCheck(cell, scene, part), motion, lines)
     while True:
         kept, mine = fewest(screws, run, RULE, known, lines), mine + 1
-        before, known = known, between_others(colliding.known_with(kept))
+        before, known = known, between_others(colliding.known_after(kept))
         if known == before:
             break
 
