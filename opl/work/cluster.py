@@ -9,7 +9,9 @@ from __future__ import annotations
 import os
 import tempfile
 import threading
+import time
 from collections.abc import Mapping
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
@@ -106,30 +108,34 @@ class ClusterDoer:
         """Do a task; return what became of it, None if it was cancelled.
 
         Raises:
-            WorkerDied: If the scheduler gave it up, because workers died of it.
+            WorkerDied: If the scheduler gave it up, because workers died of it, or was lost.
         """
         distributed: Any = import_module("distributed")
         try:
             parcel = packed(task, self._limits)
         except InputError as error:
             return Outcome("bad input", error.exit_status, str(error))
+        if self._client.status == "closed":  # it found no scheduler any more for `PATIENCE`
+            message = f"{task.job}: the scheduler of the cluster does not answer any more"
+            return Outcome("error", BUG, message, final=False)
         future = self._client.submit(perform, parcel, pure=False)
-        while True:
-            try:
-                outcome, files = future.result(timeout=BEAT)
-                break
-            except (TimeoutError, distributed.TimeoutError):
-                if self._stopped:
-                    future.cancel(force=True)
-                    raise WorkerDied from None
-                if not beat(Progress(ELSEWHERE)):
-                    future.cancel(force=True)
-                    return None
-            except (distributed.scheduler.KilledWorker, OSError) as error:
-                raise WorkerDied from error
-            except Exception as error:  # what Python could not do there, e.g. import opl
-                message = f"{task.job}: {type(error).__name__} on the cluster: {error}"
-                return Outcome("error", BUG, message, final=False)
+        # looked at, not asked for with a timeout: one that runs out while the outcome is fetched
+        # leaves the client without the outcome of any other task (distributed 2026.8)
+        while not future.done():
+            time.sleep(BEAT)
+            if self._stopped:
+                future.cancel(force=True)
+                raise WorkerDied
+            if not beat(Progress(ELSEWHERE)):
+                future.cancel(force=True)
+                return None
+        try:
+            outcome, files = future.result()
+        except (distributed.scheduler.KilledWorker, CancelledError, OSError) as error:
+            raise WorkerDied from error  # or the scheduler was lost, which cancels what it had
+        except Exception as error:  # what Python could not do there, e.g. import opl
+            message = f"{task.job}: {type(error).__name__} on the cluster: {error}"
+            return Outcome("error", BUG, message, final=False)
         message = outcome.message.replace(parcel.task.job, task.job)
         return _delivered(task, replace(outcome, message=message), files)
 

@@ -1,11 +1,13 @@
 """Jobs on a real scheduler with two worker processes: the same bytes, lost workers, versions."""
 
+import asyncio
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -13,7 +15,7 @@ import pytest
 import opl
 from opl.store.values import Outcome, Task
 from opl.work import cluster
-from opl.work.worker import Limits
+from opl.work.worker import BEAT, Limits, WorkerDied
 from tests.support.jobs import opl as command
 from tests.support.jobs import write_job
 
@@ -84,6 +86,7 @@ def test_the_same_bytes_come_back_though_a_worker_is_killed(machines, tmp_path, 
     os.kill(victim, signal.SIGKILL)
     out, _ = batch.communicate(timeout=300)
     rows = {Path(row["job"]).parent.name: row for row in json.loads(out)}
+    assert [rows[str(number)]["message"] for number in range(6)] == [""] * 6
     assert [rows[str(number)]["status"] for number in range(6)] == ["ok"] * 6
     assert (
         rows["bad"]["message"] == "jobs/bad/job.yaml: wheel.width_mm: must be more than 0, got -3"
@@ -111,6 +114,55 @@ def test_other_versions_are_refused_with_the_reason(machines, tmp_path, monkeypa
         f"numpy {versions and __import__('numpy').__version__} there, 1.0 here" in outcome.message
     )
     assert not (tmp_path / "out").exists()
+
+
+def test_outcomes_come_back_however_long_they_take_to_fetch(machines, tmp_path, monkeypatch):
+    _, client = machines
+    monkeypatch.chdir(write_job(tmp_path, SMALL).parent)
+    monkeypatch.setattr(cluster, "made_with", lambda: {"code": "other"})  # an outcome at once
+    fetch = client._gather_remote
+
+    async def slowly(*arguments):
+        await asyncio.sleep(4.0 * BEAT)
+        return await fetch(*arguments)
+
+    monkeypatch.setattr(client, "_gather_remote", slowly)
+    doer = cluster.ClusterDoer(client, Limits())
+    for _ in range(3):
+        outcome = doer.do(Task("run", "job.yaml", "out"), lambda *_: True)
+        assert "a worker of the cluster has other versions" in outcome.message
+
+
+def cut_off(dask_scheduler):
+    """Break the connections of all clients, as a fault of the network would."""
+    for comm in list(dask_scheduler.client_comms.values()):
+        comm.comm.abort()
+
+
+def test_a_task_of_a_connection_that_breaks_goes_back(machines, tmp_path, monkeypatch):
+    _, client = machines
+    monkeypatch.chdir(write_job(tmp_path, SMALL).parent)
+    doer = cluster.ClusterDoer(client, Limits())
+
+    def beat(_):
+        with suppress(OSError):  # the answer would come by the connection that is cut
+            client.run_on_scheduler(cut_off)
+        return True
+
+    with pytest.raises(WorkerDied):
+        doer.do(Task("run", "job.yaml", "out"), beat)
+    outcome = doer.do(Task("run", "job.yaml", "out"), lambda *_: True)  # the next one
+    assert (outcome.status, outcome.message) == ("ok", "")
+
+
+def test_a_task_for_a_scheduler_that_was_lost_is_refused(machines, tmp_path, monkeypatch):
+    address, _ = machines
+    monkeypatch.chdir(write_job(tmp_path, SMALL).parent)
+    client = distributed.Client(address, timeout="20s", set_as_default=False)
+    client.close()  # as it closes itself, when it finds no scheduler any more
+    outcome = cluster.ClusterDoer(client, Limits()).do(Task("run", "job.yaml", "out"), lambda *_: 1)
+    assert (outcome.status, outcome.final) == ("error", False)
+    assert outcome.message == "job.yaml: the scheduler of the cluster does not answer any more"
 
 
 def test_what_cannot_travel_is_refused(machines, tmp_path, monkeypatch):
