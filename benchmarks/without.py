@@ -1,8 +1,9 @@
 """What each part of the proof is worth: random jobs, with one part left out at a time.
 
 By hand: python -m benchmarks.without --seed 7 --count 60. The same jobs are searched with
-everything and without each part; the table goes into WITHOUT.md. What leaves no more jobs open
-without it, in a run of many, and has none take much longer, is not worth its lines.
+everything and without each part; the table goes into WITHOUT.md. Jobs that are proven to have no
+motion count beside those that are closed. What leaves no more jobs open without it, in a run of
+many, and has none take much longer, is not worth its lines.
 """
 
 from __future__ import annotations
@@ -111,39 +112,46 @@ def leave_out(name: str | None) -> None:
         patch.object(owner, attribute, other).start()
 
 
+def settled(outcome: Outcome) -> bool:
+    """Return whether a job is closed, or proven to have no motion."""
+    return outcome.closed or outcome.status == "no_path"
+
+
 def line(name: str, lines: int, outcomes: Mapping[Draw, Outcome], among: set[Draw]) -> str:
-    """Return a line of the table: what became of the jobs that are closed with everything."""
-    still = [key for key in among if outcomes[key].closed]
-    left = [outcomes[key] for key in sorted(among) if not outcomes[key].closed]
+    """Return a line of the table: what became of the jobs that are settled with everything."""
+    closed = [key for key in among if outcomes[key].closed]
+    none = [key for key in among if outcomes[key].status == "no_path"]
+    left = [outcomes[key] for key in sorted(among) if not settled(outcomes[key])]
     without_path = [one for one in left if one.found is None]
     gaps = [one.gap for one in left if one.gap is not None]
     jobs = ", ".join(f"{one.index}.{one.attempt}" for one in left)
     seconds = sum(outcomes[key].processor_s for key in among)
     largest = f"{100.0 * max(gaps):.1f} %" if gaps else "-"
     count = str(lines) if lines else "-"
-    cells = (name, count, len(still), len(without_path), largest, f"{seconds:.0f}", jobs or "-")
+    counts = len(closed), len(none), len(without_path)
+    cells = name, count, *counts, largest, f"{seconds:.0f}", jobs or "-"
     return "| " + " | ".join(map(str, cells)) + " |"
 
 
 def page(seed: int, measured: str, found: Mapping[str, Mapping[Draw, Outcome]]) -> str:
     """Return the table of a revision as Markdown; what was found with everything comes first."""
     everything, *others = found
-    among = {key for key, one in found[everything].items() if one.closed}
+    among = {key for key, one in found[everything].items() if settled(one)}
     count = 1 + max(index for index, _ in found[everything])
     return "\n".join(
         [
             f"# The proof without one of its parts, seed {seed}",
             "",
             f"Written by `python -m benchmarks.without --seed {seed} --count {count}`, opl "
-            f"{opl.__version__} at {measured}. Of the {len(among)} random jobs that are closed "
-            "with everything: how many still are without a part, how many of the others have no "
-            f"motion at all (or took more than {LONGEST:g} s), the largest gap of the rest, and "
-            "the processor time of "
+            f"{opl.__version__} at {measured}. Of the {len(among)} random jobs that are closed, or "
+            "proven to have no motion, with everything: how many still are without a part, of how "
+            "many of the others neither a motion is found nor proven that there is none (or took "
+            f"more than {LONGEST:g} s), the largest gap of the rest, and the processor time of "
             "search and clearance of all of them, side by side with others.",
             "",
-            "| without | lines of its own | closed | no motion | largest gap | processor, s "
-            "| open |",
-            "|" + "---|" * 7,
+            "| without | lines of its own | closed | proven to have none | neither | largest gap "
+            "| processor, s | open |",
+            "|" + "---|" * 8,
             line(everything, 0, found[everything], among),
             *(line(f"{name}: {PARTS[name].what}", PARTS[name].lines, found[name], among)
               for name in others),
@@ -176,7 +184,8 @@ def main() -> None:
         given = arguments.seed, draws, arguments.folder, arguments.workers, False, done, begin
         run_strangers(*given)
         if name not in PARTS:  # the others search the same draws
-            draws = [[key] for key, one in sorted(outcomes.items()) if one.status in SEARCHED]
+            kept = (*SEARCHED, "no_path")
+            draws = [[key] for key, one in sorted(outcomes.items()) if one.status in kept]
         print(name, sum(one.closed for one in outcomes.values()), flush=True)
         TABLE.write_text(page(arguments.seed, measured, found), encoding="utf-8")
 

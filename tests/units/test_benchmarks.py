@@ -78,18 +78,18 @@ def test_what_is_left_out_of_the_proof_is_there():
             assert callable(getattr(owner, attribute)) and callable(other)
 
 
-def test_a_page_without_a_part_counts_what_was_closed_with_everything():
+def test_a_page_without_a_part_counts_what_was_closed_or_proven_impossible_with_everything():
     def outcomes(*gaps):
-        facts = [{} if gap is None else {"found": 1.0, "bound": 1.0 - gap} for gap in gaps]
-        status = ["not found" if gap is None else "ok" for gap in gaps]
-        found = [stranger(k, status[k], processor_s=2.0, **facts[k]) for k in range(len(gaps))]
-        return {(one.index, one.attempt): one for one in found}
+        found = {}
+        for index, gap in enumerate(gaps):
+            facts = {"status": gap} if isinstance(gap, str) else {"found": 1.0, "bound": 1.0 - gap}
+            status = facts.pop("status", "ok")
+            found[index, 0] = stranger(index, status, processor_s=2.0, **facts)
+        return found
 
-    text = page_without(
-        7,
-        "abc1234",
-        {"nothing": outcomes(0.0, 0.001, 0.0, 0.3), "hope": outcomes(0.0, None, 0.05, 0.0)},
-    )
-    assert "at abc1234. Of the 3 random jobs" in text
-    assert "| nothing | - | 3 | 0 | - | 6 | - |" in text
-    assert f"| {PARTS['hope'].lines} | 1 | 1 | 5.0 % | 6 | 1.0, 2.0 |" in text
+    everything = outcomes(0.0, 0.001, 0.0, 0.3, "no_path", "no_path")
+    without = outcomes(0.0, "not found", 0.05, 0.0, "not found", "no_path")
+    text = page_without(7, "abc1234", {"nothing": everything, "hope": without})
+    assert "at abc1234. Of the 5 random jobs" in text
+    assert "| nothing | - | 3 | 2 | 0 | - | 10 | - |" in text
+    assert f"| {PARTS['hope'].lines} | 1 | 1 | 2 | 5.0 % | 10 | 1.0, 2.0, 4.0 |" in text
