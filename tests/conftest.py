@@ -19,6 +19,13 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("NUMBA_NUM_THREADS", "1")
 
 
+def pytest_configure(config):
+    if getattr(config.option, "numprocesses", 0) and not hasattr(config, "workerinput"):
+        from tests.support.all_kernels import compile_all
+
+        compile_all()
+
+
 def pytest_addoption(parser):
     parser.addoption(
         "--rewrite-golden",
