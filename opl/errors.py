@@ -50,17 +50,23 @@ class NoPathError(OplError):
         message: What stops the path, and where.
         reasons: One line for each run of cutter points that cannot be passed.
         lower_bound: Where none was found: no motion has a smaller joint range sum, in [rad].
+        at_leads: Whether what stops it was met where passes begin or end, too.
     """
 
     exit_status = 3
 
     def __init__(
-        self, message: str, reasons: Sequence[str] = (), lower_bound: float | None = None
+        self,
+        message: str,
+        reasons: Sequence[str] = (),
+        lower_bound: float | None = None,
+        at_leads: bool = False,
     ) -> None:
         super().__init__("\n".join([message, *reasons]))
         self.message = message
         self.reasons = tuple(reasons)
         self.lower_bound = lower_bound
+        self.at_leads = at_leads
 
 
 class NoFreeMoveError(NoPathError):

@@ -57,6 +57,7 @@ SEARCH_OBJECTIVE = "search.objective"
 SEARCH_CONTACT_WEIGHT = "search.weights.contact"
 
 PROCESS_HOME = "process.home_deg"
+PROCESS_APPROACH = "process.approach_mm"
 PROCESS_FEED = "process.feed_mm_s"
 PROCESS_CONTACT_SPEED = "process.max_contact_speed"
 PROCESS_MAX_DWELL = "process.max_dwell_s"

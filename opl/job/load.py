@@ -22,6 +22,7 @@ from opl.job.bodies import bodies_in_si, pose_of
 from opl.job.file import JobFile
 from opl.job.inputs import input_digests
 from opl.job.methods import Method
+from opl.job.process import check_leads
 from opl.job.source import Source
 from opl.job.sweeps import with_value
 from opl.job.user_frame import home_in_user_frame
@@ -147,6 +148,8 @@ def _in_si(file: JobFile, source: Source, method: str | None,
         limits=around.cell.limits,
     )
     check_home(around.home_key, cell, around.home)
+    process = file.process.in_si(around.home, file.program.one_job_per_pass)
+    check_leads(source, process, cell.part_from_wheel)
     search = file.search.in_si(file.passes.max_chord_error_mm)
     if method is not None:
         search = replace(search, method=Method(method))
@@ -165,6 +168,6 @@ def _in_si(file: JobFile, source: Source, method: str | None,
         surface=surface,
         passes=file.passes.in_si(source, surface, cell.wheel.radius),
         search=search,
-        process=file.process.in_si(home, file.program.one_job_per_pass),
+        process=replace(process, home=home),
         program=file.program.in_si(source, file.name, robot, home, at_wheel, load),
     )

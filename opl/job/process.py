@@ -10,10 +10,13 @@ import numpy as np
 from pydantic import ConfigDict, Field
 
 from opl.cell.robot import Robot
+from opl.errors import InputError
 from opl.files.documents import Document
 from opl.files.quantities import Positive, between
 from opl.geometry.frames import Array
+from opl.job import keys
 from opl.job.bodies import MM, Six
+from opl.job.source import Source
 from opl.motion.process_settings import ProcessSettings
 
 SixPositive = Annotated[list[Positive], Field(min_length=6, max_length=6)]
@@ -102,4 +105,26 @@ class ProcessSection(Document):
             max_dwell=self.max_dwell_s,
             home=home,
             home_between=home_between,
+        )
+
+
+def check_leads(source: Source, process: ProcessSettings, from_wheel: float) -> None:
+    """Refuse leads that end where no free move may begin, wherever a pass does.
+
+    Args:
+        source: The job file.
+        process: What it sets.
+        from_wheel: Distance that the part keeps from the wheel on free moves in [m].
+
+    Raises:
+        InputError: If they are too short.
+    """
+    farthest = process.lead_shape().farthest
+    if farthest < from_wheel:
+        kept, length = from_wheel / MM, process.approach_length / MM
+        raise InputError(
+            source.at(keys.PROCESS_APPROACH),
+            f"must lead the part as far off the wheel as free moves keep it, {kept:g} mm "
+            f"({keys.CLEARANCE}, or pair_clearances of the cell); {length:g} mm lead it "
+            f"{farthest / MM:.2g} mm off at the most",
         )

@@ -48,8 +48,8 @@ def plan_optimal(
         settings: What is wanted.
         fallback: A motion that is known, if one is: joints and contact should travel no further.
         follow: Given the joint range sum of the best motion and its lower bound after every step.
-        otherwise: Looks for a motion in another way, where the proof finds none, given how many
-            units of work are left for that.
+        otherwise: Looks for a motion in another way, where the proof finds none, nor that there is
+            none, given how many units of work are left for that.
         seams: Where full turns are counted from, where that is known.
         untried: Whether no motion was tried: else where none is known, those tried collide.
         beside: What may work beside this process, if anything.
@@ -61,6 +61,7 @@ def plan_optimal(
         NoMotionError: If no motion was known and none was found.
     """
     search = OptimalSearch(problem, settings, fallback, seams, untried)
+    widest = float((problem.cell.robot.upper - problem.cell.robot.lower).sum())
     share = 1.0 if otherwise is None else 1.0 - OTHERWISE_SHARE
 
     def goes_on() -> bool:
@@ -76,14 +77,13 @@ def plan_optimal(
         return False
 
     ended = go_on(share)
-    if search.plan is None and otherwise is not None:
+    if search.plan is None and otherwise is not None and search.lower_bound <= widest:
         left = max(OTHERWISE_SHARE, 1.0 - search.work_share)  # a step may take more than was left
         search.keep(otherwise(left * settings.max_subproblems))
         ended = go_on(1.0)
     if search.plan is None:
-        robot, least = problem.cell.robot, search.lower_bound
-        proven = least > float((robot.upper - robot.lower).sum())
-        raise NoMotionError(least, proven, search.work_share >= 1.0)
+        least = search.lower_bound
+        raise NoMotionError(least, least > widest, search.work_share >= 1.0)
     found = replace(search.plan, lower_bound=search.lower_bound, holders=search.holders(beside))
     return replace(found, open_because=_open_because(found, settings, search, ended))
 

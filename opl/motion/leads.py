@@ -50,6 +50,11 @@ class LeadShape:
         """Radius of the quarter of a circle in [m]."""
         return min(self.run, self.length)
 
+    @property
+    def farthest(self) -> float:
+        """Distance of the far end from the contact in [m]: no lead gets farther off the wheel."""
+        return float(np.linalg.norm(self.offsets(MoveKind.RETRACT, 1.0)[-1]))
+
     def places(self) -> Array:
         """Return how far along the way the configurations are, off the wheel first, in [m]."""
         quarter = self.radius * np.pi / 2.0

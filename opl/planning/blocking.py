@@ -90,16 +90,16 @@ def _block_link(
         cause, home_end = f"{kind.value}: {error}", int(to_home)
     if error.end in (None, home_end):
         matrix.cut_off[kind, error.pair] += 1
-    if kind is FreeMove.TO_HOME:
+    if error.end == 0 and home_end != 0:  # where the lead ends, no free move begins
+        matrix.block_node(before, track[before], f"retract: {error}")
+    elif error.end == 1 and home_end != 1:
+        matrix.block_node(after, track[after], f"approach: {error}")
+    elif kind is FreeMove.TO_HOME:
         for row in _joined(problem, matrix, MoveKind.RETRACT, before, track[before]):
             matrix.block_node(before, row, cause)
     elif kind is FreeMove.FROM_HOME:
         for row in _joined(problem, matrix, MoveKind.APPROACH, after, track[after]):
             matrix.block_node(after, row, cause)
-    elif error.end == 0:
-        matrix.block_node(before, track[before], f"retract: {cause}")
-    elif error.end == 1:
-        matrix.block_node(after, track[after], f"approach: {cause}")
     else:
         from_rows = _joined(problem, matrix, MoveKind.RETRACT, before, track[before])
         to_rows = _joined(problem, matrix, MoveKind.APPROACH, after, track[after])

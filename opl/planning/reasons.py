@@ -52,7 +52,17 @@ def no_path(problem: GrindingProblem, matrices: list[OpenMatrix], scope: str = "
         where = f"no path beyond cutter point {reached - 1} ({reached} of {n} reached)"
     positions = len(problem.field.contact_positions)
     scope = scope or f"looked for at {positions} contact positions, not between them"
-    return NoPathError(where, [*explain(problem, matrices), scope])
+    return NoPathError(where, [*explain(problem, matrices), scope], at_leads=leads_stop(matrices))
+
+
+def leads_stop(matrices: list[OpenMatrix]) -> bool:
+    """Return whether approaches and retracts collide, or end too near to the wheel to move on."""
+    causes = {cause for matrix in matrices for _, cause in matrix.causes}
+    at_the_wheel = f": {PART} and {WHEEL}"  # with a free move before it
+    return any(
+        cause.startswith(("approach: ", "retract: ")) or cause.endswith(at_the_wheel)
+        for cause in causes
+    )
 
 
 def cut_off_in(matrices: list[OpenMatrix]) -> Counter[tuple[FreeMove, Blocker]]:

@@ -28,6 +28,7 @@ PROBED_COLUMNS = 8  # cutter points that must have a free node before a change i
 
 # smallest first: of each kind the first that opens the job is reported
 MORE_ROLL_DEG = (5.0, 10.0, 20.0, 30.0, 45.0)
+LONGER_APPROACH_MM = (20.0, 50.0, 100.0)
 OTHER_WIDTH_MM = (-5.0, 10.0, -10.0, -20.0, 25.0, -30.0)
 MORE_CONTACT_CHANGE = (2.0, 5.0, 20.0, 100.0)  # times
 MORE_PENETRATION_MM = (0.25, 0.5, 1.0, 2.0)
@@ -54,6 +55,7 @@ class Remedies:
 def find_remedies(
     job: Job,
     points: CutterPoints,
+    at_leads: bool = False,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> Remedies:
     """Return the smallest single changes that open a job, each planned again.
@@ -61,6 +63,7 @@ def find_remedies(
     Args:
         job: A job for which no path was found.
         points: Its cutter points.
+        at_leads: Whether approaches and retracts were among what stopped it.
         progress: Called before each change with the part of the checks that is used up, 0 to 1.
     """
     columns = np.unique(np.linspace(0, len(points) - 1, PROBED_COLUMNS).astype(int))
@@ -71,7 +74,7 @@ def find_remedies(
     )
     found, in_vain = list[str](), list[str]()
     left = MOST_IN_ALL
-    for what, kind in KINDS.items():
+    for what, kind in {**(AT_LEADS if at_leads else {}), **KINDS}.items():
         changes = list(kind(job))
         for change, other in changes:
             progress(1.0 - left / MOST_IN_ALL)
@@ -125,6 +128,15 @@ def _more_roll(job: Job) -> Iterator[Change]:
             yield change, _with_wheel(job, max_roll=float(np.deg2rad(now + more)))
 
 
+def _longer_approach(job: Job) -> Iterator[Change]:
+    now = job.process.approach_length * MM
+    for longer in LONGER_APPROACH_MM:
+        if longer > now:
+            process = replace(job.process, approach_length=longer / MM)
+            change = f"{keys.PROCESS_APPROACH} {longer:g} instead of {now:g}"
+            yield change, replace(job, process=process)
+
+
 def _other_width(job: Job) -> Iterator[Change]:
     now = job.cell.wheel.width * MM
     for more in OTHER_WIDTH_MM:
@@ -174,7 +186,10 @@ def _turned_fixture(job: Job) -> Iterator[Change]:
         yield change, _with_cell(job, T_flange_workpiece=T_flange_workpiece)
 
 
-# tried in this order, each kind by itself
+# tried in this order, each kind by itself; these only where leads stopped motions, else for nothing
+AT_LEADS: dict[str, Callable[[Job], Iterator[Change]]] = {
+    f"a longer {keys.PROCESS_APPROACH}": _longer_approach
+}
 KINDS: dict[str, Callable[[Job], Iterator[Change]]] = {
     f"a larger {keys.SEARCH_CONTACT_CHANGE}": _more_contact_change,
     f"a larger {keys.WHEEL_MAX_ROLL}": _more_roll,

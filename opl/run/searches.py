@@ -23,7 +23,7 @@ from opl.planning.multi_start import (
 )
 from opl.planning.plan import Exhausted, Found, OutOfBudget, Plan
 from opl.planning.problem import GrindingProblem
-from opl.planning.reasons import cut_off_in, explain, no_path
+from opl.planning.reasons import cut_off_in, explain, leads_stop, no_path
 from opl.planning.settings import ObjectiveWeights, Start
 from opl.planning.so_far import Follow, SoFar, to_the_end
 from opl.run.values import Prepared
@@ -129,7 +129,8 @@ def _search_range(
         raise no_path(problem, last.matrices, f"proven: {NONE_IS_FREE}")
     if proven:
         reasons = explain(problem, in_turns.matrices)
-        raise NoPathError(f"no path: it is proven that {NONE_IS_FREE}", reasons)
+        at_leads = leads_stop(in_turns.matrices)
+        raise NoPathError(f"no path: it is proven that {NONE_IS_FREE}", reasons, at_leads=at_leads)
     reasons = list[str]()
     tried = f"the {last.checks} best motions of the recursive search are not free"
     if isinstance(last, Exhausted):
@@ -147,6 +148,7 @@ def _search_range(
         "robot, may help",
         reasons,
         lower_bound=least,
+        at_leads=leads_stop(in_turns.matrices),
     )
 
 

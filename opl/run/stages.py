@@ -280,5 +280,5 @@ def _without_path(prepared: Prepared, error: NoPathError, watch: Watch) -> Refus
         return Refused(prepared, error, (), watch.seconds)
     surfaced = prepared.surfaced
     with watch.stage(Stage.REMEDIES) as progress:
-        remedies = find_remedies(surfaced.job, surfaced.points, progress)
+        remedies = find_remedies(surfaced.job, surfaced.points, error.at_leads, progress)
     return Refused(prepared, error, remedies.found, watch.seconds, remedies.in_vain)

@@ -194,6 +194,11 @@ def test_a_job_may_name_its_own_joint_accelerations(tmp_path):
             "search.max_contact_error_mm: must be larger than passes.max_chord_error_mm, which is "
             "part of it, got 0.3 and 0.3",
         ),
+        (
+            {"process.approach_mm": 3, "process.approach_turn_deg": 90},
+            "process.approach_mm: must lead the part as far off the wheel as free moves keep it, "
+            "5 mm (clearance_mm, or pair_clearances of the cell); 3 mm lead it 4 mm off at the",
+        ),
         ({"name": "my part"}, "name: must be 1 to 28 capital letters, digits, _ or -"),
         ({"name": "A\n"}, "name: must be 1 to 28 capital letters, digits, _ or -"),
         (

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from opl.errors import NoPathError
 from opl.job.load import load_job
-from opl.run.remedies import _fed_in_reverse, _other_side, find_remedies
+from opl.run.preparing import prepare
+from opl.run.remedies import Remedies, _fed_in_reverse, _other_side, find_remedies
+from opl.run.searches import search_path
 from opl.run.surfacing import cut_surface
 from tests.support.jobs import POST, opl, write_job, write_trough
 from tests.support.planned import v_job
@@ -26,6 +29,22 @@ def test_a_narrower_wheel_opens_a_trough_and_is_told(tmp_path):
     for remedy in result["remedies"]:
         assert remedy.startswith("would be possible with ")
         assert remedy in ended.err
+
+
+def test_a_longer_approach_is_told_where_leads_end_too_near_to_the_wheel(tmp_path, monkeypatch):
+    short = {"clearance_mm": 10, "process.approach_mm": 10, "process.approach_run_mm": 1}
+    small = {"passes.rows": 2, "passes.max_step_mm": 40, "search.contact_positions": 25}
+    job = load_job(write_job(tmp_path / "short", {**small, **short}))
+    surfaced = cut_surface(job)
+    with pytest.raises(NoPathError, match="approach: part and wheel") as caught:
+        search_path(job.search, prepare(surfaced).problem)
+    assert caught.value.at_leads
+    monkeypatch.setattr("opl.run.remedies.KINDS", {})
+    (told,) = find_remedies(job, surfaced.points, at_leads=True).found
+    assert "possible with process.approach_mm 20 instead of 10 " in told
+    assert find_remedies(job, surfaced.points) == Remedies()  # tried where leads stop motions
+    longer = write_job(tmp_path / "longer", {**small, **short, "process.approach_mm": 20})
+    assert opl("run", longer, "--out", tmp_path / "out").status == 0
 
 
 def test_a_post_before_the_wheel_is_avoided_on_another_side_of_it(tmp_path):
