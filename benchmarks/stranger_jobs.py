@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 import opl
 from benchmarks.stranger_parts import FAMILIES, Array, Part, draw_part
+from benchmarks.uncommon import MOST_ROWS, make_uncommon, uncommon_count, uncommon_wheel
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.geometry.frames import inverse, pose
 from opl.geometry.wheel import ContactWheel
@@ -65,6 +66,7 @@ def draw_job(
     folder: Path,
     objective: str = "range",
     families: Sequence[str] = tuple(FAMILIES),
+    uncommon: bool = False,
 ) -> Stranger | None:
     """Draw a job and write its files.
 
@@ -75,6 +77,7 @@ def draw_job(
         folder: Where its files are written, empty.
         objective: What the search keeps small.
         families: Of parts, one of which is drawn.
+        uncommon: Whether the job has what few jobs have.
 
     Returns:
         The job; None if the arm did not reach the part however both were placed.
@@ -84,6 +87,8 @@ def draw_job(
     robot = opl.load_robot(name)
     size = np.round(random.uniform(60.0, 200.0)), np.round(random.uniform(12.0, 60.0))
     roll = float(random.choice([0.0, *random.uniform(10.0, 60.0, 5)]).round())
+    if uncommon:
+        *size, roll = uncommon_wheel(random)
     family = str(random.choice(list(families)))
     part = draw_part(family, random, size)
     across = family == "box" or part.walls is not None or random.random() < 0.7
@@ -97,10 +102,15 @@ def draw_job(
     if placed is None:
         return None
     points = int(random.integers(60, 300))
+    rows = int(random.integers(1, 7))
+    if uncommon:
+        points, rows = 20 * uncommon_count(random, 45), uncommon_count(random, MOST_ROWS)
     surface = part.write(folder)
-    job = _document(random, robot, part, placed, normal, points, roll)
+    job = _document(random, robot, part, placed, normal, (points, rows), roll)
     job["name"] = f"S{seed}_{index}"
     job["workpiece"]["surface"] = surface
+    if uncommon:
+        make_uncommon(random, job, part, folder)
     if objective != "range":  # which is the default
         job["search"]["objective"] = objective
     if surface.endswith(".step"):
@@ -187,15 +197,18 @@ def _document(
     part: Part,
     placed: _Placed,
     normal: Array,
-    points: int,
+    counts: tuple[int, int],
     roll: float,
 ) -> dict[str, Any]:
-    """Return the content of the job file, the surface of the workpiece still missing."""
+    """Return the content of the job file, the surface of the workpiece still missing.
+
+    `counts` are how many cutter points are aimed at, and how many rows.
+    """
+    points, rows = counts
     wheel = placed.wheel
     frames = part.frames(normal, (2, 41))
     p = 1e3 * frames[:, :3, 3].reshape(2, 41, 3)
     length = float(np.linalg.norm(np.diff(p, axis=1), axis=2).sum(axis=1).max())
-    rows = int(random.integers(1, 7))
     across = float(np.ptp(p.reshape(-1, 3) @ normal))
     if abs(normal[0]) < 0.9:  # rows across the part: as long as it is wide
         length = 2.0 * part.half[0]

@@ -107,6 +107,11 @@ def _spline(at: Function) -> tuple[Array, tuple[Array, Array], Array]:
     return net, (along_a.t, along_b.t), sheet
 
 
+def sheet_of(at: Function) -> Array:
+    """Return a fine sheet of points of the spline through samples, shape (m, n, 3), in [mm]."""
+    return _spline(at)[2]
+
+
 def solid(sheet: Array, thickness: float | None) -> trimesh.Trimesh:
     """Return the closed solid below a sheet of points, shape (m, n, 3)."""
     if thickness is None:

@@ -123,11 +123,13 @@ def page(
     outcomes: Sequence[Outcome],
     objective: str = "range",
     families: Sequence[str] = tuple(FAMILIES),
+    uncommon: bool = False,
 ) -> str:
     """Return the results of a seed, an objective and families of parts as a page of Markdown."""
     chosen = "" if objective == "range" else f" --objective {objective}"
     if tuple(families) != tuple(FAMILIES):
         chosen += f" --families {' '.join(families)}"
+    chosen += " --uncommon" if uncommon else ""
     searched = [one for one in outcomes if one.status in SEARCHED]
     closed = [one for one in searched if one.closed]
     quick = [one for one in closed if one.search_s <= QUICK]

@@ -6,7 +6,8 @@ side by side as --workers says, which share the cores. A job that is refused bef
 has no path, counts with its cause and is drawn again, until as many as asked for were searched. The
 same seed draws the same jobs, which --cases picks from: `--cases 3.0 17.2`; they are searched for
 the least of --objective. Parts are of all --families but those between walls, unless it names some.
-With --write the table goes into STRANGERS.md.
+With --uncommon they have what few jobs have, see `benchmarks/uncommon.py`. With --write the table
+goes into STRANGERS.md.
 """
 
 from __future__ import annotations
@@ -181,6 +182,7 @@ def run_strangers(
     begin: Callable[[], None] | None = None,
     objective: str = "range",
     families: Sequence[str] = tuple(FAMILIES),
+    uncommon: bool = False,
 ) -> None:
     """Draw jobs and run them side by side.
 
@@ -194,6 +196,7 @@ def run_strangers(
         begin: Called in each worker before any job, if given.
         objective: What the searches keep small.
         families: Of the parts.
+        uncommon: Whether the jobs have what few jobs have.
     """
     idle: SimpleQueue[Worker] = SimpleQueue()
     for _ in range(workers):
@@ -206,7 +209,7 @@ def run_strangers(
             own = folder / f"{seed}_{index}_{attempt}"
             shutil.rmtree(own, ignore_errors=True)
             own.mkdir(parents=True)
-            drawn = draw_job(seed, index, attempt, own, objective, families)
+            drawn = draw_job(seed, index, attempt, own, objective, families, uncommon)
             outcome = _outcome(index, attempt, drawn, worker)
             if drawn is None:
                 own.rmdir()
@@ -242,6 +245,7 @@ def main() -> None:
         "--families", nargs="+", choices=[*FAMILIES, *WALLED], default=list(FAMILIES),
         help="of parts that are drawn from",
     )  # fmt: skip
+    parser.add_argument("--uncommon", action="store_true", help="what few jobs have")
     parser.add_argument("--folder", type=Path, default=Path("strangers"), help="of the jobs")
     parser.add_argument("--whole", action="store_true", help="replay, program and files as well")
     parser.add_argument("--write", action="store_true", help=f"the table into {TABLE.name}")
@@ -264,11 +268,12 @@ def main() -> None:
         draws = [[(int(index), int(attempt))] for index, attempt in pairs]
     objective, families = arguments.objective, arguments.families
     given = seed, draws, folder, arguments.workers, arguments.whole, done
-    run_strangers(*given, objective=objective, families=families)
+    drawn = {"families": families, "uncommon": arguments.uncommon}
+    run_strangers(*given, objective=objective, **drawn)
     # what earlier runs of the same seed found counts too, the last of each draw
     lines = log.read_text(encoding="utf-8").splitlines()
     known = {(one.index, one.attempt): one for one in (Outcome(**json.loads(x)) for x in lines)}
-    text = page(seed, [known[key] for key in sorted(known)], objective, families)
+    text = page(seed, [known[key] for key in sorted(known)], objective, **drawn)
     for path in [folder / f"{name}.md", *([TABLE] if arguments.write else [])]:
         path.write_text(text, encoding="utf-8")
     print(text.split("\n")[4])

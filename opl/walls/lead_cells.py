@@ -24,21 +24,33 @@ from opl.walls.enclosed import ROUND_OFF
 from opl.walls.images import TOUCHING
 
 AT_ONCE = 4  # configurations of a lead that are looked at together
+# units of work of a look at some, and of each configuration in each cell: of no width, and enclosed
+WORK, ENCLOSED_WORK = (0.4, 1.0 / 400.0), (1.5, 1.0 / 200.0)
 
 
 @dataclass(frozen=True)
 class Seen:
-    """Places of a lead at contact positions, whatever the posture.
+    """Places of a lead at contact positions, whatever the posture: what was looked at so far.
 
     Attributes:
         q: Every inverse solution in [rad], shape (k, n, 8, 6).
+        solved: Of which contact positions these are known, shape (n,).
         deep: Where the part is too deep in the wheel, shape (k, n).
         near: Where it is so near to the wheel that no free move may begin, shape (k, n).
+        measured: Of which contact positions these two are known, shape (n,).
     """
 
     q: Array
+    solved: np.ndarray
     deep: np.ndarray
     near: np.ndarray
+    measured: np.ndarray
+
+    @classmethod
+    def nothing(cls, k: int, n: int) -> Seen:
+        """Return what is known of k places at n contact positions before any is looked at."""
+        flags = (np.zeros(shape, dtype=bool) for shape in (n, (k, n), (k, n), n))
+        return cls(np.full((k, n, 8, 6), np.nan), *flags)
 
 
 class LeadCells:
@@ -54,6 +66,9 @@ class LeadCells:
         begun: In which it does not, links and all that stands still, where a free move may begin.
         spare: Depth in the wheel that a lead leaves of what is allowed, in [m].
         seen: What was seen of these contact positions before, whatever the posture; grows.
+
+    Attributes:
+        work: What was looked at so far, in units of work.
     """
 
     def __init__(
@@ -74,6 +89,7 @@ class LeadCells:
         self._low, self._high = low, high
         self._middle, self._radius = (low + high) / 2.0, (high - low) / 2.0
         self._seen = seen
+        self.work = 0.0
 
     def shut(self, T_workpiece_cutter: Array, lead: Array, cells: np.ndarray) -> np.ndarray:
         """Return in which of some cells a lead fails before a free move may begin, (n,)."""
@@ -87,6 +103,8 @@ class LeadCells:
             if not len(left):
                 break
             Ts = lead[first : first + AT_ONCE]
+            look, looked = ENCLOSED_WORK if self._radius.any() else WORK
+            self.work += look + looked * len(Ts) * len(left)
             q, now, none = self._postures(Ts, cells[left])
             steps = principal(np.diff(q, axis=0, prepend=before[None, left]))
             q = before[left] + np.cumsum(steps, axis=0)
@@ -120,7 +138,7 @@ class LeadCells:
         """
         cell, arm, k, n = self._cell, self._cell.robot.arm, len(Ts_workpiece_cutter), len(asked)
         if self._seen is not None:
-            q = np.ascontiguousarray(self._of(Ts_workpiece_cutter).q[:, asked, self._family])
+            q = np.ascontiguousarray(self._solved(Ts_workpiece_cutter, asked)[:, :, self._family])
             return q, np.zeros_like(q), np.isnan(q[..., 0])
         Ts = cell.Ts_base_flange(self._middle[asked], Ts_workpiece_cutter[:, None])
         q = np.ascontiguousarray(inverse_kinematics(arm, Ts)[:, :, self._family])
@@ -152,39 +170,46 @@ class LeadCells:
         return np.asarray((fewest > most).any(axis=-1))
 
     def _of(self, Ts_workpiece_cutter: Array) -> Seen:
-        """Return what is seen of some places at all contact positions."""
+        """Return what is seen so far of some places, at all contact positions."""
         assert self._seen is not None
-        key = Ts_workpiece_cutter.tobytes()
-        if key not in self._seen:
-            Ts = self._cell.Ts_base_flange(self._middle, Ts_workpiece_cutter[:, None])
-            q, every = inverse_kinematics(self._cell.robot.arm, Ts), np.arange(len(self._middle))
-            deep, near = (self._nearer(Ts_workpiece_cutter, every, one) for one in self._distances)
-            self._seen[key] = Seen(q, deep, near)
-        return self._seen[key]
+        key, shape = Ts_workpiece_cutter.tobytes(), (len(Ts_workpiece_cutter), len(self._middle))
+        return self._seen.setdefault(key, Seen.nothing(*shape))
 
-    @property
-    def _distances(self) -> tuple[float, float]:
-        """Nearer to the wheel than these in [m] the part is too deep, or no free move may begin."""
-        deep = self._spare - self._cell.planned_penetration
-        return deep, self._cell.part_from_wheel + WHERE_BEGUN
+    def _solved(self, Ts_workpiece_cutter: Array, asked: np.ndarray) -> Array:
+        """Return every inverse solution of places at some contact positions, (k, n, 8, 6)."""
+        seen = self._of(Ts_workpiece_cutter)
+        new = asked[~seen.solved[asked]]
+        if len(new):
+            Ts = self._cell.Ts_base_flange(self._middle[new], Ts_workpiece_cutter[:, None])
+            seen.q[:, new], seen.solved[new] = inverse_kinematics(self._cell.robot.arm, Ts), True
+        return seen.q[:, asked]
 
     def _beside_wheel(
         self, Ts_workpiece_cutter: Array, asked: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return in which cells the part is nearer than either distance all over, (k, n) each."""
-        if self._seen is not None:
-            seen = self._of(Ts_workpiece_cutter)
-            return seen.deep[:, asked], seen.near[:, asked]
-        deep, near = (self._nearer(Ts_workpiece_cutter, asked, one) for one in self._distances)
-        return deep, near
+        """Return in which cells the part is surely too deep, and too near to move on, (k, n)."""
+        if self._seen is None:
+            return self._measured(Ts_workpiece_cutter, asked)
+        seen = self._of(Ts_workpiece_cutter)
+        new = asked[~seen.measured[asked]]
+        if len(new):
+            seen.deep[:, new], seen.near[:, new] = self._measured(Ts_workpiece_cutter, new)
+            seen.measured[new] = True
+        return seen.deep[:, asked], seen.near[:, asked]
 
-    def _nearer(self, Ts_workpiece_cutter: Array, asked: np.ndarray, distance: float) -> np.ndarray:
-        """Return in which cells asked about the part is nearer to the wheel all over, (k, n)."""
+    def _measured(
+        self, Ts_workpiece_cutter: Array, asked: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Measure what `_beside_wheel` returns."""
         k, n = len(Ts_workpiece_cutter), len(asked)
-        at = np.tile(self._low[asked], k), np.tile(self._high[asked], k)
         Ts = np.repeat(Ts_workpiece_cutter, n, axis=0)
-        nearer, _ = surely_nearer(self._cell, self._scene.part, Ts, *at, distance)
-        return nearer.reshape(k, n)
+        low, high = np.tile(self._low[asked], k), np.tile(self._high[asked], k)
+        deep, cell, part = np.zeros(k * n, dtype=bool), self._cell, self._scene.part
+        near, _ = surely_nearer(cell, part, Ts, low, high, cell.part_from_wheel + WHERE_BEGUN)
+        # what is not near is not deep
+        too_deep = self._spare - cell.planned_penetration
+        deep[near], _ = surely_nearer(cell, part, Ts[near], low[near], high[near], too_deep)
+        return deep.reshape(k, n), near.reshape(k, n)
 
     def _collides(self, scene: CollisionScene, q: Array, turned: Array) -> np.ndarray:
         """Return which postures collide in a scene, however far joints turn, shape (n,)."""

@@ -21,8 +21,6 @@ from opl.search.walls import Piece
 from opl.walls.images import wrist_flips
 from opl.walls.lead_cells import LeadCells, Seen
 
-CELLS_OF_WORK = 15  # enclosed along a lead, that cost a unit of work
-NODES_OF_WORK = 100  # looked at along a lead, likewise
 PARTS, ROUNDS = 8, 3  # into which the way between two contact positions is cut, how often
 RESERVE = 3e-4  # [m] of clearance: a motion may come nearer between two samples than at both
 # of it in depth: between two configurations of a lead the part sinks some micrometres deeper
@@ -144,8 +142,8 @@ class ShutLeads:
                 scenes, posture = self._scenes[reserve], (family, self._flips[flip])
                 given = *posture, low, high, *scenes, SPARE * reserve
                 cells = LeadCells(self._problem, *given, seen)
-                self.work += len(left) / (CELLS_OF_WORK if (low < high).any() else NODES_OF_WORK)
                 left = left[cells.shut(T, lead, left)]
+                self.work += cells.work
             shut[left] = True
         return shut
 

@@ -54,6 +54,31 @@ def test_drawn_jobs_are_cut_into_passes_and_repeat_byte_by_byte(tmp_path):
     assert drawn > 0
 
 
+def test_uncommon_jobs_repeat_and_are_read_or_refused_by_a_key(tmp_path):
+    read, scanned = 0, 0
+    for index in range(12):
+        texts = []
+        for again in range(2):
+            folder = tmp_path / f"{index}_{again}"
+            folder.mkdir()
+            if (stranger := draw_job(11, index, 0, folder, uncommon=True)) is not None:
+                files = [
+                    path for path in folder.iterdir() if path.suffix != ".step"
+                ]  # it has a date
+                texts.append({path.name: path.read_bytes() for path in files})
+        if stranger is None:
+            continue
+        assert texts[0] == texts[1]
+        scanned += "scan.stl" in texts[0]
+        try:
+            assert len(opl.cut_surface(opl.load_job(stranger.job)).points) > 0
+            read += 1
+        except opl.InputError as error:
+            key = str(error).split("job.yaml: ")[1]
+            assert key.startswith(("passes.", "process.", "workpiece."))
+    assert read > 3 and scanned > 0
+
+
 def test_passes_end_where_leads_leave_the_clearance_and_hardly_more(tmp_path):
     """There the samples of a box, which leave 0.3 mm more where they can, see nothing free."""
     draw_job(20261129, 9, 1, tmp_path)

@@ -63,6 +63,7 @@ def test_a_page_of_strangers_counts_what_is_closed_and_what_has_no_bound():
     assert "Found: joint travel on the wheel in rad." in page(7, outcomes, "travel")
     assert "--seed 7 --objective travel`" in page(7, outcomes, "travel")
     assert "--seed 7 --families channel step`" in page(7, outcomes, families=["channel", "step"])
+    assert "--seed 7 --uncommon`" in page(7, outcomes, uncommon=True)
     assert (
         "2 without a path, 1 without a bound; slowest 31.0 s of all drawn. Drawn again: 1 no_path."
         in text
