@@ -145,7 +145,7 @@ class OptimalSearch:
         elif not self._sampler.collisions:
             self._mind_collisions()
         # costly: only where the search would end, as walls of other boxes may tell more before
-        elif self.proof.look_closer() or (
+        elif self.proof.look_closer(lambda: self.work_share < 1.0) or (
             self._given_up + 1 == MOST_GIVEN_UP and self.motions.look_about(box, placements)
         ):
             self._lower()

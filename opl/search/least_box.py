@@ -12,6 +12,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Sequence
 from copy import copy
+from itertools import takewhile
 
 import numpy as np
 
@@ -23,13 +24,12 @@ from opl.search.cells import END, FIRST, KEY, WALL, Cells
 from opl.search.forbidden import Forbidden
 from opl.search.joint_limits import UNLIMITED
 from opl.search.relaxation import least_box
-from opl.search.subproblems import Candidate, Relaxation, Subproblem
+from opl.search.subproblems import Candidate, Relaxation, Subproblem, worth_a_price
 from opl.search.walls import Image, Piece, Wall
 
 SETTLED = 0.04  # of the gap wanted: what the bend of the spans may lose where none is split further
 NUMBERS_OF_A_CELL = 200  # worked on to cut off what no box can hold
 NUMBERS_OF_A_SOURCE = 6  # that it is worth to tell whether a box can hold a piece in one image
-MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 FURTHER = 1.5  # times a size: cells are at hand for boxes up to there
 FEWEST_UNSEEN = 8  # subproblems split before a box is shown that is not settled
@@ -189,9 +189,16 @@ class BoxProof:
         """Show boxes that are not settled more often again: the last one told something new."""
         self._show_after = FEWEST_UNSEEN
 
-    def look_closer(self) -> bool:
-        """Look closer at what is forbidden of the last candidate's spans; return whether any is."""
-        return any(self._cells.cleared(self._kept.spans, looks) for looks in CLOSER)
+    def look_closer(self, goes_on: Callable[[], bool]) -> bool:
+        """Look closer at what is forbidden of the last candidate's spans; return whether any is.
+
+        Of a large box that takes long: `goes_on` is asked before each span.
+        """
+        for looks in CLOSER:
+            spans = takewhile(lambda _: goes_on(), self._kept.spans)
+            if sum(self._cells.cleared(span[None], looks) for span in spans):
+                return True
+        return False
 
     def clear(self, places: Sequence[float]) -> bool:
         """Look at what is forbidden of the last candidate's spans at some places, in their order.
@@ -272,7 +279,7 @@ class BoxProof:
         ]
         if not len(spans):
             return False
-        few = spans[self._few_cells(spans)]
+        few = spans[worth_a_price(spans)]
         bound, numbers = least_box(
             table, cells.shifts, few, n_walls, low, high, closing, box, lost, prices
         )
@@ -291,8 +298,3 @@ class BoxProof:
             return self._limits
         flip = int(self._cells.mirrored(spans))
         return self._limits[flip : flip + 1]
-
-    def _few_cells(self, spans: np.ndarray) -> np.ndarray:
-        """Return which spans are of walls with so few cells left that they are worth a price."""
-        cells = np.bincount(spans[:, WALL], weights=spans[:, END] - spans[:, FIRST])
-        return np.asarray(cells[spans[:, WALL]] <= MOST_PRICED)

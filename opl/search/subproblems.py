@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.search.cells import Key
+from opl.search.cells import END, FIRST, WALL, Key
+
+MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
 
 
 @dataclass(frozen=True)
@@ -72,3 +74,9 @@ class Candidate:
     settled: bool
     keys: dict[int, list[Key]]
     mirrored: bool
+
+
+def worth_a_price(spans: np.ndarray) -> np.ndarray:
+    """Return which spans are of walls with so few cells left that they are worth a price."""
+    cells = np.bincount(spans[:, WALL], weights=spans[:, END] - spans[:, FIRST])
+    return np.asarray(cells[spans[:, WALL]] <= MOST_PRICED)
