@@ -221,7 +221,8 @@ def test_a_job_picks_a_wheel_and_keeps_away_from_the_others(tmp_path):
     wheels = [{**WHEEL, "name": "coarse"}, {**WHEEL, "name": "fine", "T_base_contact0_mm": away}]
     two = {"wheels": wheels, "pair_clearances": [{"pair": ["part", "fine"], "clearance_mm": 30}]}
     for picked, other in (("coarse", "fine"), ("fine", "coarse")):
-        job = load_job(write_both(tmp_path, two, {"wheel_name": picked}))
+        long = {"process.approach_mm": 40}  # the clearance must be left, too
+        job = load_job(write_both(tmp_path, two, {"wheel_name": picked, **long}))
         assert [body.name for body in job.cell.obstacles] == ["post", other]
         named = other if picked == "coarse" else "wheel"
         assert job.cell.pairs.required == {frozenset(["part", named]): pytest.approx(0.03)}
