@@ -42,7 +42,7 @@ class ProcessSection(Document):
     approach_mm: Annotated[float, between(0.01, 2000.0)] = Field(
         default=50.0,
         description="Longest that approach and retract lead off the wheel; they end where the "
-        "straight free move from there is proven free.",
+        "straight free move from there is proven free. They must get the part clear of the wheel.",
     )
     approach_turn_deg: Annotated[float, Field(ge=0.0, le=90.0)] = Field(
         default=0.0,

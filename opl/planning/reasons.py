@@ -56,7 +56,10 @@ def no_path(problem: GrindingProblem, matrices: list[OpenMatrix], scope: str = "
 
 
 def leads_stop(matrices: list[OpenMatrix]) -> bool:
-    """Return whether approaches and retracts collide, or end too near to the wheel to move on."""
+    """Return whether approaches and retracts collide, or end too near to the wheel to move on.
+
+    By the causes that `opl.planning.blocking` notes.
+    """
     causes = {cause for matrix in matrices for _, cause in matrix.causes}
     at_the_wheel = f": {PART} and {WHEEL}"  # with a free move before it
     return any(

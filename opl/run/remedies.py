@@ -186,7 +186,7 @@ def _turned_fixture(job: Job) -> Iterator[Change]:
         yield change, _with_cell(job, T_flange_workpiece=T_flange_workpiece)
 
 
-# tried in this order, each kind by itself; these only where leads stopped motions, else for nothing
+# tried in this order, each kind by itself; the first only where leads stopped motions
 AT_LEADS: dict[str, Callable[[Job], Iterator[Change]]] = {
     f"a longer {keys.PROCESS_APPROACH}": _longer_approach
 }

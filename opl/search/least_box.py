@@ -192,7 +192,7 @@ class BoxProof:
     def look_closer(self, goes_on: Callable[[], bool]) -> bool:
         """Look closer at what is forbidden of the last candidate's spans; return whether any is.
 
-        Of a large box that takes long: `goes_on` is asked before each span.
+        In a large box that takes long: it ends where `goes_on` says no, asked before each span.
         """
         for looks in CLOSER:
             spans = takewhile(lambda _: goes_on(), self._kept.spans)

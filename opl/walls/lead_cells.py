@@ -24,7 +24,7 @@ from opl.walls.enclosed import ROUND_OFF
 from opl.walls.images import TOUCHING
 
 AT_ONCE = 4  # configurations of a lead that are looked at together
-# units of work of a look at some, and of each configuration in each cell: of no width, and enclosed
+# units of work of a look at these, and of each of them in each cell: where it is, and all over it
 WORK, ENCLOSED_WORK = (0.4, 1.0 / 400.0), (1.5, 1.0 / 200.0)
 
 
@@ -172,8 +172,10 @@ class LeadCells:
     def _of(self, Ts_workpiece_cutter: Array) -> Seen:
         """Return what is seen so far of some places, at all contact positions."""
         assert self._seen is not None
-        key, shape = Ts_workpiece_cutter.tobytes(), (len(Ts_workpiece_cutter), len(self._middle))
-        return self._seen.setdefault(key, Seen.nothing(*shape))
+        key = Ts_workpiece_cutter.tobytes()
+        if key not in self._seen:
+            self._seen[key] = Seen.nothing(len(Ts_workpiece_cutter), len(self._middle))
+        return self._seen[key]
 
     def _solved(self, Ts_workpiece_cutter: Array, asked: np.ndarray) -> Array:
         """Return every inverse solution of places at some contact positions, (k, n, 8, 6)."""

@@ -123,6 +123,8 @@ class ClusterDoer:
         # leaves the client without the outcome of any other task (distributed 2026.8)
         while not future.done():
             time.sleep(BEAT)
+            if self._client.status == "closed":
+                raise WorkerDied
             if self._stopped:
                 future.cancel(force=True)
                 raise WorkerDied

@@ -62,9 +62,8 @@ def test_uncommon_jobs_repeat_and_are_read_or_refused_by_a_key(tmp_path):
             folder = tmp_path / f"{index}_{again}"
             folder.mkdir()
             if (stranger := draw_job(11, index, 0, folder, uncommon=True)) is not None:
-                files = [
-                    path for path in folder.iterdir() if path.suffix != ".step"
-                ]  # it has a date
+                # a STEP file has its date
+                files = [path for path in folder.iterdir() if path.suffix != ".step"]
                 texts.append({path.name: path.read_bytes() for path in files})
         if stranger is None:
             continue
