@@ -47,16 +47,32 @@ def signed_wheel_distance(
         point of the part, or infinite. Less than ``enough`` where the least is, too large by any
         amount there.
     """
+    return nearest_triangle(part, wheel, Ts_contact0_workpiece, needed, enough)[0]
+
+
+def nearest_triangle(
+    part: PartTree,
+    wheel: ContactWheel,
+    Ts_contact0_workpiece: Array,
+    needed: Array | float,
+    enough: Array | float = -np.inf,
+) -> tuple[Array, np.ndarray]:
+    """Return what `signed_wheel_distance` does, and which triangle has that distance or less.
+
+    By its number in the arrays of the part, -1 where the distance is infinite, shape (...).
+    """
     shape = Ts_contact0_workpiece.shape[:-2]
     needs = np.array(np.broadcast_to(needed, shape), dtype=float).reshape(-1)
     stops = np.array(np.broadcast_to(enough, shape), dtype=float).reshape(-1)
     flat = np.ascontiguousarray(Ts_contact0_workpiece.reshape(-1, 4, 4))
-    distances, looks = np.empty(len(flat)), np.empty(len(flat), dtype=np.int64)
+    distances = np.empty(len(flat))
+    nearest, looks = np.empty(len(flat), dtype=np.int64), np.empty(len(flat), dtype=np.int64)
     # to call threads costs as much as dozens of poses, and many times that on a busy machine
     kernel = _distances if len(flat) > FEW and threads_are_allowed() else _few_distances
-    kernel(flat, part.arrays, wheel.width / 2.0, wheel.radius, needs, stops, distances, looks)
+    half, radius = wheel.width / 2.0, wheel.radius
+    kernel(flat, part.arrays, half, radius, needs, stops, distances, nearest, looks)
     part.looks[0] += looks.sum()
-    return distances.reshape(shape)
+    return distances.reshape(shape), nearest.reshape(shape)
 
 
 @kernel(
@@ -98,9 +114,9 @@ def _bound(T, spheres, slabs, boxes, index, half_width, radius):  # type: ignore
     return value + lowest_along(T, spheres, slabs, boxes, index, gx, gy, gz)
 
 
-@kernel(f"Tuple((float64,int64))(float64[:,::1],{TREE},float64,float64,float64,float64)")
+@kernel(f"Tuple((float64,int64,int64))(float64[:,::1],{TREE},float64,float64,float64,float64)")
 def _part_distance(T, tree, half_width, radius, needed, enough):  # type: ignore[no-untyped-def]
-    """Distance of the part in one pose, and how many looks that took."""
+    """Distance of the part in one pose, of which triangle, and how many looks that took."""
     triangles, spheres, slabs, boxes, first, child = tree
     room = np.empty((DEEPEST + 1, 9))
     waiting = np.empty(64, dtype=np.int64)  # deeper than any halving of an array can go
@@ -108,7 +124,7 @@ def _part_distance(T, tree, half_width, radius, needed, enough):  # type: ignore
     waiting[0] = 0
     bounds[0] = -np.inf
     n_waiting = 1
-    best, looks = np.inf, 0
+    best, nearest, looks = np.inf, -1, 0
     while n_waiting > 0 and best >= enough:
         n_waiting -= 1
         if bounds[n_waiting] >= min(best - TOLERANCE, needed):
@@ -116,9 +132,11 @@ def _part_distance(T, tree, half_width, radius, needed, enough):  # type: ignore
         looks += 1
         node = waiting[n_waiting]
         if child[node] == 0:
-            best = nearest_on_triangle(
+            value = nearest_on_triangle(
                 T, triangles, first[node], half_width, radius, needed, enough, best, room
             )
+            if value < best:
+                best, nearest = value, first[node]
             continue
         one, other = child[node], child[node] + 1
         low = _bound(T, spheres, slabs, boxes, one, half_width, radius)
@@ -130,26 +148,26 @@ def _part_distance(T, tree, half_width, radius, needed, enough):  # type: ignore
         waiting[n_waiting], bounds[n_waiting] = other, high
         waiting[n_waiting + 1], bounds[n_waiting + 1] = one, low
         n_waiting += 2
-    return best, looks
+    return best, nearest, looks
 
 
 _POSES = (
     f"void(float64[:,:,::1],{TREE},float64,float64,"
-    "float64[::1],float64[::1],float64[::1],int64[::1])"
+    "float64[::1],float64[::1],float64[::1],int64[::1],int64[::1])"
 )
 
 
 @kernel(_POSES, threads=True, early=True)
-def _distances(poses, tree, half_width, radius, needs, stops, distances, looks):  # type: ignore[no-untyped-def]
+def _distances(poses, tree, half_width, radius, needs, stops, distances, nearest, looks):  # type: ignore[no-untyped-def]
     for k in prange(len(poses)):
-        distances[k], looks[k] = _part_distance(
+        distances[k], nearest[k], looks[k] = _part_distance(
             poses[k], tree, half_width, radius, needs[k], stops[k]
         )
 
 
 @kernel(_POSES, early=True)
-def _few_distances(poses, tree, half_width, radius, needs, stops, distances, looks):  # type: ignore[no-untyped-def]
+def _few_distances(poses, tree, half_width, radius, needs, stops, distances, nearest, looks):  # type: ignore[no-untyped-def]
     for k in range(len(poses)):
-        distances[k], looks[k] = _part_distance(
+        distances[k], nearest[k], looks[k] = _part_distance(
             poses[k], tree, half_width, radius, needs[k], stops[k]
         )

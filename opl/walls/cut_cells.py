@@ -1,7 +1,8 @@
 """Cells of contact positions: small where the part begins to cut into the wheel.
 
-A cell counts as forbidden only if the part is deeper in the wheel at its middle than any point of
-it can move within the cell.
+A cell counts as forbidden only if the part is deeper in the wheel at its middle than what is there
+of it can move within the cell: all of the part, or one of its triangles. Deeper by less than what
+distances are told to counts as not deep: no smaller cell would show it.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from opl.cell.part_tree import PartTree
-from opl.cell.wheel_distance import signed_wheel_distance
+from opl.cell.wheel_distance import nearest_triangle, signed_wheel_distance
 from opl.cell.wheel_triangle import TOLERANCE
 from opl.cell.workcell import WorkCell
 from opl.geometry import frames
@@ -169,12 +170,16 @@ def surely_nearer(
         np.hypot(x, z) + part.spheres[0, 3],
         np.hypot(wheel.width, 2.0 * wheel.radius) + max(distance, 0.0),
     )
-    rolled = np.abs(middle) > wheel.flat_end
-    moved = np.where(rolled, 2.0 * np.sin(np.deg2rad(radius) / 2.0) * lever, radius / MM_PER_M)
+    rolled, turn = np.abs(middle) > wheel.flat_end, 2.0 * np.sin(np.deg2rad(radius) / 2.0)
+    moved = np.where(rolled, turn * lever, radius / MM_PER_M)
     Ts_contact0_workpiece = wheel.T_contact0_contact(middle) @ Ts_cutter_workpiece
     enough = distance - moved - TOLERANCE
-    clearance = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, distance, enough)
+    clearance, nearest = nearest_triangle(part, wheel, Ts_contact0_workpiece, distance, enough)
     surely = clearance < enough
+    near = rolled & ~surely & (clearance < distance - TOLERANCE)
+    x, _, z = np.moveaxis(_corners(part, Ts_cutter_workpiece[near], nearest[near]), -1, 0)
+    moved = turn[near] * np.hypot(x, z).max(axis=1)
+    surely[near] = clearance[near] < distance - moved - TOLERANCE
     slid = ~rolled & ~surely & (clearance < distance)
     most = 2.0 * radius[slid].max(initial=0.0) / MM_PER_M
     if slid.any() and most < wheel.width:
@@ -182,7 +187,12 @@ def surely_nearer(
         narrower, nearer = replace(wheel, width=wheel.width - most), distance - TOLERANCE
         Ts = Ts_contact0_workpiece[slid]
         surely[slid] = signed_wheel_distance(part, narrower, Ts, distance, nearer) < nearer
-    return surely, clearance < distance
+    return surely, clearance < distance - TOLERANCE
+
+
+def _corners(part: PartTree, Ts_cutter_workpiece: Array, triangle: np.ndarray) -> Array:
+    """Return the corners of a triangle of the part in each cutter frame, shape (n, 3, 3)."""
+    return frames.transform(Ts_cutter_workpiece[:, None], part.triangles[triangle])
 
 
 def surely_cuts_on(
@@ -227,16 +237,22 @@ def surely_cuts_along(
     Ts = points.Ts_workpiece_cutter
     x, z, p = (np.linalg.norm(Ts[before + 1, :3, k] - Ts[before, :3, k], axis=1) for k in (0, 2, 3))
     Ts_cutter_workpiece = frames.inverse(points.frames_at(middle))
-    cx, _, cz = np.moveaxis(frames.transform(Ts_cutter_workpiece, part.spheres[0, :3]), -1, 0)
+    centre = frames.transform(Ts_cutter_workpiece, part.spheres[0, :3])
     # a point in the wheel is not farther from the contact than the wheel is large
     lever = np.minimum(
-        np.hypot(cx, cz) + part.spheres[0, 3], np.hypot(wheel.width, 2.0 * wheel.radius)
+        np.linalg.norm(centre, axis=1) + part.spheres[0, 3],
+        np.hypot(wheel.width, 2.0 * wheel.radius),
     )
-    moved = half * (TURN * (x + z) * lever + p)
     Ts_contact0_workpiece = wheel.T_contact0_contact(contact_positions) @ Ts_cutter_workpiece
-    enough = allowed - moved - TOLERANCE
-    distance = signed_wheel_distance(part, wheel, Ts_contact0_workpiece, allowed, enough)
-    return (distance < enough) & (np.maximum(x, z) <= LARGEST_TURN), distance < allowed
+    enough = allowed - half * (TURN * (x + z) * lever + p) - TOLERANCE
+    distance, nearest = nearest_triangle(part, wheel, Ts_contact0_workpiece, allowed, enough)
+    surely, cuts = distance < enough, distance < allowed - TOLERANCE
+    near = cuts & ~surely
+    corners = _corners(part, Ts_cutter_workpiece[near], nearest[near])
+    lever = np.linalg.norm(corners, axis=2).max(axis=1)
+    moved = half[near] * (TURN * (x + z)[near] * lever + p[near])
+    surely[near] = distance[near] < allowed - moved - TOLERANCE
+    return surely & (np.maximum(x, z) <= LARGEST_TURN), cuts
 
 
 def shut_along(

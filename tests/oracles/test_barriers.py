@@ -32,9 +32,9 @@ def test_a_concave_part_is_too_deep_in_the_wheel_all_along_each_barrier(tmp_path
     problem = problem_of(job)
     points, wheel = problem.points, job.cell.wheel
     corners = problem.scene.part.triangles.reshape(-1, 3)
-    for index in range(points.n_passes):
+    for index, sides in enumerate(all_sides(problem)):
         found = barriers(problem, index)
-        assert 1 <= len(found) <= 2
+        assert found and 2 <= len(sides) <= 3
         for one in found:
             for place in np.linspace(one.first, one.last, 7 * int(one.last - one.first)):
                 T = wheel.T_contact0_contact(one.contact_position)
@@ -106,6 +106,28 @@ def test_what_is_left_out_of_a_column_is_too_deep_in_the_wheel(tmp_path):
             part, cell.wheel, cell.wheel.T_contact0_contact(some) @ inverse(T), 0.0
         )
         assert (distance < -cell.planned_penetration).all()
+
+
+def test_a_column_where_the_part_begins_to_be_too_deep_is_not_cut_into_thousands_of_cells(tmp_path):
+    # along a blade it begins between two cutter points, all along the flat at once
+    draw_job(20263001, 24, 0, tmp_path)
+    problem = problem_of(load_job(tmp_path / "job.yaml"))
+    points, cell, part = problem.points, problem.cell, problem.scene.part
+    allowed = -cell.planned_penetration
+
+    def over(place):
+        T = points.frames_at(np.array([place]))
+        Ts = cell.wheel.T_contact0_contact(np.array([10.0])) @ inverse(T)
+        return allowed - signed_wheel_distance(part, cell.wheel, Ts, allowed)[0]
+
+    free, deep = 50.0, 50.05
+    assert over(free) <= 0.0 < over(deep)
+    while over(deep) > 5e-8:  # less than distances are told to
+        middle = (free + deep) / 2.0
+        free, deep = (middle, deep) if over(middle) <= 0.0 else (free, middle)
+    last = np.full(1, cell.wheel.last_position)
+    ends, _ = cells_of(cell, part, points.frames_at(np.array([deep])), -last, last)
+    assert len(ends[0]) < 300
 
 
 @pytest.mark.parametrize("depth_mm", [1.5, 5.0])
