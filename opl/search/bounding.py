@@ -13,15 +13,16 @@ STILL = 1e-6  # [rad] a core that grows by less in a round has stopped growing
 
 
 @kernel("boolean(float64[:,::1],int64,float64[::1],float64[::1],float64[:,:,::1])")
-def _within_limits(cells, cell, low, high, limits):  # type: ignore[no-untyped-def]
+def _within_limits(bounds, cell, low, high, limits):  # type: ignore[no-untyped-def]
     """Return whether a box about a core and a cell may be within any of the limits."""
     for k in range(len(limits)):
         kept = True
         for j in range(6):
             if limits[k, 1, j] < np.inf:
-                a, b = cells[cell, j], cells[cell, 6 + j]
-                least = min(max(a, b) + cells[cell, 18 + j], low[j]) + ROUND_OFF
-                most = max(min(a, b) + cells[cell, 12 + j], high[j]) - ROUND_OFF
+                least = min(bounds[cell, 6 + j], low[j]) + ROUND_OFF
+                most = max(bounds[cell, j], high[j]) - ROUND_OFF
+                if limits[k, 0, j] <= least and most <= limits[k, 1, j]:
+                    continue  # without a full turn, which is the rule
                 turns = 2.0 * np.pi * np.ceil((most - limits[k, 1, j]) / (2.0 * np.pi))
                 if limits[k, 0, j] + turns > least:
                     kept = False
@@ -32,15 +33,42 @@ def _within_limits(cells, cell, low, high, limits):  # type: ignore[no-untyped-d
 
 
 @kernel(
+    "Tuple((int64,int64,float64))(float64[:,::1],float64[::1],float64[::1],float64,"
+    "float64[:,:,::1],float64[:,::1])"
+)
+def _kept(bounds, low, high, closing, limits, held):  # type: ignore[no-untyped-def]
+    """Return the first cell of a span that some box below a size holds, and the end of the last.
+
+    -1 for none; and the size of the smallest such box. Boxes are within limits, if there are any.
+    ``held`` is filled with the greatest joint positions in these cells, and the least, (1, 12).
+    """
+    begin, stop, smallest = -1, -1, np.inf
+    held[0, :6], held[0, 6:] = -np.inf, np.inf
+    for cell in range(len(bounds)):
+        size = 0.0
+        for j in range(6):
+            edge = max(bounds[cell, j], high[j]) - min(bounds[cell, 6 + j], low[j])
+            size += max(edge, 0.0)
+        if size < closing and (len(limits) == 0 or _within_limits(bounds, cell, low, high, limits)):
+            begin = cell if begin < 0 else begin
+            stop = cell + 1
+            smallest = min(smallest, size)
+            for j in range(6):
+                held[0, j] = max(held[0, j], bounds[cell, 6 + j])
+                held[0, 6 + j] = min(held[0, 6 + j], bounds[cell, j])
+    return begin, stop, smallest
+
+
+@kernel(
     "int64(float64[:,::1],float64[:,::1],int64[:,::1],int64[::1],int64,float64[:,:,::1],"
     "float64[::1],float64[::1],float64,float64[::1])",
     early=True,
 )
-def tighten(cells, shifts, spans, pass_index, n_keys, limits, low, high, closing, sizes):  # type: ignore[no-untyped-def]
+def tighten(bounds, shifts, spans, pass_index, n_keys, limits, low, high, closing, sizes):  # type: ignore[no-untyped-def]
     """Cut off what no box below a size can hold; return how many spans are left, 0 if none can be.
 
     Args:
-        cells: The table of `Cells`.
+        bounds: As of `Cells`.
         shifts: What the cells of each source are shifted by in [rad], shape (m, 6).
         spans: Sorted by their walls; those left are moved to the front, shape (n, 5).
         pass_index: Of each wall, shape (k,).
@@ -60,38 +88,30 @@ def tighten(cells, shifts, spans, pass_index, n_keys, limits, low, high, closing
     for wall in range(n_walls):
         walls_of[pass_index[wall]] += 1
     least, most = np.empty(6), np.empty(6)
-    below, above = np.empty(6), np.empty(6)  # the core, as seen from a span that is not shifted
+    # the core, and what is kept of a span, as seen from a span that is not shifted
+    below, above, held = np.empty(6), np.empty(6), np.empty((1, 12))
     for _ in range(MOST_ROUNDS):
         change, left, k = 0.0, 0, 0
         for wall in range(n_walls):
             before, smallest = left, np.inf
             least[:], most[:] = np.inf, -np.inf
             while k < n and spans[k, 0] == wall:
-                begin, stop, shift = -1, -1, shifts[spans[k, 2]]
+                shift = shifts[spans[k, 2]]
                 for j in range(6):
                     below[j], above[j] = low[j] - shift[j], high[j] - shift[j]
-                for cell in range(spans[k, 3], spans[k, 4]):
-                    size = 0.0
-                    for j in range(6):
-                        a, b = cells[cell, j], cells[cell, 6 + j]
-                        edge = max(min(a, b) + cells[cell, 12 + j], above[j]) - min(
-                            max(a, b) + cells[cell, 18 + j], below[j]
-                        )
-                        size += max(edge, 0.0)
-                    if size < closing and _within_limits(cells, cell, below, above, limits):
-                        if begin < 0:
-                            begin = cell
-                        stop = cell + 1
-                        smallest = min(smallest, size)
+                own = bounds[spans[k, 3] : spans[k, 4]]
+                begin, stop, size = _kept(own, below, above, closing, limits[:0], held)
+                # where all of it is within limits together, which is the rule, so is each cell
+                if begin >= 0 and not _within_limits(held, 0, below, above, limits):
+                    begin, stop, size = _kept(own, below, above, closing, limits, held)
                 if begin >= 0:
-                    for cell in range(begin, stop):
-                        for j in range(6):
-                            a, b = cells[cell, j], cells[cell, 6 + j]
-                            least[j] = min(least[j], min(a, b) + cells[cell, 12 + j] + shift[j])
-                            most[j] = max(most[j], max(a, b) + cells[cell, 18 + j] + shift[j])
+                    smallest = min(smallest, size)
+                    for j in range(6):
+                        least[j] = min(least[j], held[0, 6 + j] + shift[j])
+                        most[j] = max(most[j], held[0, j] + shift[j])
                     for i in range(3):
                         spans[left, i] = spans[k, i]
-                    spans[left, 3], spans[left, 4] = begin, stop
+                    spans[left, 3], spans[left, 4] = spans[k, 3] + begin, spans[k, 3] + stop
                     left += 1
                 k += 1
             if left == before:

@@ -104,12 +104,12 @@ def _halves(node: Subproblem, cells: Cells, wall: int) -> list[np.ndarray]:
         starts, start = cells.table[own[:, FIRST], 24], place
     if len(own) == 0:
         return []
-    kinds = cells.kinds_of(own)
     if len(own) == 1:
         middle = own[0, FIRST] + _between(cells.table[own[0, FIRST] : own[0, END], 24], place)
         halves = [own.copy(), own.copy()]
         halves[0][0, END] = halves[1][0, FIRST] = middle
         return halves
+    kinds = cells.kinds_of(own)
     if wall == 0 or (kinds != kinds[0]).any():
         # the nearest, or all of its image, and all others
         away = distances(cells.table, cells.shifts, own, node.found.low, node.found.high)

@@ -65,6 +65,13 @@ def rows_of(
     return rows
 
 
+def bounds_of(rows: Array) -> Array:
+    """Return what the cells of rows are within, shape (n, 12): least joint positions, greatest."""
+    one, other = rows[:, :6], rows[:, 6:12]
+    low, high = np.minimum(one, other) + rows[:, 12:18], np.maximum(one, other) + rows[:, 18:24]
+    return np.hstack([low, high])
+
+
 def with_room(table: Any, rows: int) -> Any:
     """Return a table with room for so many rows, twice of what it had at the least."""
     if rows <= len(table):

@@ -13,7 +13,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
-from opl.search.cell_rows import COLUMNS, rows_of, with_room
+from opl.search.cell_rows import COLUMNS, bounds_of, rows_of, with_room
 from opl.search.forbidden import Forbidden
 from opl.search.reach import Reach, around_families
 from opl.search.walls import FLIPS, Image, Moves, Piece, Wall
@@ -39,6 +39,7 @@ class Cells:
         walls: The walls.
         pass_index: The pass of each.
         table: The cells, shape (capacity, 26); rows not in use are at its end.
+        bounds: What each is within: least and greatest joint positions in [rad], (capacity, 12).
         shifts: What the cells of each source are shifted by in [rad], shape (capacity, 6).
         changes: How often cells in the table became shorter.
         reach: Tells which images are left out.
@@ -59,7 +60,7 @@ class Cells:
         self._forbidden = forbidden
         self.walls: list[Wall] = []
         self.pass_index = np.empty(0, dtype=np.int64)
-        self.table = np.empty((1024, COLUMNS))
+        self.table, self.bounds = np.empty((1024, COLUMNS)), np.empty((1024, 12))
         self._used = 0
         self._keys: dict[Key, int] = {}
         # a source is a piece in one image
@@ -156,9 +157,8 @@ class Cells:
         wall, _, source, cell, _ = span.tolist()
         at = source, cell
         if at not in self._finer:
-            image, rows, _, _ = self._sources[source].tolist()
-            begin, first_cell = self._n_sources, int(self._first_cell[rows])
-            smaller = self._cut(self._piece(rows), cell - first_cell)
+            (image, rows, _, _), begin = self._sources[source].tolist(), self._n_sources
+            smaller = self._cut(self._piece(rows), cell - int(self._first_cell[rows]))
             if smaller:
                 self._note(smaller, np.array([image]), np.array([rows % FLIPS]))
             self._finer[at] = self._spans(wall, np.arange(begin, self._n_sources))
@@ -183,11 +183,11 @@ class Cells:
             if (looked[cells] >= looks).all():
                 continue
             looked[cells] = looks
-            known = self.table[first:end].copy()
             self._forbidden.clear(piece, flip, cells.start, cells.stop, looks)
             same = range(number * ROWS_OF_A_PIECE, (number + 1) * ROWS_OF_A_PIECE)
-            alike = [one for one in same if _flip_made(one) == flip]
-            self._enter([one for one in alike if self._first_cell[one] >= 0])
+            entered = [one for one in same if self._first_cell[one] >= 0]
+            known = self.table[first:end].copy()
+            self._enter([one for one in entered if _flip_made(one) == flip])
             self.changes += int((self.table[first:end] != known).any())
         return self.changes > before
 
@@ -258,7 +258,7 @@ class Cells:
         for number in new:
             self._first_cell[number] = self._used
             self._used += len(self._piece(number).pad_low)
-        self.table = with_room(self.table, self._used)
+        self.table, self.bounds = (with_room(one, self._used) for one in (self.table, self.bounds))
         self._enter(new)
         self._name(sources[self._key_of_kind[kinds] < 0])
         walls, first = np.full(len(sources), wall), self._first_cell[rows]
@@ -289,7 +289,7 @@ class Cells:
             counts = [len(piece.pad_low) for piece in pieces]
             before = np.cumsum(counts) - counts
             at = np.repeat(self._first_cell[own] - before, counts) + np.arange(len(rows))
-            self.table[at] = rows
+            self.table[at], self.bounds[at] = rows, bounds_of(rows)
 
     def _piece(self, rows: int) -> Piece:
         return self._pieces[rows // ROWS_OF_A_PIECE]

@@ -24,11 +24,11 @@ from opl.search.cells import END, FIRST, KEY, WALL, Cells
 from opl.search.forbidden import Forbidden
 from opl.search.joint_limits import UNLIMITED
 from opl.search.relaxation import least_box
-from opl.search.subproblems import Candidate, Relaxation, Subproblem, worth_a_price
+from opl.search.subproblems import Candidate, Relaxation, Subproblem, keys_left, worth_a_price
 from opl.search.walls import Image, Piece, Wall
 
 SETTLED = 0.04  # of the gap wanted: what the bend of the spans may lose where none is split further
-NUMBERS_OF_A_CELL = 200  # worked on to cut off what no box can hold
+NUMBERS_OF_A_CELL = 30  # worked on to cut off what no box can hold
 NUMBERS_OF_A_SOURCE = 6  # that it is worth to tell whether a box can hold a piece in one image
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 FURTHER = 1.5  # times a size: cells are at hand for boxes up to there
@@ -254,12 +254,9 @@ class BoxProof:
         if len(node.spans) != 1 and node.n_walls <= 1:
             n_walls = 1  # one span of the first wall tells which images of the others matter
         mirrored = len(node.spans) > 0 and cells.mirrored(node.spans)
-        # a pass is left the keys that all of its walls have
-        keys: dict[int, np.ndarray] = {}
-        of_pass = cells.pass_index[node.spans[:, WALL]]
-        for index in np.unique(of_pass).tolist():
-            keys[index] = np.unique(node.spans[of_pass == index, KEY])
-        new = []
+        keys, new = {}, []
+        if n_walls > node.n_walls:
+            keys = keys_left(node.spans, cells.pass_index)
         for wall in range(node.n_walls, n_walls):
             index = int(cells.pass_index[wall])
             self.work += NUMBERS_OF_A_SOURCE * cells.n_sources(wall)
@@ -275,7 +272,7 @@ class BoxProof:
         self.work += NUMBERS_OF_A_CELL * float((spans[:, END] - spans[:, FIRST]).sum())
         passes = cells.pass_index[:n_walls], cells.n_keys
         spans = spans[
-            : tighten(table, cells.shifts, spans, *passes, limits, low, high, closing, sizes)
+            : tighten(cells.bounds, cells.shifts, spans, *passes, limits, low, high, closing, sizes)
         ]
         if not len(spans):
             return False

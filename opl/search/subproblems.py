@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.search.cells import END, FIRST, WALL, Key
+from opl.search.cells import END, FIRST, KEY, WALL, Key
 
 MOST_PRICED = 3000  # cells of a wall that is priced; one with more is split before
 
@@ -78,5 +78,19 @@ class Candidate:
 
 def worth_a_price(spans: np.ndarray) -> np.ndarray:
     """Return which spans are of walls with so few cells left that they are worth a price."""
+    if (spans[:, END] - spans[:, FIRST]).sum() <= MOST_PRICED:
+        return np.ones(len(spans), dtype=bool)
     cells = np.bincount(spans[:, WALL], weights=spans[:, END] - spans[:, FIRST])
     return np.asarray(cells[spans[:, WALL]] <= MOST_PRICED)
+
+
+def keys_left(spans: np.ndarray, pass_index: np.ndarray) -> dict[int, np.ndarray]:
+    """Return the numbers of the keys that spans have, by pass: all that its walls may have.
+
+    Args:
+        spans: The spans.
+        pass_index: Of each wall.
+    """
+    of_pass = pass_index[spans[:, WALL]]
+    passes = np.unique(of_pass).tolist()
+    return {index: np.unique(spans[of_pass == index, KEY]) for index in passes}
