@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from opl.search.bounding import distances
 from opl.search.box import JointBox
 from opl.search.cells import END, FIRST, KEY, SOURCE, WALL, Cells
 from opl.search.hulls import nearest_point
-from opl.search.joint_limits import torn
+from opl.search.joint_limits import cut_at
 from opl.search.subproblems import Relaxation, Subproblem
 
 SMALLEST = 1e-6  # along a wall: a cell that is not cut further
@@ -26,24 +27,29 @@ def where_to_split(
     """Return the wall to be split; None if that gains nothing.
 
     Args:
-        node: The subproblem, bounded.
+        node: The subproblem, bounded; what its box is beyond the limits by is cut off that.
         cells: Its cells.
         limits: As of `BoxProof`.
         settled: What a box may miss a wall by, and what the bend of its spans may lose, where it
             is not split further, in [rad].
     """
-    found, walls, table = node.found, node.spans[:, WALL], cells.table
-    assert found is not None
+    assert node.found is not None
+    walls, table = node.spans[:, WALL], cells.table
     if np.count_nonzero(walls == 0) > 1:
         return 0
+    # what is beyond the limits is no part of the box: walls that it meets there alone, it misses
+    box = JointBox(node.found.low, node.found.high)
+    inner = cut_at(box, limits, (node.low, node.high))
+    if max((inner.lower - box.lower).max(), (box.upper - inner.upper).max()) > settled:
+        high = np.maximum(inner.lower, inner.upper)
+        node.found = replace(node.found, low=inner.lower, high=high)
+    found = node.found
     of_spans = distances(table, cells.shifts, node.spans, found.low, found.high)
     away = np.full(node.n_walls, np.inf)
     np.minimum.at(away, walls, of_spans)
     first, end = node.spans[:, FIRST], node.spans[:, END]
     tiny = walls[(end == first + 1) & (table[first, 25] - table[first, 24] < SMALLEST)]
     score = np.maximum(away, found.lost)
-    box = JointBox(found.low, found.high)
-    np.maximum.at(score, walls, torn(table, cells.shifts, node.spans, box, limits, settled))
     score[tiny] = 0.0
     if (score <= settled).all():
         return _met_with_several_keys(node, cells, of_spans, settled)
