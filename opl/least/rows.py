@@ -180,8 +180,9 @@ def _ends(ladder: Ladder, blocked: np.ndarray, way: int) -> tuple[int, Array]:
         if ladder.off_wheel[k]:
             reached = there
             continue
-        turned = _turned(ladder, k, blocked)
-        turned = (turned if way > 0 else turned.T)[reached][:, there]
+        before, after = (reached, there) if way > 0 else (there, reached)
+        turned = _turned(ladder, k, blocked, before, after)
+        turned = turned if way > 0 else turned.T
         reached = there.copy()
         reached[there] = (turned <= 1.0).any(axis=0)
         if not reached.any():
@@ -189,18 +190,26 @@ def _ends(ladder: Ladder, blocked: np.ndarray, way: int) -> tuple[int, Array]:
     return -1, np.empty(0)
 
 
-def _turned(ladder: Ladder, k: int, blocked: np.ndarray) -> Array:
-    """Return how far joints turn over the edges from a place, in what they may, shape (m, m).
+def _turned(
+    ladder: Ladder, k: int, blocked: np.ndarray, before: np.ndarray, after: np.ndarray
+) -> Array:
+    """Return how far joints turn from some nodes of a place to some of the next, in what they may.
 
-    Infinite where something is shut in between.
+    The nodes are flags of shape (m,) each; infinite where something is shut in between.
     """
+    one, other, size = np.flatnonzero(before), np.flatnonzero(after), len(before) * len(after)
     t, q = ladder.t_of_nodes, ladder.q
-    change = np.abs(t[k + 1] - t[k][:, None])
+    change = np.abs(t[k + 1, other] - t[k, one, None])
     steps = np.maximum(np.ceil(change / ladder.max_contact_step - 1e-9), 1.0)
-    largest = np.abs(q[k + 1] - q[k][:, None]).max(axis=-1)
-    turned = largest / (steps * ladder.max_joint_step)
+    largest = np.zeros_like(change)
+    for start, end in zip(q[k, one].T, q[k + 1, other].T, strict=True):
+        np.maximum(largest, np.abs(end - start[:, None]), out=largest)
+    shut = change > ladder.contact_changes[k] + 1e-9
     if ladder.sides is not None:
-        turned[ladder.sides[k, 0][:, None] != ladder.sides[k, 1]] = np.inf
-    first, end = np.searchsorted(blocked, [k * turned.size, (k + 1) * turned.size])
-    turned.flat[blocked[first:end] - k * turned.size] = np.inf
-    return np.asarray(np.where(change <= ladder.contact_changes[k] + 1e-9, turned, np.inf))
+        shut |= ladder.sides[k, 0, one][:, None] != ladder.sides[k, 1, other]
+    first, end = np.searchsorted(blocked, [k * size, (k + 1) * size])
+    if end > first:
+        edges = np.zeros((len(before), len(after)), dtype=bool)
+        edges.flat[blocked[first:end] - k * size] = True
+        shut |= edges[np.ix_(one, other)]
+    return np.asarray(np.where(shut, np.inf, largest / (steps * ladder.max_joint_step)))
