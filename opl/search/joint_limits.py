@@ -11,9 +11,8 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
+from opl.search.limit_cuts import FULL_TURN, TOUCHING
 
-TOUCHING = 1e-8  # [rad] of a limit
-FULL_TURN = 2.0 * np.pi
 UNLIMITED = (JointBox(np.full(6, -np.inf), np.full(6, np.inf)),)
 
 
