@@ -22,7 +22,7 @@ def _within_limits(bounds, cell, low, high, limits):  # type: ignore[no-untyped-
                 least = min(bounds[cell, 6 + j], low[j]) + ROUND_OFF
                 most = max(bounds[cell, j], high[j]) - ROUND_OFF
                 if limits[k, 0, j] <= least and most <= limits[k, 1, j]:
-                    continue  # without a full turn, which is the rule
+                    continue  # mostly no full turn is needed
                 turns = 2.0 * np.pi * np.ceil((most - limits[k, 1, j]) / (2.0 * np.pi))
                 if limits[k, 0, j] + turns > least:
                     kept = False
@@ -40,7 +40,8 @@ def _kept(bounds, low, high, closing, limits, held):  # type: ignore[no-untyped-
     """Return the first cell of a span that some box below a size holds, and the end of the last.
 
     -1 for none; and the size of the smallest such box. Boxes are within limits, if there are any.
-    ``held`` is filled with the greatest joint positions in these cells, and the least, (1, 12).
+    ``held`` is filled with the greatest joint positions in these cells, then the least, in [rad],
+    shape (1, 12): the other way round than bounds, a row that is within limits only if all are.
     """
     begin, stop, smallest = -1, -1, np.inf
     held[0, :6], held[0, 6:] = -np.inf, np.inf

@@ -175,19 +175,19 @@ def surely_nearer(
     Ts_contact0_workpiece = wheel.T_contact0_contact(middle) @ Ts_cutter_workpiece
     enough = distance - moved - TOLERANCE
     clearance, nearest = nearest_triangle(part, wheel, Ts_contact0_workpiece, distance, enough)
-    surely = clearance < enough
-    near = rolled & ~surely & (clearance < distance - TOLERANCE)
+    surely, deep = clearance < enough, clearance < distance - TOLERANCE
+    near = rolled & ~surely & deep
     x, _, z = np.moveaxis(_corners(part, Ts_cutter_workpiece[near], nearest[near]), -1, 0)
     moved = turn[near] * np.hypot(x, z).max(axis=1)
     surely[near] = clearance[near] < distance - moved - TOLERANCE
-    slid = ~rolled & ~surely & (clearance < distance)
+    slid = ~rolled & ~surely & deep
     most = 2.0 * radius[slid].max(initial=0.0) / MM_PER_M
     if slid.any() and most < wheel.width:
         # along the axle: a wheel so much narrower stays inside of the wheel all over these cells
         narrower, nearer = replace(wheel, width=wheel.width - most), distance - TOLERANCE
         Ts = Ts_contact0_workpiece[slid]
         surely[slid] = signed_wheel_distance(part, narrower, Ts, distance, nearer) < nearer
-    return surely, clearance < distance - TOLERANCE
+    return surely, deep
 
 
 def _corners(part: PartTree, Ts_cutter_workpiece: Array, triangle: np.ndarray) -> Array:
