@@ -92,12 +92,16 @@ class LeadCells:
         self.work = 0.0
 
     def shut(self, T_workpiece_cutter: Array, lead: Array, cells: np.ndarray) -> np.ndarray:
-        """Return in which of some cells a lead fails before a free move may begin, (n,)."""
+        """Return in which of some cells a lead fails before a free move may begin, (n,).
+
+        Those without a posture on the wheel are among them: no pass begins there.
+        """
         contact, turned, none = (of[0] for of in self._postures(T_workpiece_cutter[None], cells))
         before, turned_before = contact.copy(), turned.copy()
         # over all of a cell the joints make as many full turns on their way as at its middle
         alike = np.ones(contact.shape, dtype=bool)
-        shut, begun = np.zeros(len(contact), dtype=bool), none | np.isnan(contact[:, 0])
+        # beside contact positions without a posture, too, a lead may be out of reach at once
+        shut, begun = none.copy(), np.zeros(len(contact), dtype=bool)
         for first in range(0, len(lead), AT_ONCE):
             left = np.flatnonzero(~shut & ~begun)
             if not len(left):

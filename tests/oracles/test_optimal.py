@@ -378,7 +378,17 @@ def with_a_lazy_elbow(problem):
     return with_scene(problem, cell=cell)
 
 
-@pytest.mark.parametrize("changed", [in_a_narrow_cell, with_a_lazy_elbow])
+def at_the_end_of_reach(problem):
+    """The wheel stands where the arm reaches it at some contact positions only."""
+    cell = problem.cell
+    T_base_contact0 = cell.wheel.T_base_contact0.copy()
+    T_base_contact0[:3, 3] += [0.83, -0.24, 0.56]
+    wheel = replace(cell.wheel, T_base_contact0=T_base_contact0)
+    robot = replace(cell.robot, lower=np.full(6, -4.0), upper=np.full(6, 4.0))
+    return with_scene(problem, cell=replace(cell, wheel=wheel, robot=robot))
+
+
+@pytest.mark.parametrize("changed", [in_a_narrow_cell, with_a_lazy_elbow, at_the_end_of_reach])
 def test_no_lead_is_free_where_it_is_surely_shut(changed):
     problem = changed(one_row())
     cell, points, random = problem.cell, problem.points, np.random.default_rng(3)
@@ -418,6 +428,30 @@ def test_no_lead_is_free_where_it_is_surely_shut(changed):
     assert shut > 10
     assert asked > 5
     assert shut < 0.8 * all_cells
+
+
+def test_leads_that_leave_the_reach_at_once_are_shut_up_to_its_end():
+    problem = at_the_end_of_reach(one_row())
+    cell, points, scene = problem.cell, problem.points, problem.scene
+    free_moves = FreeMoveSearch(cell, scene.collision, scene.part)
+    leads = FreeLeads(cell, scene.collision, scene.part, free_moves)
+    shut_leads = ShutLeads(problem)
+    t = np.linspace(-cell.wheel.last_position, cell.wheel.last_position, 4000)
+    asked = 0
+    for kind, column in ((MoveKind.APPROACH, 0), (MoveKind.RETRACT, len(points) - 1)):
+        T_workpiece_cutter = points.Ts_workpiece_cutter[column]
+        q = inverse_kinematics(cell.robot.arm, cell.Ts_base_flange(t, T_workpiece_cutter))
+        for branch in range(4):
+            reached = ~np.isnan(q[:, branch, 0])
+            for k in np.flatnonzero(reached[1:] != reached[:-1]):
+                last = k if reached[k] else k + 1
+                end = PassEnd(kind, branch, column, t[last], q[last, branch])
+                try:
+                    leads.find(points, problem.process, end)
+                except UnreachableApproachError:
+                    asked += 1
+                    assert shut_leads.at(T_workpiece_cutter, branch, 0, t[[last]]).all()
+    assert asked > 3
 
 
 def test_every_motion_crosses_a_chain_within_the_pads_of_its_pieces():
