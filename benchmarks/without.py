@@ -24,7 +24,6 @@ from benchmarks.strangers import LONGEST, MOST_DRAWS, Draw, run_strangers
 from opl.least import box_nodes, search_space
 from opl.least.hope import Hope
 from opl.least.passages import NO_PASSAGES, Rectangles
-from opl.search import cell_rows
 from opl.walls.shut_leads import ShutLeads
 from opl.walls.sides import ANY_SIDE
 
@@ -82,17 +81,6 @@ PARTS: Mapping[str, Part] = {
         [
             (box_nodes, "first_sunk", lambda problem, hits: None),
             (box_nodes, "until_sunk", lambda problem, tracks, hits: iter(tracks)),
-        ],
-    ),
-    "limit cuts": Part(
-        "which part of a cell is within the limits of joints",
-        ("search/limit_cuts.py",),
-        [
-            (
-                cell_rows,
-                "within_limits",
-                lambda rows, limits: (np.zeros(rows.shape[:-1]), np.ones(rows.shape[:-1])),
-            )
         ],
     ),
     "hope": Part(

@@ -40,9 +40,8 @@ def where_to_split(
     # what is beyond the limits is no part of the box: walls that it meets there alone, it misses
     box = JointBox(node.found.low, node.found.high)
     inner = cut_at(box, limits, (node.low, node.high))
-    if max((inner.lower - box.lower).max(), (box.upper - inner.upper).max()) > settled:
-        high = np.maximum(inner.lower, inner.upper)
-        node.found = replace(node.found, low=inner.lower, high=high)
+    if max(np.abs(inner.lower - box.lower).max(), np.abs(inner.upper - box.upper).max()) > settled:
+        node.found = replace(node.found, low=inner.lower, high=inner.upper)
     found = node.found
     of_spans = distances(table, cells.shifts, node.spans, found.low, found.high)
     away = np.full(node.n_walls, np.inf)

@@ -1,8 +1,7 @@
 """The cells of pieces as rows of numbers: what the compiled parts of the proof read.
 
 A row is a cell: joint positions at its two ends, how far below and above the chord the postures can
-be, and its ends along the wall. Where part of it is beyond the limits of joints, or forbidden, the
-row is that of what is left.
+be, and its ends along the wall. Where part of it is forbidden, the row is that of what is left.
 """
 
 from __future__ import annotations
@@ -13,8 +12,6 @@ from typing import Any
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.search.box import JointBox
-from opl.search.limit_cuts import within_limits
 from opl.search.walls import Piece
 
 COLUMNS = 26  # start 0:6, end 6:12, pad_low 12:18, pad_high 18:24, places 24 and 25
@@ -25,7 +22,6 @@ def rows_of(
     pieces: Sequence[Piece],
     sign: Array,
     shift: Array,
-    limits: Sequence[JointBox],
     left: Sequence[tuple[Array, Array]],
 ) -> Array:
     """Return the rows of pieces in one image, one after the other, shape (n, 26).
@@ -34,7 +30,6 @@ def rows_of(
         pieces: The pieces.
         sign: Of the image, shape (6,).
         shift: Of the image in [rad], shape (6,).
-        limits: As of `BoxProof`.
         left: What of the cells of each piece is not forbidden, as of `Forbidden.clear`; empty for
             all.
     """
@@ -50,10 +45,9 @@ def rows_of(
     rows[:, 18:24] = np.where(sign < 0.0, -pad_low, pad_high)
     rows[:, 24] = np.concatenate([piece.at[:-1] for piece in pieces])
     rows[:, 25] = np.concatenate([piece.at[1:] for piece in pieces])
-    low, high = within_limits(rows, limits)
-    if left:
-        low = np.maximum(low, np.concatenate([begin for begin, _ in left]))
-        high = np.minimum(high, np.concatenate([until for _, until in left]))
+    if not left:
+        return rows
+    low, high = (np.concatenate(ends) for ends in zip(*left, strict=True))
     none, step, along = low > high, end - start, rows[:, 25] - rows[:, 24]
     begins, ends = (low > 0.0) & ~none, (high < 1.0) & ~none
     rows[begins, 0:6] += (low[:, None] * step)[begins]

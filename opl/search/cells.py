@@ -12,7 +12,6 @@ from copy import copy
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.search.box import JointBox
 from opl.search.cell_rows import COLUMNS, bounds_of, rows_of, with_room
 from opl.search.forbidden import Forbidden
 from opl.search.reach import Reach, around_families
@@ -32,7 +31,6 @@ class Cells:
             with the same flip apart.
         cut: Cuts a cell of a wall into smaller ones.
         forbidden: Tells which parts of cells are forbidden; None to allow all.
-        limits: As of `BoxProof`; what is beyond all of them is no part of a cell.
         reach: Boxes of this size or more in [rad] are not asked about.
 
     Attributes:
@@ -50,10 +48,8 @@ class Cells:
         images: Callable[[int], Sequence[Image]],
         cut: Callable[[Piece, int], Sequence[Piece]],
         forbidden: Forbidden | None,
-        limits: Sequence[JointBox],
         reach: float = np.inf,
     ) -> None:
-        self._limits = limits
         self.reach = Reach(reach)
         self._images = images
         self._cut = cut
@@ -209,7 +205,7 @@ class Cells:
         return other
 
     def _anew(self, walls: Sequence[Wall], reach: float) -> Cells:
-        others = Cells(self._images, self._cut, self._forbidden, self._limits, reach)
+        others = Cells(self._images, self._cut, self._forbidden, reach)
         for wall in walls:
             others.add(wall)
         return others
@@ -285,7 +281,7 @@ class Cells:
             if self._forbidden is not None:
                 made = zip(pieces, map(_flip_made, own), strict=True)
                 left = [self._forbidden.clear(*one, 0, 0, 1) for one in made]
-            rows = rows_of(pieces, sign, shift, self._limits, left)
+            rows = rows_of(pieces, sign, shift, left)
             counts = [len(piece.pad_low) for piece in pieces]
             before = np.cumsum(counts) - counts
             at = np.repeat(self._first_cell[own] - before, counts) + np.arange(len(rows))

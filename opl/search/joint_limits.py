@@ -11,8 +11,9 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.search.box import JointBox
-from opl.search.limit_cuts import FULL_TURN, TOUCHING
 
+FULL_TURN = 2.0 * np.pi
+TOUCHING = 1e-8  # [rad] beyond a limit that still counts as within
 UNLIMITED = (JointBox(np.full(6, -np.inf), np.full(6, np.inf)),)
 
 
@@ -34,9 +35,9 @@ def about(
 def cut_at(
     box: JointBox, limits: Sequence[JointBox], core: tuple[Array, Array] | None = None
 ) -> JointBox:
-    """Return the part of a box that is within limits, as of `about`."""
+    """Return the part of a box that is within limits, as of `about`; at them where none is."""
     near = about(box, limits, core)
-    return JointBox(np.maximum(box.lower, near.lower), np.minimum(box.upper, near.upper))
+    return JointBox(*(np.clip(face, near.lower, near.upper) for face in (box.lower, box.upper)))
 
 
 def _turned(box: JointBox, limits: JointBox, core: tuple[Array, Array] | None = None) -> JointBox:

@@ -61,7 +61,7 @@ class BoxProof:
         forbidden: Forbidden | None = None,
         limits: Sequence[JointBox] = UNLIMITED,
     ) -> None:
-        self._cells = Cells(images, cut, forbidden, limits, FURTHER * threshold)
+        self._cells = Cells(images, cut, forbidden, FURTHER * threshold)
         self._gap = gap
         self._limits = limits
         self._tells_flips = forbidden is not None and len(limits) > 1

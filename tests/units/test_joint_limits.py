@@ -85,6 +85,7 @@ def tried(walls, limits):
 
 @settings(max_examples=100, deadline=None)
 @given(ends, ends, ends, ends)
+@example((0.0, 0.5, 0.0), (0.5, -0.5, 0.5), (0.0, 0.0, 0.0), (0.0, 0.75, 0.0))
 @example((0.0, 0.0, 0.75), (-0.25, 0.0, 0.0), (0.0, 0.5, 0.0), (0.03125, 0.0, 0.0))
 def test_the_least_box_is_within_the_limits(one, other, start, end):
     walls = straight(0.0, one, other), straight(1.0, start, end)
