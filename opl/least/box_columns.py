@@ -10,9 +10,8 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.least.doubts import Doubts
-from opl.least.field_at_places import FieldAtPlaces
+from opl.least.known_rows import KnownRows
 from opl.least.postures import Columns
-from opl.planning.nodes import inverse_solutions
 from opl.planning.problem import GrindingProblem, nearer_nodes
 from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
@@ -46,7 +45,7 @@ class ColumnSampler:
     def __init__(self, problem: GrindingProblem, seams: Seams, limits: Sequence[JointBox]) -> None:
         self._problem = problem
         self._seams = seams
-        self._field = FieldAtPlaces(problem)
+        self._known = KnownRows(problem)
         self._shut: dict[tuple[float, float, float], bool] = {}  # edges asked about, by their ends
         self.collisions = False  # whether postures that collide are left out
         self.mirrored = False  # whether they are those with the wrist flipped that may not collide
@@ -163,11 +162,16 @@ class ColumnSampler:
         self, places: Array, pass_index: np.ndarray, placements: Sequence[Placement]
     ) -> Array:
         """Return postures of places at the field's contact positions, shape (n, M, 6)."""
-        angles = np.empty((len(places), len(self._problem.field.contact_positions), 6))
-        families = _families(pass_index, placements)
-        for family in np.unique(families).tolist():
-            own = np.flatnonzero(families == family)
-            angles[own] = self._field.at(places[own], family)
+        positions, families = (
+            self._problem.field.contact_positions,
+            _families(pass_index, placements),
+        )
+        angles, whole = np.empty((len(places), len(positions), 6)), places == np.floor(places)
+        for family in np.unique(families[whole]).tolist():
+            own = whole & (families == family)
+            angles[own] = self._problem.angles(family, places[own].astype(int))
+        grid = np.broadcast_to(positions, angles.shape[:2])
+        angles[~whole] = self._known.angles(places[~whole], grid[~whole], families[~whole])
         return placed(angles, self._seams.start, pass_index, placements)
 
     def _leave_out_collisions(self, columns: Columns, box: JointBox) -> None:
@@ -192,13 +196,9 @@ class ColumnSampler:
         """Return the postures of places at contact positions, shape (n, m)."""
         problem = self._problem
         self.work += t.size / POSTURES_OF_WORK
-        q = np.empty((*t.shape, 6))
-        for block in blocks_of(*t.shape):
-            frames = there.Ts_workpiece_cutter[block, None]
-            solutions = inverse_solutions(problem.cell, frames, t[block])
-            passes = there.pass_index[block]
-            own = np.arange(len(passes)), slice(None), _families(passes, placements)
-            q[block] = placed(solutions[own], self._seams.start, passes, placements)
+        passes = there.pass_index
+        angles = self._known.angles(places, t, _families(passes, placements))
+        q = placed(angles, self._seams.start, passes, placements)
         free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
         free &= _allowed(places, there.pass_index, placements, t)
         free[free] = image_within_limits(problem.cell.robot, self.flips, q[free])
@@ -208,7 +208,7 @@ class ColumnSampler:
 
     def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m)."""
-        return self._problem.cuts_at(places, there, t, self.doubts.at(there.pass_index, t))
+        return self._known.cuts(places, t, self.doubts.at(there.pass_index, t))
 
     def spared(self, columns: Columns, spare: Array) -> Columns:
         """Leave out postures that leave less than some depth of that allowed, by place in [m]."""

@@ -4,31 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from opl.cell.robot import forward_kinematics
 from opl.least.box_track import nearest_about
-from opl.least.field_at_places import FieldAtPlaces
 from opl.least.postures import BESIDE
 from opl.least.rectangle import Rectangle
 from opl.least.rows import shut_edges
 from opl.search.box import JointBox
 from opl.walls.sides import Barrier, Side
 from tests.support.boxes import near_a_box
-from tests.support.planned import small_problem
-
-
-def test_the_flange_is_where_the_place_is_ground_at_each_contact_position():
-    problem = small_problem()
-    cell, t, field = problem.cell, problem.field.contact_positions, FieldAtPlaces(problem)
-    _, _, columns = near_a_box()
-    family = columns.placements[0].family
-    places = np.array([3.0, 3.25, 4.0, 7.875])
-    wanted = cell.Ts_base_flange(t, problem.points.frames_at(places)[:, None])
-    # asked for twice: as they are found, and as they are known
-    for q in (field.at(places, family), field.at(places[::-1], family)[::-1]):
-        reached = ~np.isnan(q[..., 0])
-        assert reached.sum() > 100
-        flange = forward_kinematics(cell.robot, q[reached])
-        np.testing.assert_allclose(flange, wanted[reached], atol=1e-9)
 
 
 def test_places_beside_a_wall_that_is_missed_as_well_are_left_out():
