@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from opl.geometry.toolpath import CutterPoints
 from opl.least.doubts import Doubts
 from opl.least.known_rows import KnownRows
 from opl.least.postures import Columns
-from opl.planning.problem import GrindingProblem, nearer_nodes
+from opl.planning.problem import GrindingProblem
 from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
 from opl.search.in_box import about_nearest, hidden, missing, nearest_points, sampled
@@ -24,7 +25,7 @@ from opl.walls.placement import Placement, of_passes, placed
 from opl.walls.shut_leads import RESERVE, ShutLeads
 
 FINE = 33  # contact positions of a place at which a box is held against it
-POSTURES_OF_WORK = 400  # that cost a unit of work
+SOLVED_OF_WORK, KNOWN_OF_WORK = 800, 2000  # postures that cost a unit of work
 WITHIN = 9  # halvings of the way between places that is too deep in the wheel, but hardly
 CLOSER = 2  # times that places are sampled closer where collisions begin
 HIDDEN = 5e-5  # of the box: what a chord that meets it may stand off the postures
@@ -85,12 +86,14 @@ class ColumnSampler:
         positions = problem.field.contact_positions
         grid = np.broadcast_to(positions, (len(places), len(positions)))
         cuts = self._cuts(places, there, grid)
-        cuts |= self._spends(there, grid, ~cuts, spare)
         t = np.empty((len(places), FINE))
         for block in blocks_of(*grid.shape):
             coarse = self._coarse(places[block], there.pass_index[block], placements)
             free = ~cuts[block] & ~np.isnan(coarse[..., 0])
             free &= _allowed(places[block], there.pass_index[block], placements, grid[block])
+            if spare[block].any():
+                of = places[block], grid[block], spare[block]
+                _leave_out(coarse, free, box, partial(self._known.spends, *of))
             t[block], _ = sampled(grid[block], coarse, free, box, FINE, whole=True)
         # where the part begins to cut is known to a hair only
         last = problem.cell.wheel.last_position
@@ -176,28 +179,21 @@ class ColumnSampler:
 
     def _leave_out_collisions(self, columns: Columns, box: JointBox) -> None:
         """Leave postures that collide out of columns, until those nearest to a box are free."""
-        free, asked = columns.free, np.zeros_like(columns.free)
-        every = np.arange(len(free))
-        while True:
-            _, row = nearest_points(columns.q, free, box)
-            near = np.zeros_like(free)
-            met = row >= 0.0
-            for end in (np.floor(row), np.ceil(row)):
-                near[every[met], end[met].astype(int)] = True
-            near &= ~asked
-            if not near.any():
-                return
-            asked |= near
-            free[near] = ~self.collides(columns.q[near])
+
+        def refused(near: np.ndarray) -> np.ndarray:
+            near[near] = self.collides(columns.q[near])
+            return near
+
+        _leave_out(columns.q, columns.free, box, refused)
 
     def at(
         self, places: Array, there: CutterPoints, placements: Sequence[Placement], t: Array
     ) -> Columns:
         """Return the postures of places at contact positions, shape (n, m)."""
         problem = self._problem
-        self.work += t.size / POSTURES_OF_WORK
-        passes = there.pass_index
+        passes, solved = there.pass_index, self._known.solved
         angles = self._known.angles(places, t, _families(passes, placements))
+        self.work += (self._known.solved - solved) / SOLVED_OF_WORK + t.size / KNOWN_OF_WORK
         q = placed(angles, self._seams.start, passes, placements)
         free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
         free &= _allowed(places, there.pass_index, placements, t)
@@ -212,16 +208,8 @@ class ColumnSampler:
 
     def spared(self, columns: Columns, spare: Array) -> Columns:
         """Leave out postures that leave less than some depth of that allowed, by place in [m]."""
-        spends = self._spends(columns.points, columns.t, columns.free, spare)
+        spends = self._known.spends(columns.places, columns.t, spare, columns.free)
         return replace(columns, free=columns.free & ~spends)
-
-    def _spends(self, there: CutterPoints, t: Array, free: np.ndarray, spare: Array) -> np.ndarray:
-        """Return which free nodes leave less than some depth in [m] of that allowed, (n, m)."""
-        asked = free & (spare > 0.0)[:, None]
-        if not asked.any():
-            return asked
-        scene, needed = self._problem.scene, spare[:, None] - self._problem.cell.planned_penetration
-        return nearer_nodes(scene, there, t, asked, needed)
 
     def _leave_out_leads(
         self,
@@ -264,6 +252,31 @@ class ColumnSampler:
             asked = (edge for edge, one in zip(edges, new, strict=True) if one)
             self._shut.update(zip(asked, found.tolist(), strict=True))
         return np.array([self._shut[edge] for edge in edges], dtype=bool)
+
+
+def _leave_out(
+    q: Array, free: np.ndarray, box: JointBox, refused: Callable[[np.ndarray], np.ndarray]
+) -> None:
+    """Leave postures out that are refused, until those nearest to a box are free.
+
+    Args:
+        q: Postures of places in [rad], shape (n, m, 6).
+        free: Which are free as far as is known, shape (n, m); changed.
+        box: The box.
+        refused: Tells which of some are refused, both flags of shape (n, m).
+    """
+    asked, every = np.zeros_like(free), np.arange(len(free))
+    while True:
+        _, row = nearest_points(q, free, box)
+        near = np.zeros_like(free)
+        met = row >= 0.0
+        for end in (np.floor(row), np.ceil(row)):
+            near[every[met], end[met].astype(int)] = True
+        near &= ~asked
+        if not near.any():
+            return
+        asked |= near
+        free &= ~refused(near)
 
 
 def _size(columns: Columns, box: JointBox) -> float:

@@ -6,15 +6,17 @@ that are asked for nine were asked for before.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 
 import numpy as np
 
 from opl.geometry.frames import Array
 from opl.planning.nodes import inverse_solutions
-from opl.planning.problem import GrindingProblem
+from opl.planning.problem import GrindingProblem, nearer_nodes
 
-MOST_KNOWN = 2**23  # numbers; beyond that all are forgotten
+MOST_KNOWN = 2**26  # bytes; beyond that all are forgotten
+DEPTH = "depth"
+UNKNOWN = np.int8(-1)  # whether the part is nearer than it may be; else 0 or 1
 
 Key = tuple[Hashable, ...]
 
@@ -32,7 +34,7 @@ class KnownRows:
     def __init__(self, problem: GrindingProblem) -> None:
         self._problem = problem
         self._known: dict[Key, Array] = {}
-        self._numbers = 0
+        self._bytes = 0
         self.solved = 0
 
     def angles(self, places: Array, t: Array, families: np.ndarray) -> Array:
@@ -43,46 +45,70 @@ class KnownRows:
             t: Contact positions of each in belt units, shape (n, m).
             families: The posture of each, shape (n,).
         """
-
-        def solve(new: list[int]) -> Array:
+        keys = _keys(places, t, families.tolist())
+        found = np.empty((*t.shape, 6))
+        new = [k for k, key in enumerate(keys) if key not in self._known]
+        for k in set(range(len(keys))).difference(new):
+            found[k] = self._known[keys[k]]
+        if new:
             self.solved += t[new].size
             frames = self._problem.points.frames_at(places[new])[:, None]
             q = inverse_solutions(self._problem.cell, frames, t[new])
-            return q[np.arange(len(new)), :, families[new]]
-
-        return self._rows(places, t, families.tolist(), solve)
+            found[new] = q[np.arange(len(new)), :, families[new]]
+            self._keep([keys[k] for k in new], found[new])
+        return found
 
     def cuts(self, places: Array, t: Array, doubted: np.ndarray) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m).
 
         As `GrindingProblem.cuts_at` does, with what is doubted of each place, shape (n, m).
         """
+        cut, unsure = self._problem.sure_cuts(places, t, doubted)
+        return np.asarray(cut | self._nearer(places, t, np.zeros(len(places)), unsure))
 
-        def measure(new: list[int]) -> np.ndarray:
-            points = self._problem.points.at_places(places[new])
-            return self._problem.cuts_at(places[new], points, t[new], doubted[new])
+    def spends(self, places: Array, t: Array, spare: Array, asked: np.ndarray) -> np.ndarray:
+        """Return where the part leaves less than some depth of that allowed, shape (n, m).
 
-        return self._rows(places, t, [row.tobytes() for row in doubted], measure)
+        Args:
+            places: Fractional cutter points, shape (n,).
+            t: Contact positions of each in belt units, shape (n, m).
+            spare: Depth in [m] that is to be left at each, shape (n,); none where it is 0.
+            asked: Where that is asked, shape (n, m); elsewhere it is said that it does not.
+        """
+        return self._nearer(places, t, spare, asked & (spare > 0.0)[:, None])
 
-    def _rows(
-        self,
-        places: Array,
-        t: Array,
-        kinds: Sequence[Hashable],
-        find: Callable[[list[int]], np.ndarray],
-    ) -> np.ndarray:
-        """Return what is known of rows, by place, contact positions and kind, after new ones."""
-        rows = (row.tobytes() for row in t)
-        keys: list[Key] = list(zip(places.tolist(), rows, kinds, strict=True))
-        known = self._known
-        if not keys:
-            return find([])
-        if new := [k for k, key in enumerate(keys) if key not in known]:
-            found = find(new)
-            self._numbers += found.size
-            known.update(zip((keys[k] for k in new), found, strict=True))
-        together = np.array([known[key] for key in keys])
-        if self._numbers > MOST_KNOWN:
-            known.clear()
-            self._numbers = 0
-        return together
+    def _nearer(self, places: Array, t: Array, spare: Array, asked: np.ndarray) -> np.ndarray:
+        """Return where of what is asked the part is nearer to the wheel than it may be, (n, m).
+
+        It is to leave some depth in [m] of that allowed, shape (n,).
+        """
+        found = np.zeros(t.shape, dtype=bool)
+        if not (some := asked.any(axis=1)).any():
+            return found
+        places, t, spare, asked = places[some], t[some], spare[some], asked[some]
+        keys = _keys(places, t, [(DEPTH, depth) for depth in spare.tolist()])
+        unknown = np.full(t.shape[1], UNKNOWN)
+        known = np.array([self._known.get(key, unknown) for key in keys])
+        new = asked & (known == UNKNOWN)
+        if (own := np.flatnonzero(new.any(axis=1))).size:
+            points = self._problem.points.at_places(places[own])
+            needed = spare[own, None] - self._problem.cell.planned_penetration
+            nearer = nearer_nodes(self._problem.scene, points, t[own], new[own], needed)
+            known[own] = np.where(new[own], nearer, known[own])
+            self._keep([keys[k] for k in own.tolist()], known[own])
+        found[some] = asked & (known == 1)
+        return found
+
+    def _keep(self, keys: Sequence[Key], rows: np.ndarray) -> None:
+        """Know rows from now on, the first time that they are found or anew."""
+        size = rows.nbytes + 8 * rows.shape[0] * rows.shape[1]  # with their contact positions
+        self._bytes += size
+        if self._bytes > MOST_KNOWN:
+            self._known.clear()
+            self._bytes = size
+        self._known.update(zip(keys, rows, strict=True))
+
+
+def _keys(places: Array, t: Array, kinds: Sequence[Hashable]) -> list[Key]:
+    """Return what rows are known by: place, contact positions and kind."""
+    return list(zip(places.tolist(), (row.tobytes() for row in t), kinds, strict=True))

@@ -123,6 +123,16 @@ class GrindingProblem:
             t: Contact positions in belt units, shape (n, m).
             doubted: What is measured though all around it are free, shape (n, m) or one for all.
         """
+        cut, unsure = self.sure_cuts(places, t, doubted)
+        return np.asarray(nearer_nodes(self.scene, points, t, unsure) | cut)
+
+    def sure_cuts(
+        self, places: Array, t: Array, doubted: np.ndarray | bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return where the part cuts in as `cuts_at` does, and where that is to be measured.
+
+        Both of shape (n, m); nothing is measured here.
+        """
         field, cuts = self.field.contact_positions, self.cuts
         after = np.clip(np.searchsorted(field, t), 1, len(field) - 1)
         before = np.floor(places).astype(int)[:, None]
@@ -131,8 +141,7 @@ class GrindingProblem:
             near += cuts[column, after - 1].astype(int) + cuts[column, after]
         on_way, shut = (places % 1.0 > 0.0)[:, None], np.pad(self.shut, ((0, 1), (0, 0)))
         cut = (near == 4) & (~on_way | (shut[before, after - 1] & shut[before, after]))
-        unsure = ((near > 0) | doubted) & ~cut
-        return np.asarray(nearer_nodes(self.scene, points, t, unsure) | cut)
+        return np.asarray(cut), np.asarray(((near > 0) | doubted) & ~cut)
 
     def solutions(self, columns: np.ndarray) -> Array:
         """Solve all IK branches at some cutter points, at the contact positions of the field.

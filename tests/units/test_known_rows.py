@@ -1,5 +1,7 @@
 """What is solved and measured of places is the same as it is found and as it is known."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from opl.files.resources import folder
 from opl.job.load import load_job
 from opl.least import known_rows
 from opl.least.known_rows import KnownRows
+from opl.planning.problem import nearer_nodes
 from tests.support.boxes import near_a_box
 from tests.support.planned import problem_of, small_problem, with_positions
 
@@ -22,7 +25,14 @@ def spread(problem):
     return t
 
 
-@pytest.fixture(params=[known_rows.MOST_KNOWN, 500], ids=["all known", "often forgotten"])
+@cache
+def s_problem():
+    """Return the S part at few contact positions, so that between them much is not known."""
+    job = load_job(folder("workpieces") / "s_shape" / "job.yaml")
+    return problem_of(with_positions(job, 6))
+
+
+@pytest.fixture(params=[known_rows.MOST_KNOWN, 4000], ids=["all known", "often forgotten"])
 def rows(request, monkeypatch):
     monkeypatch.setattr(known_rows, "MOST_KNOWN", request.param)
     return KnownRows(small_problem())
@@ -45,11 +55,10 @@ def test_the_flange_is_where_the_place_is_ground_at_each_contact_position(rows):
     assert not np.allclose(other, found[:1], equal_nan=True)
 
 
-@pytest.mark.parametrize("most", [known_rows.MOST_KNOWN, 3000])
+@pytest.mark.parametrize("most", [known_rows.MOST_KNOWN, 20000])
 def test_where_the_part_cuts_in_is_what_the_problem_says_whatever_is_doubted(most, monkeypatch):
     monkeypatch.setattr(known_rows, "MOST_KNOWN", most)
-    job = load_job(folder("workpieces") / "s_shape" / "job.yaml")
-    problem = problem_of(with_positions(job, 6))  # few, so that between them much is not known
+    problem = s_problem()
     random, last = np.random.default_rng(2), problem.field.contact_positions[-1]
     places = np.sort(random.uniform(0.0, len(problem.points) - 1, 60))
     places = places[~problem.off_wheel[places.astype(int)]]
@@ -62,6 +71,19 @@ def test_where_the_part_cuts_in_is_what_the_problem_says_whatever_is_doubted(mos
         found = rows.cuts(places, t, doubted)
         np.testing.assert_array_equal(found, problem.cuts_at(places, points, t, doubted))
         np.testing.assert_array_equal(found & unseen, doubted)
+
+
+def test_where_depth_is_spared_is_measured_where_that_is_asked():
+    problem = s_problem()
+    rows, t, points = KnownRows(problem), spread(problem), problem.points.at_places(PLACES)
+    random, deepest = np.random.default_rng(6), problem.cell.planned_penetration
+    for share in (0.0, 0.5, 0.9, 0.5):
+        spare = share * deepest * (np.arange(len(PLACES)) % 3 > 0)
+        asked = random.random(t.shape) < 0.6
+        needed = spare[:, None] - deepest
+        deep = nearer_nodes(problem.scene, points, t, asked & (needed > -deepest), needed)
+        np.testing.assert_array_equal(rows.spends(PLACES, t, spare, asked), deep)
+        assert deep.any() == (share > 0.0)
 
 
 def test_rows_that_are_known_are_not_solved_again():
