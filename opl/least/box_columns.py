@@ -21,7 +21,7 @@ from opl.search.joint_limits import about
 from opl.walls.cut_cells import shut_along
 from opl.walls.families import GROWN, grown
 from opl.walls.images import Seams, image_within_limits, wrist_flips
-from opl.walls.placement import Placement, of_passes, placed
+from opl.walls.placement import Placement, allowed, families_of, placed
 from opl.walls.shut_leads import RESERVE, ShutLeads
 
 FINE = 33  # contact positions of a place at which a box is held against it
@@ -90,7 +90,7 @@ class ColumnSampler:
         for block in blocks_of(*grid.shape):
             coarse = self._coarse(places[block], there.pass_index[block], placements)
             free = ~cuts[block] & ~np.isnan(coarse[..., 0])
-            free &= _allowed(places[block], there.pass_index[block], placements, grid[block])
+            free &= allowed(places[block], there.pass_index[block], placements, grid[block])
             if spare[block].any():
                 of = places[block], grid[block], spare[block]
                 _leave_out(coarse, free, box, partial(self._known.spends, *of))
@@ -165,16 +165,7 @@ class ColumnSampler:
         self, places: Array, pass_index: np.ndarray, placements: Sequence[Placement]
     ) -> Array:
         """Return postures of places at the field's contact positions, shape (n, M, 6)."""
-        positions, families = (
-            self._problem.field.contact_positions,
-            _families(pass_index, placements),
-        )
-        angles, whole = np.empty((len(places), len(positions), 6)), places == np.floor(places)
-        for family in np.unique(families[whole]).tolist():
-            own = whole & (families == family)
-            angles[own] = self._problem.angles(family, places[own].astype(int))
-        grid = np.broadcast_to(positions, angles.shape[:2])
-        angles[~whole] = self._known.angles(places[~whole], grid[~whole], families[~whole])
+        angles = self._known.over_field(places, families_of(pass_index, placements))
         return placed(angles, self._seams.start, pass_index, placements)
 
     def _leave_out_collisions(self, columns: Columns, box: JointBox) -> None:
@@ -192,11 +183,11 @@ class ColumnSampler:
         """Return the postures of places at contact positions, shape (n, m)."""
         problem = self._problem
         passes, solved = there.pass_index, self._known.solved
-        angles = self._known.angles(places, t, _families(passes, placements))
+        angles = self._known.angles(places, t, families_of(passes, placements))
         self.work += (self._known.solved - solved) / SOLVED_OF_WORK + t.size / KNOWN_OF_WORK
         q = placed(angles, self._seams.start, passes, placements)
         free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
-        free &= _allowed(places, there.pass_index, placements, t)
+        free &= allowed(places, passes, placements, t)
         free[free] = image_within_limits(problem.cell.robot, self.flips, q[free])
         if self.collisions:
             self._leave_out_leads(places, there, placements, t, free)
@@ -283,18 +274,3 @@ def _size(columns: Columns, box: JointBox) -> float:
     """Return the size of a box grown until it holds a posture of each column, in [rad]."""
     larger = grown(columns.q, columns.free, box)
     return np.inf if larger is None else larger.size
-
-
-def _families(pass_index: np.ndarray, placements: Sequence[Placement]) -> np.ndarray:
-    """Return the family of each place, shape (n,)."""
-    return np.asarray(np.array([placement.family for placement in placements])[pass_index])
-
-
-def _allowed(
-    places: Array, pass_index: np.ndarray, placements: Sequence[Placement], t: Array
-) -> np.ndarray:
-    """Return which contact positions of places their passes may use, shape (n, m)."""
-    allowed = np.empty(t.shape, dtype=bool)
-    for own, placement in of_passes(pass_index, placements):
-        allowed[own] = placement.side.holds(places[own], t[own])
-    return allowed

@@ -58,6 +58,18 @@ class KnownRows:
             self._keep([keys[k] for k in new], found[new])
         return found
 
+    def over_field(self, places: Array, families: np.ndarray) -> Array:
+        """Return the same at all contact positions of the field, shape (n, M, 6)."""
+        problem, whole = self._problem, places == np.floor(places)
+        positions = problem.field.contact_positions
+        angles = np.empty((len(places), len(positions), 6))
+        for family in np.unique(families[whole]).tolist():
+            own = whole & (families == family)
+            angles[own] = problem.angles(family, places[own].astype(int))
+        between, grid = ~whole, np.broadcast_to(positions, angles.shape[:2])
+        angles[between] = self.angles(places[between], grid[between], families[between])
+        return angles
+
     def cuts(self, places: Array, t: Array, doubted: np.ndarray) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m).
 

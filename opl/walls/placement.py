@@ -111,3 +111,18 @@ def of_passes(
     """
     for index in np.unique(pass_index).tolist():
         yield np.flatnonzero(pass_index == index), placements[index]
+
+
+def families_of(pass_index: np.ndarray, placements: Sequence[Placement]) -> np.ndarray:
+    """Return the family of each of some places, shape (n,); arguments as of `of_passes`."""
+    return np.asarray(np.array([placement.family for placement in placements])[pass_index])
+
+
+def allowed(
+    places: Array, pass_index: np.ndarray, placements: Sequence[Placement], t: Array
+) -> np.ndarray:
+    """Return which contact positions of places their passes may use, shape (n, m)."""
+    may = np.empty(t.shape, dtype=bool)
+    for own, placement in of_passes(pass_index, placements):
+        may[own] = placement.side.holds(places[own], t[own])
+    return may

@@ -55,6 +55,15 @@ def test_the_flange_is_where_the_place_is_ground_at_each_contact_position(rows):
     assert not np.allclose(other, found[:1], equal_nan=True)
 
 
+def test_over_the_field_the_angles_are_those_of_its_contact_positions(rows):
+    problem, families = small_problem(), np.array([1, 0, 1, 1, 0, 0])
+    positions = problem.field.contact_positions
+    grid = np.broadcast_to(positions, (len(PLACES), len(positions)))
+    wanted = KnownRows(problem).angles(PLACES, grid, families)
+    for _ in range(2):
+        np.testing.assert_allclose(rows.over_field(PLACES, families), wanted, atol=1e-12)
+
+
 @pytest.mark.parametrize("most", [known_rows.MOST_KNOWN, 20000])
 def test_where_the_part_cuts_in_is_what_the_problem_says_whatever_is_doubted(most, monkeypatch):
     monkeypatch.setattr(known_rows, "MOST_KNOWN", most)
