@@ -13,6 +13,7 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.planning.nodes import inverse_solutions
 from opl.planning.problem import GrindingProblem, nearer_nodes
+from opl.planning.turned import blocks_of
 
 MOST_KNOWN = 2**26  # bytes; beyond that all are forgotten
 DEPTH = "depth"
@@ -45,17 +46,20 @@ class KnownRows:
             t: Contact positions of each in belt units, shape (n, m).
             families: The posture of each, shape (n,).
         """
-        keys = _keys(places, t, families.tolist())
+        keys, cell = _keys(places, t, families.tolist()), self._problem.cell
         found = np.empty((*t.shape, 6))
-        new = [k for k, key in enumerate(keys) if key not in self._known]
-        for k in set(range(len(keys))).difference(new):
+        new = np.array([key not in self._known for key in keys], dtype=bool)
+        for k in np.flatnonzero(~new).tolist():
             found[k] = self._known[keys[k]]
-        if new:
-            self.solved += t[new].size
-            frames = self._problem.points.frames_at(places[new])[:, None]
-            q = inverse_solutions(self._problem.cell, frames, t[new])
-            found[new] = q[np.arange(len(new)), :, families[new]]
-            self._keep([keys[k] for k in new], found[new])
+        to_solve = np.flatnonzero(new)
+        for block in blocks_of(len(to_solve), t.shape[1]):
+            own = to_solve[block]
+            q = inverse_solutions(
+                cell, self._problem.points.frames_at(places[own])[:, None], t[own]
+            )
+            found[own] = q[np.arange(len(own)), :, families[own]]
+            self._keep([keys[k] for k in own.tolist()], found[own])
+        self.solved += t[new].size
         return found
 
     def over_field(self, places: Array, families: np.ndarray) -> Array:
