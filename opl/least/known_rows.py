@@ -16,8 +16,8 @@ from opl.planning.problem import GrindingProblem, nearer_nodes
 from opl.planning.turned import blocks_of
 
 MOST_KNOWN = 2**26  # bytes; beyond that all are forgotten
-DEPTH = "depth"
-UNKNOWN = np.int8(-1)  # whether the part is nearer than it may be; else 0 or 1
+DEPTH = "depth"  # tells rows of depths from those of a posture, whose kind is a number too
+UNKNOWN, NEARER = np.int8(-1), np.int8(1)  # than the part may be to the wheel; 0 where it is not
 
 Key = tuple[Hashable, ...]
 
@@ -29,7 +29,7 @@ class KnownRows:
         problem: What is to be planned.
 
     Attributes:
-        solved: How many contact positions were, of all places.
+        solved: How many postures were solved, one for each place and contact position.
     """
 
     def __init__(self, problem: GrindingProblem) -> None:
@@ -112,7 +112,7 @@ class KnownRows:
             nearer = nearer_nodes(self._problem.scene, points, t[own], new[own], needed)
             known[own] = np.where(new[own], nearer, known[own])
             self._keep([keys[k] for k in own.tolist()], known[own])
-        found[some] = asked & (known == 1)
+        found[some] = asked & (known == NEARER)
         return found
 
     def _keep(self, keys: Sequence[Key], rows: np.ndarray) -> None:

@@ -100,7 +100,8 @@ class LeadCells:
         before, turned_before = contact.copy(), turned.copy()
         # over all of a cell the joints make as many full turns on their way as at its middle
         alike = np.ones(contact.shape, dtype=bool)
-        # beside contact positions without a posture, too, a lead may be out of reach at once
+        # what has no posture counts as shut: just inside of the reach, leads may leave it at once,
+        # and where that begins is looked for between contact positions that differ
         shut, begun = none.copy(), np.zeros(len(contact), dtype=bool)
         for first in range(0, len(lead), AT_ONCE):
             left = np.flatnonzero(~shut & ~begun)
