@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.least.box_columns import ColumnSampler
 from opl.least.box_nodes import SAMPLES, BoxNodes, Learn, TrackSearch
 from opl.least.passages import NO_PASSAGES, Passages
 from opl.least.postures import Columns
@@ -25,8 +24,6 @@ from opl.walls.families import grown
 
 BULGE = 1.75  # times the room of a motion: how far it may leave its box between two places
 EDGES_OF_WORK = 3e5  # that cost a unit of work to search, all rounds
-# belt units about a crossing, and contact positions there: it was told from a chord between lines
-NEARBY, FEW = 0.1, 5
 MOST_SPARED = 4  # times that depth is spared in one box for what sinks between places
 
 
@@ -130,45 +127,8 @@ class BoxTracks:
         t, spacing = in_box.sampled(columns.t, columns.q, columns.free, inner, SAMPLES)
         places, one = columns.places, t[:, :1]
         level = levels(places, passages.rows, inner, one)
-        sampler, last = self._search.sampler, self._search.problem.cell.wheel.last_position
-        crossing = crossed(places, passages.crossings, one)
-        if len(passages.crossings):
-            crossing = nearest_about(sampler, columns, crossing, inner, last)
-        free = nearest_free(columns, inner) if sampler.collisions else one[:, :0]
-        t = np.concatenate([t, level, crossing, free], axis=1)
+        sampler, crossing = self._search.sampler, crossed(places, passages.crossings, one)
+        t = np.concatenate([t, level, crossing], axis=1)
         sampler.work += len(t) * t.shape[1] ** 2 / EDGES_OF_WORK
         at = sampler.at(places, columns.points, columns.placements, t)
         return BoxNodes(self._search, at, passages.rows, inner, spare, spacing)
-
-
-def nearest_free(columns: Columns, box: JointBox) -> Array:
-    """Return between which sampled contact positions places are nearest to a box, shape (n, 2).
-
-    Columns sampled with collisions left out do not collide there. Where little of a box is free,
-    samples spread over it would miss that. In belt units.
-    """
-    _, row = in_box.nearest_points(columns.q, columns.free, box)
-    both = np.stack([np.floor(row), np.ceil(row)], axis=1).astype(int)
-    return np.asarray(np.take_along_axis(columns.t, np.maximum(both, 0), axis=1))
-
-
-def nearest_about(
-    sampler: ColumnSampler, columns: Columns, t: Array, box: JointBox, last: float
-) -> Array:
-    """Return about which contact positions places are nearest to a box, shape (n, 1).
-
-    Args:
-        sampler: Samples the places.
-        columns: The places.
-        t: Contact positions in belt units, one of each place, shape (n, 1).
-        box: The box.
-        last: The greatest contact position.
-    """
-    near = np.clip(t + NEARBY * np.linspace(-1.0, 1.0, FEW), -last, last)
-    at = sampler.at(columns.places, columns.points, columns.placements, near)
-    _, row = in_box.nearest_points(at.q, at.free, box)
-    share, every = np.maximum(row, 0.0), np.arange(len(row))
-    before = np.minimum(share.astype(int), FEW - 2)
-    start, end = near[every, before], near[every, before + 1]
-    nearest = start + (share - before) * (end - start)
-    return np.asarray(np.where(row >= 0.0, nearest, t[:, 0])[:, None])

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from opl.least.box_nodes import TrackSearch
 from opl.least.box_track import BoxTracks
-from opl.least.passages import NO_PASSAGES, Passages
+from opl.least.passages import Passages
 from opl.least.postures import Columns
 from opl.least.rows import Bulge
 from opl.least.search_space import SearchSpace
@@ -16,7 +16,7 @@ from opl.planning.settings import OptimalSettings
 from opl.search.box import JointBox
 from opl.walls.placement import Placement
 
-CLEARLY_LESS = 0.005  # of the best: what a motion in a box not settled should be better by
+CLEARLY_LESS = 0.005  # of the best: what a motion should be better by that spares depth
 # of a box that holds all, but no motion that is found: how much larger boxes are where one is
 # sought instead, so that what cannot be proven is not left far from the bound
 LARGER = tuple(0.0005 * 2.0**k for k in range(9))
@@ -73,12 +73,6 @@ class Motions:
         better = found is not None and found.path.joint_range_sum < self.value
         self.best = found if better else self.best
         return better
-
-    def look_in(self, columns: Columns, box: JointBox) -> bool:
-        """Look for a motion through places in a box that may hold one; return whether one is."""
-        found = self._found(columns, NO_PASSAGES, box)
-        self.keep(found)
-        return found is not None
 
     def learn_in(self, columns: Columns, passages: Passages, box: JointBox | None) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""

@@ -35,7 +35,6 @@ from opl.walls.obstructed import Obstructions
 from opl.walls.placement import Placement
 
 CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
-MOST_IN_VAIN = 2  # such boxes in which no motion is free: what collides is left out from then on
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
 
@@ -72,7 +71,7 @@ class OptimalSearch:
         tracks = TrackSearch(problem, self._sampler, settings.costs, most, push_away)
         self.motions = Motions(space, tracks, settings, fallback, largest)
         self._proven = 0.0
-        self._given_up = self._in_vain = 0  # boxes without a motion near the bound, or a free one
+        self._given_up = 0  # boxes without a motion near the bound
         self._hoped = Hope(fallback is not None)
         self.forbidden: Forbidden | None = None  # of collisions, once they are known to matter
         if not untried and (fallback is None or fallback.checks > 1):  # the first is not free
@@ -85,7 +84,7 @@ class OptimalSearch:
         hoped = min(self.proof.threshold, self._hoped.guess(0.0, largest))
         self._begin_again(self._new_proof(hoped), hoped)
         first = [0.0, float(len(points) // 2), float(len(points) - 1)]
-        self._add(list(dict.fromkeys(first + self._families.unreached())))
+        self._add(list(dict.fromkeys(first)))
 
     @property
     def finished(self) -> bool:
@@ -155,12 +154,7 @@ class OptimalSearch:
             self.proof.give_up()
 
     def _go_into(self, box: JointBox, placements: Sequence[Placement], missed: list[float]) -> None:
-        """Look for a motion in a box that is not settled; add walls that it misses, or split it."""
-        if placements:
-            self._look_for_more(box, placements)
-            if self._in_vain >= MOST_IN_VAIN and not self._sampler.collisions:
-                self._mind_collisions()
-                return
+        """Add walls that a box which is not settled misses, or split it."""
         most = CLEARLY_MISSED * self.proof.threshold
         if missed:
             self._add(missed)
@@ -216,25 +210,6 @@ class OptimalSearch:
         if not self._sampler.collisions:
             self._hope(larger)
         return larger
-
-    def _look_for_more(self, box: JointBox, placements: Sequence[Placement]) -> None:
-        """Grow a box that is not settled until it holds all; look for a motion in it, if small."""
-        threshold, larger = self.proof.threshold, self._grown(box, placements)
-        if larger is None or larger.size > self.motions.worth:
-            return
-        if self._work.left_for_unsettled(self.plan is not None):
-            with self._work.early():
-                if self._missed.shut(larger, placements, CLEARLY_MISSED * threshold):
-                    return
-                columns, _, inner = self._space.look(larger, placements, self._settings)
-                if inner is not None:
-                    self._hope(inner)
-                    collided = self.motions.collided
-                    found = self.motions.look_in(columns, inner)
-                    self._in_vain += int(not found and self.motions.collided > collided)
-                    self._lower()
-        if self.proof.threshold < threshold:
-            self.proof.show_soon()
 
     def _hope(self, box: JointBox | None) -> None:
         """Look only for what is as good as a motion in a box would be."""

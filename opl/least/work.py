@@ -65,16 +65,7 @@ class Work:
     @property
     def left_for_early(self) -> bool:
         """Whether motions may be sought in boxes that are not proven to be the least."""
-        return self._early < FIRST_WORK + self._early_share
-
-    def left_for_unsettled(self, has_motion: bool) -> bool:
-        """Return whether so in boxes that are not even settled.
-
-        Where a motion is known, not at once: many a proof comes to its end before.
-        """
-        return self.left_for_early and (
-            not has_motion or self._early + FIRST_WORK < self._early_share
-        )
+        return self._early < FIRST_WORK + EARLY_SHARE * self.done
 
     @contextmanager
     def early(self) -> Iterator[None]:
@@ -88,10 +79,6 @@ class Work:
         self._before += 0.0 if self.proof is None else work_of_proof(self.proof)
         self._begun = self._before + self._counted()
         self.proof = proof
-
-    @property
-    def _early_share(self) -> float:
-        return EARLY_SHARE * self.done
 
     def _counted(self) -> float:
         asked = self._scene.work + self._tracks.push_away.queries / QUERIES

@@ -25,7 +25,6 @@ from opl.walls.sides import Side
 MOST_COLUMNS = 1000  # at which a box is held against the families
 FEW_COLUMNS = 40  # over which a box is grown at first
 STARTS = 8  # nodes from which one is grown
-MOST_PASSES = 8  # in which families are ruled out before the proof begins
 MOST_GROWN = 200  # times that a box is grown for a column
 NODES_OF_WORK = 15000  # that cost a unit of work to hold against a box
 MOST_KNOWN = 2_000_000  # placed nodes that are kept at hand: 49 bytes each
@@ -152,18 +151,6 @@ class Families:
                 if whole is not None and (best is None or whole.size < best.size):
                     best = whole
         return best
-
-    def unreached(self) -> list[float]:
-        """Return a cutter point of each pass that rules out each family that does not grind all."""
-        places: list[float] = []
-        for columns in self._passes[:MOST_PASSES]:
-            left = [~free[columns].any(axis=1) for _, free in self._unrolled.values()]
-            left = [lacks for lacks in left if lacks.any()]
-            while left:
-                worst = int(np.argmax(np.sum(left, axis=0)))
-                places.append(float(self._places[columns][worst]))
-                left = [lacks for lacks in left if not lacks[worst]]
-        return places
 
     def grown(self, box: JointBox, placements: Sequence[Placement]) -> JointBox | None:
         """Return a box grown for all columns at the field's contact positions, as `grown` does."""

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from opl.least.box_track import nearest_about
 from opl.least.postures import BESIDE
 from opl.least.rectangle import Rectangle
 from opl.least.rows import shut_edges
@@ -84,16 +83,3 @@ def test_a_way_is_narrow_where_it_slides_past_what_is_shut_at_a_place():
         assert found == ([(places[k], places[k + 1])] if shut else [])
     told = [free[k, j] and free[k + 1, j] for k, j in every]
     assert any(told) and not all(told)
-
-
-def test_a_crossing_is_moved_to_where_the_place_is_nearest_to_a_box():
-    _, sampler, columns = near_a_box()
-    last, rows = 8.0, np.arange(0, len(columns.places), 3)
-    few = columns.places[rows]
-    t = np.linspace(-5.0, 5.0, len(few))[:, None]
-    there = sampler.at(few, sampler.there(few), columns.placements, t)
-    box = JointBox(there.q[4, 0], there.q[4, 0])
-    found = nearest_about(sampler, there, t + 0.07, box, last)
-    assert there.free[4, 0]
-    assert abs(found[4, 0] - t[4, 0]) < 1e-4
-    assert (np.abs(found - t) <= 0.17 + 1e-12).all()
