@@ -15,7 +15,6 @@ from opl.files.beside import Beside
 from opl.least.box_nodes import TrackSearch
 from opl.least.holders import holders
 from opl.least.hope import Hope
-from opl.least.missed import Missed
 from opl.least.motions import Motions
 from opl.least.passages import Passages
 from opl.least.postures import Columns
@@ -77,7 +76,7 @@ class OptimalSearch:
         if not untried and (fallback is None or fallback.checks > 1):  # the first is not free
             self._leave_out_collisions()
         self.proof = self._new_proof(largest)
-        self._missed = Missed(space.sampler, points.pass_index)
+        self._places: set[float] = set()  # of the walls
         self._work = Work(problem.scene, self._walls, self._families, tracks)
         # boxes grown know nothing of collisions
         self._hope(None if self._sampler.collisions else self._families.smallest_grown())
@@ -129,9 +128,9 @@ class OptimalSearch:
         box, most = JointBox(candidate.low, candidate.high), self.proof.threshold
         self._sampler.mirrored = candidate.mirrored
         allowed = self._settings.missed(most) if candidate.settled else CLEARLY_MISSED * most
-        placements, missed = self._families.hold(box, candidate.keys, self._missed.known, allowed)
+        placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
         if not candidate.settled:
-            self._go_into(box, placements, missed[:MOST_ADDED])
+            self._go_into(missed[:MOST_ADDED])
             return
         best, collided = self.plan, self.motions.collided
         learnt = self._learn(box, placements, missed[:MOST_ADDED])
@@ -153,16 +152,14 @@ class OptimalSearch:
             self._given_up += 1
             self.proof.give_up()
 
-    def _go_into(self, box: JointBox, placements: Sequence[Placement], missed: list[float]) -> None:
+    def _go_into(self, missed: list[float]) -> None:
         """Add walls that a box which is not settled misses, or split it."""
-        most = CLEARLY_MISSED * self.proof.threshold
         if missed:
             self._add(missed)
-        elif not (placements and self.proof.clear(self._missed.shut(box, placements, most))):
+            self.proof.show_soon()
+            self.proof.put_back()
+        else:
             self.proof.split()
-            return
-        self.proof.show_soon()
-        self.proof.put_back()
 
     def _learn(self, box: JointBox, placements: Sequence[Placement], missed: list[float]) -> bool:
         """Add walls that a box misses, or look for a motion in it; return whether it can tell more.
@@ -178,16 +175,10 @@ class OptimalSearch:
         if barred:
             self._add([], barred)
             return True
-        allowed = self._settings.missed(self.proof.threshold)
-        known, again = self._missed.first(box, placements, allowed)
-        if not missed and (self.proof.clear(known) or self.proof.split_keys(known)):
-            return True
-        if again and not known:
-            self._add(again[:MOST_ADDED])
-            return True
         columns, passages, inner = self._space.look(box, placements, self._settings)
         self._hope(inner)
-        known, new = self._missed.of(columns, box, allowed)
+        allowed = self._settings.missed(self.proof.threshold)
+        known, new = columns.missed(box, self._places, allowed)
         if not missed and (self.proof.clear(known) or self.proof.split_keys(known)):
             return True
         missed = missed or new[:MOST_ADDED]
@@ -220,7 +211,6 @@ class OptimalSearch:
     def _mind_collisions(self) -> None:
         """Begin again without what collides: the robot does wherever a motion might have been."""
         self._leave_out_collisions()
-        self._missed.known.clear()
         self.proof.put_back()  # before what is proven is noted
         self._hoped = Hope(self.plan is not None)
         minding = self._new_proof(hoped := self._hoped.guess(self.lower_bound, self.motions.value))
@@ -256,7 +246,7 @@ class OptimalSearch:
             self.proof.add(wall)
         for wall in self._walls.columns(places):
             self.proof.add(wall)
-            self._missed.known.add(wall.place)
+            self._places.add(wall.place)
 
     def _learn_in(self, columns: Columns, passages: Passages, box: JointBox | None) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
