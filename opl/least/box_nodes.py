@@ -1,12 +1,9 @@
-"""The nodes of some places in a box, at contact positions of their own, and tracks through them.
-
-What collides between two places rules out more than one edge: all that pass there.
-"""
+"""The nodes of some places in a box, at contact positions of their own, and tracks through them."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,11 +11,10 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.least.box_columns import LESS, ColumnSampler
 from opl.least.postures import Columns
-from opl.least.rows import SMALLEST_EDGE, Bulge, Row, broken_at, bulging, shut_edges
+from opl.least.rows import Bulge, Row, broken_at, bulging, shut_edges
 from opl.least.sinking import (
     first_sunk,
     leads_are_deep,
-    passed_where_struck,
     past_help,
     places_between,
     struck_between,
@@ -43,7 +39,6 @@ ROUNDS = 3  # of sampling closer around a track
 MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
 MOST_WORK = 5000.0  # units on them, most of them spent on free moves that are not there
 MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
-LIKE_OTHERS = "passed where another collided"  # the cause of what was not checked itself
 
 Learn = Callable[[Sequence[Bulge]], bool]  # told where places are wanted; whether that is new
 
@@ -217,7 +212,6 @@ class BoxNodes:
         search, places, problem = self._search, self._columns.places, self.problem
         scene, robot = problem.scene, problem.cell.robot
         most, end = search.checks + MOST_CHECKS, scene.work + MOST_WORK
-        too_near = np.diff(places) <= SMALLEST_EDGE
         while search.checks < most and scene.work < end:
             before, hits = search.checks, dict[Same, Collides]()
             tries = until_sunk(problem, twins(self.matrices, track, robot), hits)
@@ -234,16 +228,14 @@ class BoxNodes:
             passes, t = problem.points.pass_index[list(deep)], np.array(list(deep.values()))
             if search.sampler.doubts.note(passes, t):
                 return None, None, True
-            shut = too_near
-            if sunk is not None:
-                at_ends = np.isin(np.arange(len(places)), list(deep))
-                shut = past_help(places, sunk) & ~(at_ends[:-1] | at_ends[1:])
             # leads that are shut are left out with what collides
             if not search.sampler.collisions and leads_are_deep(problem, hits):
                 search.collided += 1
                 return None, None, False
-            if sunk is not None and not shut.any():
-                return None, sunk, False
+            if sunk is not None:
+                at_place = np.isin(np.arange(len(places)), list(deep))
+                if not (past_help(places, sunk) & ~(at_place[:-1] | at_place[1:])).any():
+                    return None, sunk, False
             search.collided += int(sunk is None)
             if not self._swept:
                 self.sweep()
@@ -252,7 +244,6 @@ class BoxNodes:
                 struck = places_between(places, struck_between(problem, hits))
                 if struck and learn(struck):
                     return None, None, True
-                self._bar(passed_where_struck(hits), shut)
             if (following := self.smoothest()) is None:
                 return None, sunk, False
             track = following
@@ -262,20 +253,4 @@ class BoxNodes:
         """Return what stopped the motions checked here, as of `TrackSearch.stopped`."""
         causes = sum((matrix.causes for matrix in self.matrices), Counter[tuple[int, str]]())
         places = self._columns.places.tolist()
-        met = {(places[column], why): count for (column, why), count in causes.items()}
-        return Counter({at: count for at, count in met.items() if at[1] != LIKE_OTHERS})
-
-    def _bar(self, struck: Iterable[tuple[int, float]], shut: np.ndarray) -> None:
-        """Block all edges that pass where motions collided, as of `passed_where_struck`.
-
-        Between the columns that are shut there, shape (n - 1,): places that are so near that it
-        matters little which edge it is.
-        """
-        for first, t in struck:
-            if not shut[first]:
-                continue
-            ends = self._columns.t[first : first + 2]
-            for before, after in ((ends[0] < t, ends[1] > t), (ends[0] > t, ends[1] < t)):
-                rows = np.flatnonzero(before).tolist(), np.flatnonzero(after).tolist()
-                for matrix in self.matrices:
-                    matrix.block_edges(first, *rows, LIKE_OTHERS)
+        return Counter({(places[column], why): count for (column, why), count in causes.items()})

@@ -116,19 +116,6 @@ def sunk_at(collided: Mapping[Same, Collides]) -> dict[int, float]:
     return deep
 
 
-def passed_where_struck(collided: Mapping[Same, Collides]) -> set[tuple[int, float]]:
-    """Return after which columns, and at which contact positions, configurations collide."""
-    found = set()
-    for blocked in collided.values():
-        motion = blocked.motion
-        for fault in blocked.faults:
-            place = motion.cutter_point[fault.move]
-            grinding = motion.phase[fault.move] is Phase.GRINDING
-            if fault.at_end and grinding and place != np.rint(place):
-                found.add((int(place), float(motion.contact_position[fault.move])))
-    return found
-
-
 def first_sunk(problem: GrindingProblem, collided: Mapping[Same, Collides]) -> Array | None:
     """Return `sunk_between` of the first motion that sinks, None if none does."""
     for blocked in collided.values():

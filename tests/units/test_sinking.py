@@ -8,14 +8,13 @@ from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import inverse
 from opl.least import box_nodes, sinking
-from opl.least.box_nodes import BoxNodes, TrackSearch
+from opl.least.box_nodes import TrackSearch
 from opl.least.box_track import BoxTracks
 from opl.least.passages import NO_PASSAGES
 from opl.least.sinking import (
     HARDLY,
     MORE,
     leads_are_deep,
-    passed_where_struck,
     past_help,
     places_between,
     places_for,
@@ -130,37 +129,6 @@ def test_deep_between_places_that_are_near_nothing_helps():
     places, deep = np.array([0.0, 1.0, 1.2, 1.201, 3.0]), np.array([1e-3, 1e-3, 3e-5, 1e-3])
     assert past_help(places, deep).tolist() == [False, True, True, False]
     assert not past_help(places, np.array([1e-3, 3e-5, 1e-5, 1e-3])).any()
-
-
-def test_where_configurations_between_columns_collide_is_told_with_their_contact_positions():
-    _, motion, grinding = motion_of_a_track()
-    place = motion.cutter_point
-    between = [k for k in grinding if place[k] != np.rint(place[k])][:2]
-    at_column = next(k for k in grinding if k not in between and place[k] == np.rint(place[k]))
-    faults = [CollidingMove(k, ("R_link", WHEEL), True) for k in (*between, at_column)]
-    faults.append(CollidingMove(between[0] + 1, ("R_link", WHEEL), False))
-    found = passed_where_struck({(b"", b""): Collides(motion, tuple(faults))})
-    assert found == {(int(place[k]), float(motion.contact_position[k])) for k in between}
-
-
-def test_edges_that_pass_where_a_motion_collided_are_blocked_where_that_is_shut():
-    problem, settings = small_problem(), v_job().search.optimal
-    box, sampler, columns = near_a_box()
-    most, push_away = Travel(np.inf, np.inf), PushAway(problem.cell, settings.costs)
-    search = TrackSearch(problem, sampler, settings.costs, most, push_away)
-    spare, spacing = np.zeros(len(columns.places)), np.ones(len(columns.places))
-    edge, t = 3, float(np.median(columns.t[3]))
-    for shut in (False, True):
-        near = BoxNodes(search, columns, [], box, spare, spacing)
-        edges = np.arange(len(spare) - 1) == edge
-        near._bar({(edge, t), (edge + 1, t)}, edges if shut else ~edges & False)
-        for matrix in near.matrices:
-            n = matrix.free.shape[1]
-            first, rest = np.divmod(np.array(sorted(matrix.blocked), dtype=int), n * n)
-            before, after = np.divmod(rest, n)
-            assert (first == edge).all() and (len(first) > 0) == shut
-            passes = (columns.t[edge, before] - t) * (columns.t[edge + 1, after] - t)
-            assert (passes < 0.0).all()
 
 
 def distances(columns):
