@@ -52,7 +52,6 @@ class BoxTracks:
         box: JointBox,
         room: float,
         learn: Learn,
-        worth: float = 0.0,
     ) -> Plan | None:
         """Return the motion of the smoothest free track in a box.
 
@@ -62,8 +61,6 @@ class BoxTracks:
             box: The box.
             room: By how much the motion may leave it, in [rad] of its size.
             learn: Told where tracks leave the box, end or collide.
-            worth: A motion of a smaller joint range sum in [rad] is worth having, though what
-                spares depth needs more room.
 
         Returns:
             The motion; None if nothing is free, or if something was learnt instead.
@@ -80,7 +77,7 @@ class BoxTracks:
             )
             if learn(bars(places, ladders, blocked)):
                 return None
-            return self.plan(columns, NO_PASSAGES, box, room, learn, worth) if rows else None
+            return self.plan(columns, NO_PASSAGES, box, room, learn) if rows else None
         bulges = coarse.bulges(track, box.widened(BULGE * room))
         if any(bulge.steep for bulge in bulges) and learn(bulges):
             return None
@@ -104,8 +101,7 @@ class BoxTracks:
             columns = self._search.sampler.columns(box, columns.placements, places, spare)
             larger = grown(columns.q, columns.free, box)
             # places may cost less than depth does
-            learnt = (larger is None or larger.size > most) and learn(places_for(places, sunk))
-            if learnt and (larger is None or larger.size > worth):
+            if (larger is None or larger.size > most) and learn(places_for(places, sunk)):
                 return None
             box = larger or box
             sampled = self._sampled(columns, passages, box, room, spare)

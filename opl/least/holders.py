@@ -106,10 +106,8 @@ def _least(proof: BoxProof, value: float) -> tuple[float, Array]:
         candidate = proof.take_next()
         if candidate is None:
             continue
-        if candidate.settled:
-            prices = np.abs(proof.pressing())
-            ranges = candidate.high - candidate.low
-            prices[:, ranges < LEAST_SHARE * ranges.sum()] = 0.0  # held by all alike
-            return min(max(bound, candidate.bound), value), prices
-        proof.split()
+        prices = np.abs(proof.pressing())
+        ranges = candidate.high - candidate.low
+        prices[:, ranges < LEAST_SHARE * ranges.sum()] = 0.0  # held by all alike
+        return min(max(bound, candidate.bound), value), prices
     return min(proof.lower_bound, value), np.zeros((len(proof.walls), 6))

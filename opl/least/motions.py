@@ -16,7 +16,6 @@ from opl.planning.settings import OptimalSettings
 from opl.search.box import JointBox
 from opl.walls.placement import Placement
 
-CLEARLY_LESS = 0.005  # of the best: what a motion should be better by that spares depth
 # of a box that holds all, but no motion that is found: how much larger boxes are where one is
 # sought instead, so that what cannot be proven is not left far from the bound
 LARGER = tuple(0.0005 * 2.0**k for k in range(9))
@@ -63,11 +62,6 @@ class Motions:
         """What stopped the motions checked last, as of `TrackSearch`."""
         return self._search.stopped
 
-    @property
-    def worth(self) -> float:
-        """What is clearly better than the best, in [rad]."""
-        return self.value * (1.0 - CLEARLY_LESS)
-
     def keep(self, found: Plan | None) -> bool:
         """Keep a motion that is better than the best; return whether it is."""
         better = found is not None and found.path.joint_range_sum < self.value
@@ -86,7 +80,7 @@ class Motions:
             return learnt
 
         room = self._settings.room(box.size)
-        found = self._tracks.plan(columns, passages, box, room, learn, self.worth)
+        found = self._tracks.plan(columns, passages, box, room, learn)
         self.keep(found)
         learnt = learnt or self._search.sampler.doubts.count > doubts
         return learnt or (found is None and learn(passages.narrow))

@@ -33,7 +33,6 @@ from opl.walls.images import Seams
 from opl.walls.obstructed import Obstructions
 from opl.walls.placement import Placement
 
-CLEARLY_MISSED = 0.02  # of the best size: what a box that is not settled may miss
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
 
@@ -127,11 +126,8 @@ class OptimalSearch:
             return
         box, most = JointBox(candidate.low, candidate.high), self.proof.threshold
         self._sampler.mirrored = candidate.mirrored
-        allowed = self._settings.missed(most) if candidate.settled else CLEARLY_MISSED * most
-        placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
-        if not candidate.settled:
-            self._go_into(missed[:MOST_ADDED])
-            return
+        given = candidate.keys, self._places, self._settings.missed(most)
+        placements, missed = self._families.hold(box, *given)
         best, collided = self.plan, self.motions.collided
         learnt = self._learn(box, placements, missed[:MOST_ADDED])
         if self.plan is best and self.motions.collided > collided and not self._sampler.collisions:
@@ -151,15 +147,6 @@ class OptimalSearch:
         else:
             self._given_up += 1
             self.proof.give_up()
-
-    def _go_into(self, missed: list[float]) -> None:
-        """Add walls that a box which is not settled misses, or split it."""
-        if missed:
-            self._add(missed)
-            self.proof.show_soon()
-            self.proof.put_back()
-        else:
-            self.proof.split()
 
     def _learn(self, box: JointBox, placements: Sequence[Placement], missed: list[float]) -> bool:
         """Add walls that a box misses, or look for a motion in it; return whether it can tell more.

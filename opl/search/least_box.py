@@ -32,10 +32,8 @@ NUMBERS_OF_A_CELL = 30  # worked on to cut off what no box can hold
 NUMBERS_OF_A_SOURCE = 6  # that it is worth to tell whether a box can hold a piece in one image
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 FURTHER = 1.5  # times a size: cells are at hand for boxes up to there
-FEWEST_UNSEEN = 8  # subproblems split before a box is shown that is not settled
 FEWEST_BEFORE_ANEW = 256  # subproblems of a tree that is begun anew for walls added since
 CLOSER = 2, 3  # looks at what is forbidden, each closer than the one before
-MOST_UNSEEN = 256  # that many where those shown before told nothing new
 
 
 class BoxProof:
@@ -70,9 +68,8 @@ class BoxProof:
     def _begin(self, threshold: float) -> None:
         self.threshold = threshold
         self.stuck = np.inf  # least bound of what could not be split
-        self.subproblems = self._count = self._unseen = 0
+        self.subproblems = self._count = 0
         self.work = 0.0  # how many numbers were worked on, about
-        self._show_after = FEWEST_UNSEEN
         self._anew_after = FEWEST_BEFORE_ANEW
         self._plant(0.0)
 
@@ -128,9 +125,8 @@ class BoxProof:
         """Work on the subproblem with the least bound.
 
         Returns:
-            Its box, where nothing is gained by splitting it further, and now and then before: the
-            caller adds a wall that misses the box, or lowers the threshold, and puts it back; or
-            splits it, or gives it up.
+            Its box, where nothing is gained by splitting it further: the caller adds a wall that
+            misses the box, or lowers the threshold, and puts it back; or gives it up.
         """
         grown = len(self.walls) > self._walls_then
         if grown and self._of_tree >= self._anew_after and np.isinf(self.stuck):
@@ -146,24 +142,19 @@ class BoxProof:
                 heapq.heappush(self._open, node)  # others are more promising now
                 return None
         may_lose = SETTLED * self._gap * self.threshold
-        self._branch = where_to_split(node, self._cells, self._limits_of(node.spans), may_lose)
         self._kept = node
-        settled = self._branch is None
-        if node.n_walls < len(self.walls):
-            self.put_back() if settled else self.split()
+        wall = where_to_split(node, self._cells, self._limits_of(node.spans), may_lose)
+        if wall is not None:
+            for spans in parts(node, self._cells, wall):
+                heapq.heappush(self._open, self._part(node, spans))
             return None
-        if settled and self._cells.cleared(node.spans, 1):
+        if node.n_walls < len(self.walls) or self._cells.cleared(node.spans, 1):
             self.put_back()
             return None
-        self._unseen += 1
-        if not settled and self._unseen < self._show_after:
-            self.split()
-            return None
-        self._unseen, self._show_after = 0, min(2 * self._show_after, MOST_UNSEEN)
         found = node.found
         assert found is not None
         keys, mirrored = self._cells.keys_of(node.spans), self._cells.mirrored(node.spans)
-        return Candidate(node.bound, found.low, found.high, settled, keys, mirrored)
+        return Candidate(node.bound, found.low, found.high, keys, mirrored)
 
     @property
     def outdated(self) -> bool:
@@ -185,10 +176,6 @@ class BoxProof:
         least_box(table, shifts, node.spans, n, low, high, size, box, lost, prices)
         return np.asarray(prices[:, :6] - prices[:, 6:])
 
-    def show_soon(self) -> None:
-        """Show boxes that are not settled more often again: the last one told something new."""
-        self._show_after = FEWEST_UNSEEN
-
     def look_closer(self, goes_on: Callable[[], bool]) -> bool:
         """Look closer at what is forbidden of the last candidate's spans; return whether any is.
 
@@ -203,18 +190,11 @@ class BoxProof:
     def clear(self, places: Sequence[float]) -> bool:
         """Look at what is forbidden of the last candidate's spans at some places, in their order.
 
-        Closely where nothing is gained by splitting it; until any is. Return whether any is.
+        Closely, until any is. Return whether any is.
         """
-        spans, looks = self._kept.spans, 1 if self._branch is not None else 2
+        spans = self._kept.spans
         of = [[n for n, wall in enumerate(self.walls) if wall.place == place] for place in places]
-        return any(self._cells.cleared(spans[np.isin(spans[:, WALL], own)], looks) for own in of)
-
-    def split(self) -> None:
-        """Split the subproblem of the last candidate."""
-        if self._branch is not None:
-            node = self._kept
-            for spans in parts(node, self._cells, self._branch):
-                heapq.heappush(self._open, self._part(node, spans))
+        return any(self._cells.cleared(spans[np.isin(spans[:, WALL], own)], 2) for own in of)
 
     def split_keys(self, places: Sequence[float] | None = None) -> bool:
         """Split the last subproblem between keys at a wall, if it can: of some places, or of all.

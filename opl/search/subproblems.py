@@ -59,11 +59,12 @@ class Subproblem:
 class Candidate:
     """A box that holds a point of every wall, as far as the proof can tell.
 
+    It is settled: nothing is gained by splitting its subproblem further.
+
     Attributes:
         bound: Of its subproblem in [rad].
         low: Lower faces in [rad], shape (6,).
         high: Upper faces.
-        settled: Whether nothing is gained by splitting its subproblem further.
         keys: The families and images that each pass with walls has left, by pass.
         mirrored: Whether the whole motion has the wrist flipped; the box is that of the other.
     """
@@ -71,7 +72,6 @@ class Candidate:
     bound: float
     low: Array
     high: Array
-    settled: bool
     keys: dict[int, list[Key]]
     mirrored: bool
 

@@ -50,9 +50,7 @@ def least(walls, limits):
         if candidate is None:
             continue
         size = float((candidate.high - candidate.low).sum())
-        if not candidate.settled:
-            proof.split()
-        elif size < proof.threshold:
+        if size < proof.threshold:
             proof.threshold = size
             proof.put_back()
         else:
