@@ -158,10 +158,6 @@ class OptimalSearch:
         if not placements or larger is None or larger.size >= most:
             self._add(missed)
             return bool(missed)
-        barred = [] if missed else self._space.barred(box, placements, self._settings)
-        if barred:
-            self._add([], barred)
-            return True
         columns, passages, inner = self._space.look(box, placements, self._settings)
         self._hope(inner)
         allowed = self._settings.missed(self.proof.threshold)

@@ -12,7 +12,6 @@ from opl.least.postures import Columns
 from opl.planning.problem import GrindingProblem
 from opl.planning.settings import OptimalSettings
 from opl.search.box import JointBox
-from opl.search.walls import Chain
 from opl.walls.barriers import all_sides
 from opl.walls.columns import ColumnWalls
 from opl.walls.cut_cells import whole_cells
@@ -52,17 +51,6 @@ class SearchSpace:
         families = Families(images, q, problem.cuts, points.pass_index, t, sides)
         sampler = ColumnSampler(problem, seams, images.limits)
         return cls(walls, families, sampler, Rectangles(sampler, points, whole_cells(cell.wheel)))
-
-    def barred(
-        self, box: JointBox, placements: Sequence[Placement], settings: OptimalSettings
-    ) -> list[Chain]:
-        """Return the chains between places that no motion in a box gets past, as far as known.
-
-        Those of `look`, but no place is looked at anew for them; none where all can be passed.
-        """
-        allowed, room = settings.missed(box.size), settings.room(box.size)
-        passages = self.rectangles.held(box, placements, allowed, room)
-        return [] if passages.open else passages.walls
 
     def look(
         self, box: JointBox, placements: Sequence[Placement], settings: OptimalSettings

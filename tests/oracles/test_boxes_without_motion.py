@@ -81,16 +81,21 @@ def postures_of(chain):
     return q[~np.isnan(q).any(axis=-1)]
 
 
+def passages(box, placements):
+    given = SETTINGS.missed(box.size), SETTINGS.room(box.size)
+    return space().rectangles.held(box, placements, *given)
+
+
 def test_a_box_meets_no_posture_of_the_chains_that_stand_in_its_way():
     box, placements = smaller(0.3)
-    assert not space().barred(box, placements, SETTINGS)  # nothing is cut between places
+    assert passages(box, placements).open  # nothing is cut between places
     space().rectangles.refine([Bulge(29.0, 30.0, 8, True)], box)
-    chains = space().barred(box, placements, SETTINGS)
-    assert chains
-    for chain in chains:
+    found = passages(box, placements)
+    assert found.walls and not found.open
+    for chain in found.walls:
         assert chain[0][1] == -chain[-1][1] == -v_row().cell.wheel.last_position
         q = postures_of(chain)
         middle = (box.lower + box.upper) / 2.0
         q = q + 2.0 * np.pi * np.round((middle - q) / (2.0 * np.pi))
         assert missing(q, box).min() > SETTINGS.missed(box.size)
-    assert not space().barred(box.widened(10.0), placements, SETTINGS)
+    assert passages(box.widened(10.0), placements).open
