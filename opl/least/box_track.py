@@ -124,7 +124,19 @@ class BoxTracks:
         places, one = columns.places, t[:, :1]
         level = levels(places, passages.rows, inner, one)
         sampler, crossing = self._search.sampler, crossed(places, passages.crossings, one)
-        t = np.concatenate([t, level, crossing], axis=1)
+        free = nearest_free(columns, inner) if sampler.collisions else one[:, :0]
+        t = np.concatenate([t, level, crossing, free], axis=1)
         sampler.work += len(t) * t.shape[1] ** 2 / EDGES_OF_WORK
         at = sampler.at(places, columns.points, columns.placements, t)
         return BoxNodes(self._search, at, passages.rows, inner, spare, spacing)
+
+
+def nearest_free(columns: Columns, box: JointBox) -> Array:
+    """Return between which sampled contact positions places are nearest to a box, shape (n, 2).
+
+    Columns sampled with collisions left out do not collide there. Where little of a box is free,
+    samples spread over it would miss that. In belt units.
+    """
+    _, row = in_box.nearest_points(columns.q, columns.free, box)
+    both = np.stack([np.floor(row), np.ceil(row)], axis=1).astype(int)
+    return np.asarray(np.take_along_axis(columns.t, np.maximum(both, 0), axis=1))

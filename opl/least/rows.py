@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -137,9 +137,18 @@ def bars(
 ) -> list[Bulge]:
     """Return between which places no track of a ladder gets further, from its start or its end.
 
-    It would get past what is shut, or joints would turn further than an edge may. The edges that
-    are blocked in each ladder are sorted keys, as of `shut_edges`.
+    It would get past what is shut, or joints would turn further than an edge may. Where that is so
+    only at places that are as close as they may be, what tracks do that sweep over the wheel before
+    may be to blame: then it is told of those that do not. The edges that are blocked in each ladder
+    are sorted keys, as of `shut_edges`.
     """
+    found = _bars(places, ladders, blocked_edges)
+    return found or _bars(places, [_unswept(one, places) for one in ladders], blocked_edges)
+
+
+def _bars(
+    places: Array, ladders: Sequence[Ladder], blocked_edges: Sequence[np.ndarray]
+) -> list[Bulge]:
     found: list[Bulge] = []
     for ladder, blocked in zip(ladders, blocked_edges, strict=True):
         for k, turned in (_ends(ladder, blocked, way) for way in (1, -1)):
@@ -148,6 +157,16 @@ def bars(
                 parts = 2 if shut else int(np.clip(np.ceil(least), 2, MOST_PARTS))
                 found.append(Bulge(float(places[k]), float(places[k + 1]), parts, shut))
     return list(dict.fromkeys(found))  # the same in each image
+
+
+def _unswept(ladder: Ladder, places: Array) -> Ladder:
+    """Return a ladder whose contact does not sweep over the wheel where places are far apart.
+
+    There nothing is known of what it would sweep over.
+    """
+    apart = np.diff(places)
+    most = np.where(apart > 1.0 / MOST_PARTS, SWEEP * apart, np.inf)
+    return replace(ladder, max_contact_change=np.minimum(ladder.contact_changes, most))
 
 
 def _ends(ladder: Ladder, blocked: np.ndarray, way: int) -> tuple[int, Array]:

@@ -73,6 +73,21 @@ def test_a_bar_is_told_once_though_tracks_of_several_images_end_there():
     assert len(found) == 2
 
 
+def test_where_a_sweep_leads_away_from_the_only_way_on_it_is_not_counted_on():
+    """The joints turn too far along the way that leads on; a sweep need not, but ends nowhere."""
+    q = np.zeros((4, 2, 6))
+    q[2:, 0] = 1.5  # times what an edge may turn without a sweep
+    free, on = np.ones((4, 2), dtype=bool), np.zeros(3, dtype=bool)
+    free[0, 1] = free[3, 1] = False
+    ladder = Ladder(q, free, np.array([0.0, 20.0]), on, 1.0, 1.0)
+    # near the end places are as close together as they may be
+    places = np.array([0.0, 1.0, 2.0, 2.0 + 1.0 / 1000.0])
+    shut = np.array([(2 * 2 + 1) * 2 + 0])  # from where the sweep leads, there is no way on
+    assert [(bar.first, bar.last) for bar in bars(places, [ladder], [shut])] == [(1.0, 2.0)]
+    # where places are close together, it is known what a sweep passes over
+    assert bars(places / 10.0, [ladder], [shut]) == []
+
+
 def test_a_way_is_crossed_straight_on_from_crossing_to_crossing():
     crossings = np.array([[2.0, 4.0], [2.5, 6.0], [3.0, 6.0], [7.0, -2.0]])
     places = np.array([1.0, 2.0, 2.25, 2.75, 3.0, 5.0, 7.0, 7.5])

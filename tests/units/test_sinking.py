@@ -179,9 +179,7 @@ def test_where_a_box_leaves_no_depth_to_spare_tracks_are_sought_in_the_next_that
     assert box.size < np.ptp(q, axis=0).sum() < 1.05 * box.size
 
 
-def test_a_motion_that_needs_more_room_to_spare_depth_is_sought_where_it_is_worth_having(
-    monkeypatch,
-):
+def test_where_depth_can_be_spared_in_a_larger_box_only_places_are_wanted_first(monkeypatch):
     problem, settings = small_problem(), v_job().search.optimal
     box, sampler, columns = near_a_box()
     edge, needed = 29, 402.5e-6  # of depth: there is so much only in a box that is larger
@@ -195,15 +193,15 @@ def test_a_motion_that_needs_more_room_to_spare_depth_is_sought_where_it_is_wort
 
     monkeypatch.setattr(box_nodes.BoxNodes, "check", check)
     push_away, most = PushAway(problem.cell, settings.costs), Travel(np.inf, np.inf)
-    for worth, found in ((0.0, None), (box.size, None), (1.05 * box.size, free)):
+    for new, found in ((True, None), (False, free)):
         checked, told = [], []
 
-        def learn(bulges, checked=checked, told=told):
+        def learn(bulges, checked=checked, told=told, new=new):
             # first asked as the part sinks so deep, then as what spares that needs room
             told += [(bulge.first, bulge.last) for bulge in bulges if checked]
-            return told == [(edge, edge + 1)] * 2
+            return new and told == [(edge, edge + 1)] * 2
 
         tracks = BoxTracks(TrackSearch(problem, sampler, settings.costs, most, push_away))
-        assert tracks.plan(columns, NO_PASSAGES, box, 1e-3, learn, worth) is found
+        assert tracks.plan(columns, NO_PASSAGES, box, 1e-3, learn) is found
         assert told[:2] == [(edge, edge + 1)] * 2
         assert len(checked) == (1 if found is None else 2)
