@@ -232,7 +232,7 @@ class BoxNodes:
             if not search.sampler.collisions and leads_are_deep(problem, hits):
                 search.collided += 1
                 return None, None, False
-            if sunk is not None:
+            if sunk is not None:  # other tracks only where neither places nor depth help this one
                 at_place = np.isin(np.arange(len(places)), list(deep))
                 if not (past_help(places, sunk) & ~(at_place[:-1] | at_place[1:])).any():
                     return None, sunk, False

@@ -95,11 +95,11 @@ class Motions:
             if larger.size >= self.value:
                 break
             columns, passages, inner = self._space.look(larger, placements, self._settings)
-            if inner is not None and (found := self._found(columns, passages, inner)) is not None:
+            if inner is None:
+                continue
+            room = self._settings.room(inner.size)
+            # through places as they are, cut no finer where a track leaves the box
+            found = self._tracks.plan(columns, passages, inner, room, lambda _: False)
+            if found is not None:
                 return self.keep(found)
         return False
-
-    def _found(self, columns: Columns, passages: Passages, box: JointBox) -> Plan | None:
-        """Return the motion through places as they are, cut no finer where a track leaves a box."""
-        room = self._settings.room(box.size)
-        return self._tracks.plan(columns, passages, box, room, lambda _: False)

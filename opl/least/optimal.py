@@ -124,10 +124,10 @@ class OptimalSearch:
             return
         if (candidate := self.proof.take_next()) is None:
             return
-        box, most = JointBox(candidate.low, candidate.high), self.proof.threshold
+        box = JointBox(candidate.low, candidate.high)
         self._sampler.mirrored = candidate.mirrored
-        given = candidate.keys, self._places, self._settings.missed(most)
-        placements, missed = self._families.hold(box, *given)
+        allowed = self._settings.missed(self.proof.threshold)
+        placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
         best, collided = self.plan, self.motions.collided
         learnt = self._learn(box, placements, missed[:MOST_ADDED])
         if self.plan is best and self.motions.collided > collided and not self._sampler.collisions:

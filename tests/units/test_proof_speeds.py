@@ -1,12 +1,16 @@
 """Speeds held against places that are known to a fraction of a millimetre only."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from opl.geometry.toolpath import CutterPoints
+from opl.job.refusals import rest_refusal
 from opl.motion.motion import Motion, MoveKind, TimedMotion
 from opl.motion.timing import Cause, Timing
 from opl.program.played import Corner, Playback, ReadMove, SpeedUnit, WrittenSpeed
 from opl.proof.speeds import pass_findings, speed_findings
+from tests.support.planned import small_problem
 
 FEED = 0.02  # [m/s]
 NOWHERE = np.full(6, np.nan)
@@ -110,3 +114,9 @@ def test_a_pass_of_less_time_on_the_wheel_than_its_way_takes_is_told():
     late = TimedMotion(motion, np.array([0.0, 1.0, 0.5, 5.5]))  # rests before it leaves the wheel
     (found,) = pass_findings(late, points, FEED)
     assert found.message == "0.50 s of moves on the wheel, 5.00 s at the feed"
+    process = replace(small_problem().process, feed=FEED)
+    assert rest_refusal(at_feed, points, process) is None
+    rests = TimedMotion(motion, np.array([0.0, 1.0, 0.0, 6.0]))
+    for timed, takes in ((late, "0.50"), (rests, "0.00")):
+        (reason,) = rest_refusal(timed, points, process).reasons
+        assert reason == f"pass 1: {takes} s of moves on the wheel, 5.00 s at the feed"
