@@ -172,15 +172,24 @@ class ColumnSampler:
         """Leave postures that collide out of columns, until those nearest to a box are free."""
 
         def refused(near: np.ndarray) -> np.ndarray:
-            near[near] = self.collides(columns.q[near])
+            near[near] = self.collides(columns.q[near], self.reserve)
             return near
 
         _leave_out(columns.q, columns.free, box, refused)
 
     def at(
-        self, places: Array, there: CutterPoints, placements: Sequence[Placement], t: Array
+        self,
+        places: Array,
+        there: CutterPoints,
+        placements: Sequence[Placement],
+        t: Array,
+        reserve: float | None = None,
     ) -> Columns:
-        """Return the postures of places at contact positions, shape (n, m)."""
+        """Return the postures of places at contact positions, shape (n, m).
+
+        Leads leave a reserve beyond the clearance needed in [m], that of the sampler if none is
+        given.
+        """
         problem = self._problem
         passes, solved = there.pass_index, self._known.solved
         angles = self._known.angles(places, t, families_of(passes, placements))
@@ -190,7 +199,8 @@ class ColumnSampler:
         free &= allowed(places, passes, placements, t)
         free[free] = image_within_limits(problem.cell.robot, self.flips, q[free])
         if self.collisions:
-            self._leave_out_leads(places, there, placements, t, free)
+            reserve = self.reserve if reserve is None else reserve
+            self._leave_out_leads(places, there, placements, t, free, reserve)
         return Columns(places, there, tuple(placements), t, q, free)
 
     def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
@@ -209,25 +219,26 @@ class ColumnSampler:
         placements: Sequence[Placement],
         t: Array,
         free: np.ndarray,
+        reserve: float,
     ) -> None:
         """Leave postures out, flags of shape (n, m), where passes cannot begin or end."""
         for column in np.flatnonzero(np.isin(places, self._ends)).tolist():
             own, row = placements[int(there.pass_index[column])], np.flatnonzero(free[column])
             flip = own.number ^ int(self.mirrored)
             T = there.Ts_workpiece_cutter[column]
-            free[column, row] = ~self.leads.at(T, own.family, flip, t[column, row], self.reserve)
+            free[column, row] = ~self.leads.at(T, own.family, flip, t[column, row], reserve)
 
     def there(self, places: Array) -> CutterPoints:
         """Return fractional cutter points of some passes, shape (n,), as points of their own."""
         return self._problem.points.at_places(places)
 
-    def collides(self, q: Array) -> np.ndarray:
-        """Return which postures collide, or mirrored do, with a little to spare for the way on.
+    def collides(self, q: Array, reserve: float) -> np.ndarray:
+        """Return which postures collide, or mirrored do, with some clearance to spare.
 
-        q in [rad], shape (n, 6).
+        q in [rad], shape (n, 6); the reserve in [m].
         """
         sign, shift = self.flips[self.mirrored]
-        return self._problem.scene.collision.wider(self.reserve).collides(q * sign + shift)
+        return self._problem.scene.collision.wider(reserve).collides(q * sign + shift)
 
     def shut_along(self, first: Array, last: Array, t: Array) -> np.ndarray:
         """Return between which places the part surely cuts into the wheel all the way, (n,).

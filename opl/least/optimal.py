@@ -162,7 +162,8 @@ class OptimalSearch:
         self._hope(inner)
         allowed = self._settings.missed(self.proof.threshold)
         known, new = columns.missed(box, self._places, allowed)
-        if not missed and (self.proof.clear(known) or self.proof.split_keys(known)):
+        cleared = not missed and self.proof.clear(known, not passages.open)
+        if cleared or (not missed and self.proof.split_keys(known)):
             return True
         missed = missed or new[:MOST_ADDED]
         if not missed and not passages.walls:

@@ -21,6 +21,7 @@ from opl.search.passage import Corner, edges_missed
 from opl.walls.placement import Placement
 
 HALVINGS = 10  # of the way between contact positions at which the part begins to cut
+NO_RESERVE = 0.0  # [m] of clearance: what walls of the proof leave out leaves none either
 NEAR = 0.01  # [rad] from a box within which postures are looked at for collisions
 
 
@@ -40,7 +41,7 @@ class Rectangle:
         self._sampler, self._image = sampler, image
         self._places, self._t = places, contact_positions
         t = np.broadcast_to(contact_positions, (len(places), len(contact_positions)))
-        columns = sampler.at(places, sampler.there(places), [image], t)
+        columns = sampler.at(places, sampler.there(places), [image], t, NO_RESERVE)
         reached = ~np.isnan(columns.q[..., 0])
         where = places[:-1, None], places[1:, None], contact_positions, contact_positions
         self._q, self._free = np.nan_to_num(columns.q), columns.free
@@ -63,7 +64,7 @@ class Rectangle:
             middle = (inside + outside) / 2.0
             places = self._places[k]
             there = self._sampler.there(places)
-            found = self._sampler.at(places, there, [self._image], middle[:, None])
+            found = self._sampler.at(places, there, [self._image], middle[:, None], NO_RESERVE)
             free = found.free[:, 0]
             q[free, 1] = found.q[free, 0]
             inside, outside = np.where(free, middle, inside), np.where(free, outside, middle)
@@ -74,7 +75,7 @@ class Rectangle:
         if self._sampler.collisions:
             near = ~self._looked_at & (missing(self._q, box) <= NEAR)
             self._looked_at |= near
-            self._free[near] = ~self._sampler.collides(self._q[near])
+            self._free[near] = ~self._sampler.collides(self._q[near], NO_RESERVE)
 
     def missed(self, box: JointBox) -> tuple[Array, Array]:
         """Return by how much a box misses the edges, as `edges_missed` does."""
@@ -111,9 +112,8 @@ class Rectangle:
         if not len(k):
             return []
         places = (self._places[k] + self._places[k + 1]) / 2.0
-        at = self._sampler.at(
-            places, self._sampler.there(places), [self._image], self._t[j][:, None]
-        )
+        there = self._sampler.there(places)
+        at = self._sampler.at(places, there, [self._image], self._t[j][:, None], NO_RESERVE)
         halves = np.stack([self._q[k, j], at.q[:, 0], self._q[k + 1, j]], axis=1)
         free = np.repeat(at.free, 3, axis=1)
         near = missing_chords(halves, free, box) < missed

@@ -187,13 +187,15 @@ class BoxProof:
                 return True
         return False
 
-    def clear(self, places: Sequence[float]) -> bool:
+    def clear(self, places: Sequence[float], chains: bool) -> bool:
         """Look at what is forbidden of the last candidate's spans at some places, in their order.
 
-        Closely, until any is. Return whether any is.
+        Closely, until any is, and at those of chains last if they are asked for. Return whether any
+        is.
         """
-        spans = self._kept.spans
-        of = [[n for n, wall in enumerate(self.walls) if wall.place == place] for place in places]
+        spans, every = self._kept.spans, list(enumerate(self.walls))
+        of = [[n for n, wall in every if wall.place == place] for place in places]
+        of += [[n for n, wall in every if wall.turns]] if chains else []
         return any(self._cells.cleared(spans[np.isin(spans[:, WALL], own)], 2) for own in of)
 
     def split_keys(self, places: Sequence[float] | None = None) -> bool:

@@ -164,3 +164,8 @@ class Wall:
     place: float
     pieces: tuple[Piece, ...]
     chain: Chain = ()
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is a chain of places and contact positions: no cutter point or place."""
+        return len(self.chain) > 2

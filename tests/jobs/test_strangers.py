@@ -102,9 +102,15 @@ def test_the_least_motion_is_found_though_tracks_sweep_over_what_is_shut(drawn, 
     assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)
 
 
-def test_cells_that_end_at_the_limits_of_joints_prove_that_no_motion_exists(tmp_path):
-    """A filleted box: with what is beyond the limits, its walls would be crossed."""
-    draw_job(20262805, 7, 0, tmp_path)
+@pytest.mark.parametrize(
+    "drawn",
+    [
+        (20262805, 7, 0),  # with what is beyond the limits, its walls would be crossed
+        (20263203, 69, 0),  # where chains are shut is told only by a closer look at collisions
+    ],
+)
+def test_walls_prove_that_a_filleted_box_has_no_motion(drawn, tmp_path):
+    draw_job(*drawn, tmp_path)
     job = opl.load_job(tmp_path / "job.yaml")
     with pytest.raises(opl.NoPathError, match="it is proven that no motion"):
         search_path(job.search, problem_of(job))

@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from opl.least.box_columns import ColumnSampler
 from opl.least.postures import BESIDE
 from opl.least.rectangle import Rectangle
 from opl.least.rows import shut_edges
 from opl.search.box import JointBox
+from opl.search.joint_limits import UNLIMITED
 from opl.walls.sides import Barrier, Side
-from tests.support.boxes import near_a_box
+from tests.support.boxes import near_a_box, small_families
+from tests.support.planned import small_problem
 
 
 def test_places_beside_a_wall_that_is_missed_as_well_are_left_out():
@@ -48,6 +51,22 @@ def test_lines_on_both_sides_of_what_lies_in_a_box_between_them_are_rows():
     rows = rectangle.rows(up, 1e-6)
     assert [row.contact_position for row in rows] == [0.0, 2.0]
     assert all((row.places == places[:3]).all() for row in rows)
+
+
+def test_what_only_keeps_no_reserve_of_clearance_is_open_to_a_way():
+    """A chain that rests on the reserve is no wall: the proof knows of the clearance alone."""
+    _, known, columns = near_a_box()
+    sampler = ColumnSampler(small_problem(), small_families()[1], UNLIMITED)
+    sampler.collisions, sampler.reserve = True, 0.2
+    places, t = np.arange(20.0, 24.0), np.linspace(-5.0, 5.0, 3)
+    q = known.at(places, known.there(places), columns.placements, np.tile(t, (4, 1))).q
+    assert sampler.collides(q.reshape(-1, 6), sampler.reserve).all()
+    rectangle = Rectangle(sampler, places, t, columns.placements[0])
+    everywhere = JointBox(np.full(6, -10.0), np.full(6, 10.0))
+    rectangle.leave_out_collisions(everywhere)
+    up, along = rectangle.missed(everywhere)
+    assert (up == 0.0).all()
+    assert (along == 0.0).all()
 
 
 def test_no_edge_passes_a_row_where_the_part_cuts_into_the_wheel():

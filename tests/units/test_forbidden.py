@@ -130,3 +130,32 @@ def test_a_box_is_split_between_postures_at_any_wall_where_no_place_is_given():
     proof.put_back()
     candidate = proof.take_next()
     assert len(candidate.keys[1]) == 1
+
+
+class OnlySeenClosely(LowCells):
+    """Forbids what `LowCells` does where it is looked at closely."""
+
+    def clear(self, piece, flip, first, end, looks):
+        if looks > 1:
+            self.seen = piece
+        none = np.zeros(len(piece.pad_low))
+        known = getattr(self, "seen", None) is piece
+        return super().clear(piece, flip, first, end, looks) if known else (none, none + 1.0)
+
+
+def test_chains_are_looked_at_closely_only_where_they_are_asked_for():
+    chain = replace(ramp(0.5, 1), chain=((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)))
+    walls = [ramp(0.0, 0), chain]
+    forbidden = OnlySeenClosely(walls, [(0.0, 0.0), (0.4, 0.4)])
+    proof = BoxProof(lambda _: IMAGES, lambda *_: (), 3.0, 1e-4, forbidden)
+    for wall in walls:
+        proof.add(wall)
+    while (candidate := proof.take_next()) is None:
+        pass
+    assert candidate.bound == pytest.approx(0.0, abs=1e-3)
+    assert not proof.clear([0.0], chains=False)
+    assert proof.clear([0.0], chains=True)
+    proof.put_back()
+    while (candidate := proof.take_next()) is None:
+        pass
+    assert candidate.bound == pytest.approx(0.4, abs=1e-3)
