@@ -32,6 +32,7 @@ NUMBERS_OF_A_CELL = 30  # worked on to cut off what no box can hold
 NUMBERS_OF_A_SOURCE = 6  # that it is worth to tell whether a box can hold a piece in one image
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 FURTHER = 1.5  # times a size: cells are at hand for boxes up to there
+MOST_WITHOUT_A_BOX = 256  # subproblems worked on, until one of them is followed down to a box
 FEWEST_BEFORE_ANEW = 256  # subproblems of a tree that is begun anew for walls added since
 CLOSER = 2, 3  # looks at what is forbidden, each closer than the one before
 
@@ -75,8 +76,10 @@ class BoxProof:
 
     def _plant(self, bound: float) -> None:
         """Begin a tree of subproblems: one of which nothing but a bound is known."""
-        self._of_tree, self._walls_then = 0, len(self.walls)
+        self._planted, self._walls_then = self.subproblems, len(self.walls)
         self._open: list[Subproblem] = []
+        self._followed: Subproblem | None = None  # down to a box
+        self._last_box = self.subproblems  # how many there were then
         low, high = np.full(6, np.inf), np.full(6, -np.inf)
         nothing = np.empty((0, 5), dtype=np.int64)
         heapq.heappush(self._open, Subproblem(bound, self._count, nothing, 0, low, high))
@@ -109,52 +112,70 @@ class BoxProof:
     @property
     def lower_bound(self) -> float:
         """No box that holds a point of every wall is smaller, in [rad]."""
-        least = self._open[0].bound if self._open else np.inf
-        return float(min(least, self.stuck, self.closing))
+        return float(min(self._least_open, self.stuck, self.closing))
 
     @property
     def closed(self) -> bool:
         """Whether nothing is left that could be smaller than the threshold less the gap."""
-        return not self._open or self._open[0].bound >= self.closing
+        return self._least_open >= self.closing
+
+    @property
+    def _least_open(self) -> float:
+        """The least bound of what is open, infinite if nothing is."""
+        left = (self._followed, *self._open[:1])
+        return min((node.bound for node in left if node is not None), default=np.inf)
 
     def add(self, wall: Wall) -> None:
         """Take in a wall."""
         self._cells.add(wall)
 
     def take_next(self) -> Candidate | None:
-        """Work on the subproblem with the least bound.
+        """Work on the subproblem with the least bound, or on one that is followed down to a box.
 
         Returns:
             Its box, where nothing is gained by splitting it further: the caller adds a wall that
             misses the box, or lowers the threshold, and puts it back; or gives it up.
         """
-        grown = len(self.walls) > self._walls_then
-        if grown and self._of_tree >= self._anew_after and np.isinf(self.stuck):
+        large = self.subproblems - self._planted >= self._anew_after
+        if large and len(self.walls) > self._walls_then and np.isinf(self.stuck):
             self._anew_after *= 2
-            self._plant(self._open[0].bound)
-        node = heapq.heappop(self._open)
+            self._plant(self._least_open)
+        followed, self._followed = self._followed, None
+        node = followed or heapq.heappop(self._open)
         self.subproblems += 1
-        self._of_tree += 1
         if node.found is None or node.n_walls < len(self.walls) or self._sharper(node.found):
             if not self._bound(node):
+                self._last_box = self._last_box if followed is None else self.subproblems
                 return None
-            if self._open and node.bound > self._open[0].bound + 1e-9:
+            if followed is None and self._open and node.bound > self._open[0].bound + 1e-9:
                 heapq.heappush(self._open, node)  # others are more promising now
                 return None
         may_lose = SETTLED * self._gap * self.threshold
         self._kept = node
         wall = where_to_split(node, self._cells, self._limits_of(node.spans), may_lose)
         if wall is not None:
-            for spans in parts(node, self._cells, wall):
-                heapq.heappush(self._open, self._part(node, spans))
+            self._leave_open([self._part(node, part) for part in parts(node, self._cells, wall)])
             return None
         if node.n_walls < len(self.walls) or self._cells.cleared(node.spans, 1):
             self.put_back()
             return None
-        found = node.found
+        found, self._last_box = node.found, self.subproblems
         assert found is not None
         keys, mirrored = self._cells.keys_of(node.spans), self._cells.mirrored(node.spans)
         return Candidate(node.bound, found.low, found.high, keys, mirrored)
+
+    def _leave_open(self, split: list[Subproblem]) -> None:
+        """Leave what a subproblem was split into open; follow the least, if it is time to.
+
+        Where many are all but equal no box, and so no wall, would come before all are split.
+        """
+        if self.subproblems - self._last_box >= MOST_WITHOUT_A_BOX:
+            self.subproblems += len(split) - 1
+            split = sorted(node for node in split if self._bound(node))
+            self._followed = split.pop(0) if split else None
+            self._last_box = self._last_box if self._followed else self.subproblems
+        for node in split:
+            heapq.heappush(self._open, node)
 
     @property
     def outdated(self) -> bool:
