@@ -132,7 +132,7 @@ class OptimalSearch:
         learnt = self._learn(box, placements, missed[:MOST_ADDED])
         if self.plan is best and self.motions.collided > collided and not self._sampler.collisions:
             self._mind_collisions()
-        elif learnt or self.proof.outdated:
+        elif learnt or self.proof.outdated or self.proof.has_smaller:
             self.proof.put_back()
         elif candidate.bound >= self.proof.closing:
             return
@@ -162,9 +162,10 @@ class OptimalSearch:
         self._hope(inner)
         allowed = self._settings.missed(self.proof.threshold)
         known, new = columns.missed(box, self._places, allowed)
-        cleared = not missed and self.proof.clear(known, not passages.open)
-        if cleared or (not missed and self.proof.split_keys(known)):
-            return True
+        if not missed:
+            shut = not passages.open
+            if self.proof.clear(known, chains=shut) or self.proof.split_keys(known):
+                return True
         missed = missed or new[:MOST_ADDED]
         if not missed and not passages.walls:
             # the box meets the walls that it cannot pass, but perhaps not with these images

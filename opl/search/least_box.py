@@ -9,7 +9,6 @@ before they were known are many more than they take, so the tree is begun anew n
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable, Sequence
 from copy import copy
 from itertools import takewhile
@@ -23,6 +22,7 @@ from opl.search.branching import parts, where_to_split
 from opl.search.cells import END, FIRST, KEY, WALL, Cells
 from opl.search.forbidden import Forbidden
 from opl.search.joint_limits import UNLIMITED
+from opl.search.open_subproblems import OpenSubproblems
 from opl.search.relaxation import least_box
 from opl.search.subproblems import Candidate, Relaxation, Subproblem, keys_left, worth_a_price
 from opl.search.walls import Image, Piece, Wall
@@ -32,7 +32,6 @@ NUMBERS_OF_A_CELL = 30  # worked on to cut off what no box can hold
 NUMBERS_OF_A_SOURCE = 6  # that it is worth to tell whether a box can hold a piece in one image
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 FURTHER = 1.5  # times a size: cells are at hand for boxes up to there
-MOST_WITHOUT_A_BOX = 256  # subproblems worked on, until one of them is followed down to a box
 FEWEST_BEFORE_ANEW = 256  # subproblems of a tree that is begun anew for walls added since
 CLOSER = 2, 3  # looks at what is forbidden, each closer than the one before
 
@@ -77,12 +76,9 @@ class BoxProof:
     def _plant(self, bound: float) -> None:
         """Begin a tree of subproblems: one of which nothing but a bound is known."""
         self._planted, self._walls_then = self.subproblems, len(self.walls)
-        self._open: list[Subproblem] = []
-        self._followed: Subproblem | None = None  # down to a box
-        self._last_box = self.subproblems  # how many there were then
         low, high = np.full(6, np.inf), np.full(6, -np.inf)
         nothing = np.empty((0, 5), dtype=np.int64)
-        heapq.heappush(self._open, Subproblem(bound, self._count, nothing, 0, low, high))
+        self._open = OpenSubproblems(Subproblem(bound, self._count, nothing, 0, low, high))
 
     def again(self, threshold: float) -> BoxProof:
         """Return the proof begun again for boxes below another size, with the walls of this one."""
@@ -112,25 +108,19 @@ class BoxProof:
     @property
     def lower_bound(self) -> float:
         """No box that holds a point of every wall is smaller, in [rad]."""
-        return float(min(self._least_open, self.stuck, self.closing))
+        return float(min(self._open.least_bound, self.stuck, self.closing))
 
     @property
     def closed(self) -> bool:
         """Whether nothing is left that could be smaller than the threshold less the gap."""
-        return self._least_open >= self.closing
-
-    @property
-    def _least_open(self) -> float:
-        """The least bound of what is open, infinite if nothing is."""
-        left = (self._followed, *self._open[:1])
-        return min((node.bound for node in left if node is not None), default=np.inf)
+        return self._open.least_bound >= self.closing
 
     def add(self, wall: Wall) -> None:
         """Take in a wall."""
         self._cells.add(wall)
 
     def take_next(self) -> Candidate | None:
-        """Work on the subproblem with the least bound, or on one that is followed down to a box.
+        """Work on the subproblem with the least bound, or on one of a dive.
 
         Returns:
             Its box, where nothing is gained by splitting it further: the caller adds a wall that
@@ -139,48 +129,44 @@ class BoxProof:
         large = self.subproblems - self._planted >= self._anew_after
         if large and len(self.walls) > self._walls_then and np.isinf(self.stuck):
             self._anew_after *= 2
-            self._plant(self._least_open)
-        followed, self._followed = self._followed, None
-        node = followed or heapq.heappop(self._open)
+            self._plant(self._open.least_bound)
+        node = self._open.take()
         self.subproblems += 1
         if node.found is None or node.n_walls < len(self.walls) or self._sharper(node.found):
             if not self._bound(node):
-                self._last_box = self._last_box if followed is None else self.subproblems
                 return None
-            if followed is None and self._open and node.bound > self._open[0].bound + 1e-9:
-                heapq.heappush(self._open, node)  # others are more promising now
+            if not self._open.diving and self._open.before(node):
+                self._open.leave([node])
                 return None
         may_lose = SETTLED * self._gap * self.threshold
         self._kept = node
         wall = where_to_split(node, self._cells, self._limits_of(node.spans), may_lose)
         if wall is not None:
-            self._leave_open([self._part(node, part) for part in parts(node, self._cells, wall)])
+            split = [self._part(node, part) for part in parts(node, self._cells, wall)]
+            if self._open.dive_is_due:
+                self.subproblems += len(split) - 1
+                self._open.dive([part for part in split if self._bound(part)])
+            else:
+                self._open.leave(split)
             return None
         if node.n_walls < len(self.walls) or self._cells.cleared(node.spans, 1):
             self.put_back()
             return None
-        found, self._last_box = node.found, self.subproblems
+        self._open.note_box()
+        found = node.found
         assert found is not None
         keys, mirrored = self._cells.keys_of(node.spans), self._cells.mirrored(node.spans)
         return Candidate(node.bound, found.low, found.high, keys, mirrored)
-
-    def _leave_open(self, split: list[Subproblem]) -> None:
-        """Leave what a subproblem was split into open; follow the least, if it is time to.
-
-        Where many are all but equal no box, and so no wall, would come before all are split.
-        """
-        if self.subproblems - self._last_box >= MOST_WITHOUT_A_BOX:
-            self.subproblems += len(split) - 1
-            split = sorted(node for node in split if self._bound(node))
-            self._followed = split.pop(0) if split else None
-            self._last_box = self._last_box if self._followed else self.subproblems
-        for node in split:
-            heapq.heappush(self._open, node)
 
     @property
     def outdated(self) -> bool:
         """Whether the last candidate may be bounded better now."""
         return self._kept.found is not None and self._sharper(self._kept.found)
+
+    @property
+    def has_smaller(self) -> bool:
+        """Whether a smaller box than the last candidate may be left: that came of a dive."""
+        return self._open.before(self._kept)
 
     def pressing(self) -> Array:
         """Return how hard each wall presses on the faces of the last candidate's box.
@@ -211,12 +197,12 @@ class BoxProof:
     def clear(self, places: Sequence[float], chains: bool) -> bool:
         """Look at what is forbidden of the last candidate's spans at some places, in their order.
 
-        Closely, until any is, and at those of chains last if they are asked for. Return whether any
-        is.
+        Closely, until any is, last at those of walls that are chains, if wanted. Return whether
+        any is.
         """
         spans, every = self._kept.spans, list(enumerate(self.walls))
         of = [[n for n, wall in every if wall.place == place] for place in places]
-        of += [[n for n, wall in every if wall.turns]] if chains else []
+        of += [[n for n, wall in every if wall.is_chain]] if chains else []
         return any(self._cells.cleared(spans[np.isin(spans[:, WALL], own)], 2) for own in of)
 
     def split_keys(self, places: Sequence[float] | None = None) -> bool:
@@ -229,14 +215,14 @@ class BoxProof:
             own = node.spans[node.spans[:, WALL] == number, KEY]
             if (places is None or wall.place in places) and len(own) and (own != own[0]).any():
                 one, other = parts(node, self._cells, number)
-                heapq.heappush(self._open, self._part(node, other))
+                self._open.leave([self._part(node, other)])
                 self._kept = self._part(node, one)
                 return True
         return False
 
     def put_back(self) -> None:
         """Leave the subproblem of the last candidate open."""
-        heapq.heappush(self._open, self._kept)
+        self._open.leave([self._kept])
 
     def give_up(self) -> None:
         """Let the subproblem of the last candidate stay as it is; its bound counts."""

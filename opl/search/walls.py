@@ -166,6 +166,6 @@ class Wall:
     chain: Chain = ()
 
     @property
-    def turns(self) -> bool:
-        """Whether it is a chain of places and contact positions: no cutter point or place."""
+    def is_chain(self) -> bool:
+        """Whether it runs along contact positions as well, not at one place alone."""
         return len(self.chain) > 2

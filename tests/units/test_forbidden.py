@@ -135,12 +135,15 @@ def test_a_box_is_split_between_postures_at_any_wall_where_no_place_is_given():
 class OnlySeenClosely(LowCells):
     """Forbids what `LowCells` does where it is looked at closely."""
 
+    seen = None
+
     def clear(self, piece, flip, first, end, looks):
         if looks > 1:
             self.seen = piece
         none = np.zeros(len(piece.pad_low))
-        known = getattr(self, "seen", None) is piece
-        return super().clear(piece, flip, first, end, looks) if known else (none, none + 1.0)
+        if self.seen is not piece:
+            return none, none + 1.0
+        return super().clear(piece, flip, first, end, looks)
 
 
 def test_chains_are_looked_at_closely_only_where_they_are_asked_for():
