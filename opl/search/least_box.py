@@ -197,13 +197,18 @@ class BoxProof:
     def clear(self, places: Sequence[float], chains: bool) -> bool:
         """Look at what is forbidden of the last candidate's spans at some places, in their order.
 
-        Closely, until any is, last at those of walls that are chains, if wanted. Return whether
-        any is.
+        Closely, until any is, then at those of walls that are chains, if wanted; last as closely
+        as can be, where the box meets one cell of a chain alone. Return whether any is.
         """
         spans, every = self._kept.spans, list(enumerate(self.walls))
-        of = [[n for n, wall in every if wall.place == place] for place in places]
-        of += [[n for n, wall in every if wall.is_chain]] if chains else []
-        return any(self._cells.cleared(spans[np.isin(spans[:, WALL], own)], 2) for own in of)
+        close, closest = CLOSER
+        looks = [(close, [n for n, wall in every if wall.place == place]) for place in places]
+        if chains:
+            own = [n for n, wall in every if wall.is_chain]
+            looks.append((close, own))
+            met = np.bincount(spans[:, WALL], spans[:, END] - spans[:, FIRST], len(every))
+            looks += [(closest, [n]) for n in own if met[n] == 1]
+        return any(self._cells.cleared(spans[np.isin(spans[:, WALL], n)], at) for at, n in looks)
 
     def split_keys(self, places: Sequence[float] | None = None) -> bool:
         """Split the last subproblem between keys at a wall, if it can: of some places, or of all.

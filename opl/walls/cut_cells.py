@@ -104,6 +104,7 @@ def halved(
     high: Array,
     surely: Callable[[np.ndarray, Array, Array], tuple[np.ndarray, np.ndarray]],
     most_within: int = MOST_HALVINGS,
+    few: int = 0,
 ) -> tuple[np.ndarray, Array, Array, np.ndarray]:
     """Return cells, halved where something begins in them, and which of them it surely fills.
 
@@ -113,10 +114,12 @@ def halved(
         high: Greatest of each.
         surely: Which cells of these it surely fills, and where it is at their middle.
         most_within: How often a cell is halved that lies within it, but not surely.
+        few: How many of those are left where they are halved on nevertheless.
     """
     cuts, deep = surely(run, low, high)
     for halving in range(MOST_HALVINGS):
-        unsure = deep & ~cuts & (halving < most_within)
+        unsure = deep & ~cuts
+        unsure &= halving < most_within or np.count_nonzero(unsure) <= few
         begins = (deep[:-1] != deep[1:]) & (run[:-1] == run[1:])
         unsure[:-1] |= begins & ~deep[:-1]
         unsure[1:] |= begins & ~deep[1:]

@@ -17,9 +17,9 @@ from opl.walls.columns import ColumnWalls
 from opl.walls.cut_cells import halved, surely_cuts_on
 from opl.walls.shut_leads import ShutLeads
 
-# into how many parts a cell is cut at each look, and halvings of what is all in collision then, but
-# not deep enough to be sure
-PARTS, WITHIN = (1, 4, 16), (2, 4, 6)
+# into how many parts a cell is cut at each look, halvings of what is all in collision then, but not
+# deep enough to be sure, and how few of those are halved on: what begins there is known closely
+PARTS, WITHIN, FEW = (1, 4, 16), (2, 4, 6), (0, 0, 8)
 AROUND = 16  # cells on either side of those asked about that are looked at as well, at first
 
 
@@ -109,7 +109,8 @@ class Obstructions:
         begin, last = max(first - 1, 0), min(end + 1, len(pads))
         ends = np.linspace(begin, last, (last - begin) * parts + 1)
         run = np.zeros(len(ends) - 1, dtype=int)
-        _, low, high, hit = halved(run, ends[:-1], ends[1:], surely, WITHIN[looks - 1])
+        within = WITHIN[looks - 1], FEW[looks - 1]
+        _, low, high, hit = halved(run, ends[:-1], ends[1:], surely, *within)
         cell = ((low + high) / 2.0).astype(int)
         new = np.zeros(len(pads), dtype=bool)
         new[first:end] = known.looks[first:end] < looks

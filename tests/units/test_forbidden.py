@@ -162,3 +162,34 @@ def test_chains_are_looked_at_closely_only_where_they_are_asked_for():
     while (candidate := proof.take_next()) is None:
         pass
     assert candidate.bound == pytest.approx(0.4, abs=1e-3)
+
+
+class OnlySeenAsCloselyAsCanBe(LowCells):
+    """Forbids what `LowCells` does where it is looked at a third time, and notes where that is."""
+
+    def __init__(self, walls, shares):
+        super().__init__(walls, shares)
+        self.seen = []
+
+    def clear(self, piece, flip, first, end, looks):
+        if looks > 2:
+            self.seen.append((first, end))
+        none = np.zeros(len(piece.pad_low))
+        return super().clear(piece, flip, first, end, looks) if self.seen else (none, none + 1.0)
+
+
+@pytest.mark.parametrize("cells", [1, 10])
+def test_one_cell_of_a_chain_alone_is_looked_at_as_closely_as_can_be(cells):
+    chain = replace(ramp(0.5, 1), chain=((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)))
+    chain = replace(chain, pieces=(chain.pieces[0].part(0, cells),))
+    walls = [ramp(0.0, 0), chain]
+    forbidden = OnlySeenAsCloselyAsCanBe(walls, [(0.0, 0.0), (0.05, 0.05)])
+    proof = BoxProof(lambda _: IMAGES[:1], lambda *_: (), 3.0, 1e-4, forbidden)
+    for wall in walls:
+        proof.add(wall)
+    while (candidate := proof.take_next()) is None:
+        pass
+    assert candidate.bound == pytest.approx(0.0, abs=1e-3)
+    assert not proof.clear([0.0], chains=False)
+    assert proof.clear([0.0], chains=True) == (cells == 1)
+    assert forbidden.seen == ([(0, 1)] if cells == 1 else [])
