@@ -7,13 +7,16 @@ the box between two places, more places are taken in.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
+
 import numpy as np
 
 from opl.geometry.frames import Array
 from opl.least.box_nodes import SAMPLES, BoxNodes, Learn, TrackSearch
 from opl.least.passages import NO_PASSAGES, Passages
 from opl.least.postures import Columns
-from opl.least.rows import bars, crossed, levels
+from opl.least.rows import Bulge, bars, crossed, levels
 from opl.least.sinking import DEEP, places_for, shallower, spare_for
 from opl.planning.open_matrix import Track
 from opl.planning.plan import Plan
@@ -75,9 +78,9 @@ class BoxTracks:
                 [m.ladder for m in few.values()],
                 [m.blocked_edges for m in few.values()],
             )
-            if learn(bars(places, ladders, blocked)):
+            if learn(bars(places, ladders, blocked)) or not rows:
                 return None
-            return self.plan(columns, NO_PASSAGES, box, room, learn) if rows else None
+            return self.plan(columns, NO_PASSAGES, box, room, partial(steep, learn))
         bulges = coarse.bulges(track, box.widened(BULGE * room))
         if any(bulge.steep for bulge in bulges) and learn(bulges):
             return None
@@ -129,6 +132,14 @@ class BoxTracks:
         sampler.work += len(t) * t.shape[1] ** 2 / EDGES_OF_WORK
         at = sampler.at(places, columns.points, columns.placements, t)
         return BoxNodes(self._search, at, passages.rows, inner, spare, spacing)
+
+
+def steep(learn: Learn, bulges: Sequence[Bulge]) -> bool:
+    """Learn of bulges where one is steep; return whether anything was.
+
+    Of a track past rows: rows tell where it sinks between places, these would but be cut finer.
+    """
+    return any(bulge.steep for bulge in bulges) and learn(bulges)
 
 
 def nearest_free(columns: Columns, box: JointBox) -> Array:

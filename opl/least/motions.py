@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from opl.least.box_nodes import TrackSearch
 from opl.least.box_track import BoxTracks
@@ -19,6 +19,7 @@ from opl.walls.placement import Placement
 # of a box that holds all, but no motion that is found: how much larger boxes are where one is
 # sought instead, so that what cannot be proven is not left far from the bound
 LARGER = tuple(0.0005 * 2.0**k for k in range(9))
+MOST_LOOKS = 3  # at each of these, with places cut finer by what the look before told
 
 
 class Motions:
@@ -85,21 +86,25 @@ class Motions:
         learnt = learnt or self._search.sampler.doubts.count > doubts
         return learnt or (found is None and learn(passages.narrow))
 
-    def look_about(self, box: JointBox, placements: Sequence[Placement]) -> bool:
+    def look_about(
+        self, box: JointBox, placements: Sequence[Placement], goes_on: Callable[[], bool]
+    ) -> bool:
         """Look for a motion in larger and larger boxes about one; return whether a better one is.
 
-        Up to the size of the best, and of what placements hold in the box.
+        Up to the size of the best, and of what placements hold in the box. Places are cut finer as
+        long as `goes_on` says so.
         """
         for share in LARGER if placements else ():
             larger = box.widened(share * box.size)
             if larger.size >= self.value:
                 break
-            columns, passages, inner = self._space.look(larger, placements, self._settings)
-            if inner is None:
-                continue
-            room = self._settings.room(inner.size)
-            # through places as they are, cut no finer where a track leaves the box
-            found = self._tracks.plan(columns, passages, inner, room, lambda _: False)
-            if found is not None:
-                return self.keep(found)
+            best, looks = self.best, 0
+            while looks == 0 or (looks < MOST_LOOKS and goes_on()):
+                looks += 1
+                columns, passages, inner = self._space.look(larger, placements, self._settings)
+                learnt = self.learn_in(columns, passages, inner)
+                if self.best is not best:
+                    return True
+                if not learnt:
+                    break
         return False

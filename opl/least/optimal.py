@@ -139,14 +139,18 @@ class OptimalSearch:
         elif not self._sampler.collisions:
             self._mind_collisions()
         # costly: only where the search would end, as walls of other boxes may tell more before
-        elif self.proof.look_closer(lambda: self.work_share < 1.0) or (
-            self._given_up + 1 == MOST_GIVEN_UP and self.motions.look_about(box, placements)
+        elif self.proof.look_closer(self._goes_on) or (
+            self._given_up + 1 == MOST_GIVEN_UP
+            and self.motions.look_about(box, placements, self._goes_on)
         ):
             self._lower()
             self.proof.put_back()
         else:
             self._given_up += 1
             self.proof.give_up()
+
+    def _goes_on(self) -> bool:
+        return self.work_share < 1.0
 
     def _learn(self, box: JointBox, placements: Sequence[Placement], missed: list[float]) -> bool:
         """Add walls that a box misses, or look for a motion in it; return whether it can tell more.

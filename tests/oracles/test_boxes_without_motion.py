@@ -8,7 +8,7 @@ import pytest
 
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.least.box_nodes import TrackSearch
-from opl.least.motions import LARGER, Motions
+from opl.least.motions import LARGER, MOST_LOOKS, Motions
 from opl.least.rows import Bulge
 from opl.least.search_space import SearchSpace, seams_in
 from opl.planning.costs import PushAway
@@ -22,6 +22,12 @@ from tests.oracles.test_optimal import SETTINGS, recursive, v_row
 def space():
     """Return what is looked at of one row of the V part."""
     return SearchSpace.of(v_row(), seams_in(v_row()), recursive(v_row).path.joint_range_sum)
+
+
+@pytest.fixture(autouse=True)
+def anew():
+    """Begin each test with no more known than at first: ways grow finer."""
+    space.cache_clear()
 
 
 def motions(known):
@@ -42,9 +48,13 @@ def smaller(share):
     return box, space().families.hold(box, {}, set(), 0.01)[0]
 
 
+def always():
+    return True
+
+
 def test_a_motion_is_found_about_a_box_that_is_too_small():
     search, (box, placements) = motions(None), smaller(0.02)
-    assert search.look_about(box, placements)
+    assert search.look_about(box, placements, always)
     found = search.best.path
     assert box.size < found.joint_range_sum
     assert found.joint_range_sum == pytest.approx(np.ptp(found.q, axis=0).sum(), rel=1e-9)
@@ -54,12 +64,13 @@ def test_a_motion_is_found_about_a_box_that_is_too_small():
 
 
 def test_none_is_kept_that_is_no_better():
-    first = motions(None)
     box, placements = smaller(0.02)
-    first.look_about(box, placements)
-    again = motions(first.best)
-    assert not again.look_about(box, placements)
-    assert again.best is first.best
+    search = motions(None)
+    assert search.look_about(box, placements, always)
+    while (again := motions(search.best)).look_about(box, placements, always):
+        assert again.value < search.value  # among places that were cut finer
+        search = again
+    assert again.best is search.best
 
 
 @pytest.mark.parametrize("share", [0.02, 0.9])
@@ -68,7 +79,24 @@ def test_boxes_as_large_as_the_best_are_not_looked_at(share, monkeypatch):
     search = motions(recursive(v_row))
     monkeypatch.setattr(type(search), "value", property(lambda _: box.size))
     monkeypatch.setattr(type(space()), "look", lambda *_: pytest.fail("looked at"))
-    assert not search.look_about(box, placements)
+    assert not search.look_about(box, placements, always)
+
+
+@pytest.mark.parametrize("goes_on", [False, True])
+def test_places_are_cut_finer_some_times_in_each_box_as_long_as_it_goes_on(goes_on, monkeypatch):
+    box, placements = smaller(0.02)
+    search, sizes = motions(None), []
+
+    def look(_, larger, *given):
+        sizes.append(larger.size)
+        return None, None, larger
+
+    monkeypatch.setattr(type(space()), "look", look)
+    monkeypatch.setattr(Motions, "learn_in", lambda *_: True)
+    assert not search.look_about(box, placements, lambda: goes_on)
+    looks = MOST_LOOKS if goes_on else 1
+    wanted = [box.widened(share * box.size).size for share in LARGER for _ in range(looks)]
+    assert sizes == pytest.approx(wanted)
 
 
 def postures_of(chain):

@@ -7,10 +7,11 @@ import numpy as np
 from opl.cell.wheel_distance import signed_wheel_distance
 from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import inverse
-from opl.least import box_nodes, sinking
+from opl.least import box_nodes, box_track, sinking
 from opl.least.box_nodes import TrackSearch
 from opl.least.box_track import BoxTracks
 from opl.least.passages import NO_PASSAGES
+from opl.least.rows import Row
 from opl.least.sinking import (
     HARDLY,
     MORE,
@@ -205,3 +206,28 @@ def test_where_depth_can_be_spared_in_a_larger_box_only_places_are_wanted_first(
         assert tracks.plan(columns, NO_PASSAGES, box, 1e-3, learn) is found
         assert told[:2] == [(edge, edge + 1)] * 2
         assert len(checked) == (1 if found is None else 2)
+
+
+def test_a_track_past_rows_that_sinks_wants_no_places(monkeypatch):
+    problem, settings = small_problem(), v_job().search.optimal
+    box, sampler, columns = near_a_box()
+    smoothest, answers = box_nodes.BoxNodes.smoothest, []
+    sinks = places_for(columns.places, np.full(len(columns.places) - 1, 1e-6))
+
+    def check(sampled, track, learn):
+        answers.append(learn(sinks))
+        return None, None, answers[-1]
+
+    def unless_rows(sampled):
+        return None if sampled._rows else smoothest(sampled)
+
+    monkeypatch.setattr(box_nodes.BoxNodes, "check", check)
+    monkeypatch.setattr(box_nodes.BoxNodes, "smoothest", unless_rows)
+    monkeypatch.setattr(box_track, "bars", lambda *_: [])
+    push_away, most = PushAway(problem.cell, settings.costs), Travel(np.inf, np.inf)
+    tracks = BoxTracks(TrackSearch(problem, sampler, settings.costs, most, push_away))
+    for rows in ([], [Row(columns.places[:2], 0.0, np.full((2, 6), np.nan))]):
+        answers.clear()
+        passages = replace(NO_PASSAGES, rows=rows)
+        assert tracks.plan(columns, passages, box, 1e-3, lambda told: told is sinks) is None
+        assert answers[0] == (not rows)
