@@ -203,6 +203,19 @@ class BoxNodes:
         where = path.cutter_point.astype(int), excess / box.size
         return bulging(self._columns.places, nodes.t_along(track.rows), *where)
 
+    def collides(self, track: Track) -> bool:
+        """Return whether a track collides at places, where that is not minded yet; it counts then.
+
+        It does with the wrist either way, so its motion would, however finely it is cut.
+        """
+        search, q = self._search, self.matrices[track.matrix].nodes.along(track.rows)
+        if search.sampler.collisions:
+            return False
+        scene, flips = self.problem.scene.collision, search.sampler.flips
+        hit = all(scene.first_colliding(q * sign + shift) < len(q) for sign, shift in flips)
+        search.collided += int(hit)
+        return hit
+
     def check(self, track: Track, learn: Learn) -> tuple[Plan | None, Array | None, bool]:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free.
 

@@ -81,6 +81,8 @@ class BoxTracks:
             if learn(bars(places, ladders, blocked)) or not rows:
                 return None
             return self.plan(columns, NO_PASSAGES, box, room, partial(steep, learn))
+        if coarse.collides(track):
+            return None
         bulges = coarse.bulges(track, box.widened(BULGE * room))
         if any(bulge.steep for bulge in bulges) and learn(bulges):
             return None

@@ -277,6 +277,18 @@ def test_without_a_motion_that_is_known_the_proof_finds_one(untried):
     assert plan.lower_bound <= optimal(one_row).path.joint_range_sum
 
 
+def test_collisions_are_minded_once_the_first_track_collides_before_any_motion_is_made():
+    everywhere = Ghosts(np.zeros(6), radius=1e3)
+    search = OptimalSearch(
+        with_scene(one_row(), collision=everywhere), SETTINGS, None, untried=True
+    )
+    while search.forbidden is None:
+        assert not search.finished
+        search.step()
+    assert search.motions.collided > 0
+    assert search.motions.stopped.total() == 0  # of motions that were checked
+
+
 def test_a_motion_that_the_proof_does_not_find_keeps_its_bound():
     asked = []
 
