@@ -106,11 +106,11 @@ def explain_free_moves(cell: WorkCell, cut_off: Counter[tuple[FreeMove, Blocker]
 
 def free_at(problem: GrindingProblem, column: int) -> bool:
     """Return whether any node of a column is free of limits, wheel and robot collisions."""
-    collides = problem.scene.collision.collides
+    collides, cuts = problem.scene.collision.collides, problem.cuts[column]
     return any(
-        not collides(q[None])[0]
+        not collides(nodes.at(column, np.flatnonzero(exists & ~cuts[nodes.position_index]))).all()
         for nodes in problem.field.matrices
-        for q in nodes.at(column, np.flatnonzero(problem.free_nodes(nodes)[column]))
+        if (exists := nodes.exists[column]).any()
     )
 
 

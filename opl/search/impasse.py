@@ -19,25 +19,20 @@ def impasses(ladder: Ladder, blocked: np.ndarray) -> list[tuple[int, int]]:
 
     `blocked` are the sorted keys of the edges that are not free, int64.
     """
-    free = ladder.free
-
-    def edges(column: int) -> np.ndarray:
-        rule = _edges(ladder.edge_rule, blocked, column)
-        return np.asarray(rule & free[column][:, None] & free[column + 1])
-
+    free, rule = np.ascontiguousarray(ladder.free), ladder.edge_rule
     found = []
     start = 0
     while start < len(free):
         reach, last = free[start], start
         while reach.any() and last < len(free) - 1:
-            reach = edges(last)[reach].any(axis=0)
+            reach = _reached(rule, blocked, free, last, reach, False)
             last += 1
         if reach.any():
             break  # it leads to the end
         reach, first = free[last], last
         while reach.any():
             first -= 1
-            reach = edges(first)[:, reach].any(axis=1)
+            reach = _reached(rule, blocked, free, first, reach, True)
         found.append((first, last))
         start = first + 1
     return found
@@ -65,12 +60,18 @@ def passable(ladder: Ladder, blocked: np.ndarray, first: int, last: int) -> bool
     return bool((part.free & ~dead)[0].any())
 
 
-@kernel(f"boolean[:,::1]({EDGE_RULE},int64[::1],int64)")
-def _edges(edge_rule, blocked, column):  # type: ignore[no-untyped-def]
-    """Return which rows of a column lead to which of the next, were they all free."""
-    n_rows = edge_rule[0].shape[2]
-    edges = np.empty((n_rows, n_rows), dtype=np.bool_)
-    for here in range(n_rows):
-        for row in range(n_rows):
-            edges[here, row] = allowed(edge_rule, blocked, column, here, row)
-    return edges
+@kernel(f"boolean[::1]({EDGE_RULE},int64[::1],boolean[:,::1],int64,boolean[::1],boolean)")
+def _reached(edge_rule, blocked, free, column, reach, back):  # type: ignore[no-untyped-def]
+    """Return which free rows an edge leads to that begins at a column, from some rows of it.
+
+    Or back: at which free rows of the column one begins that leads to some rows of the next.
+    """
+    ends, rows = free[column if back else column + 1], np.flatnonzero(reach)
+    found = np.zeros(len(ends), dtype=np.bool_)
+    for end in np.flatnonzero(ends):
+        for row in rows:
+            here, there = (end, row) if back else (row, end)
+            if allowed(edge_rule, blocked, column, here, there):
+                found[end] = True
+                break
+    return found
