@@ -204,9 +204,9 @@ class BoxNodes:
         return bulging(self._columns.places, nodes.t_along(track.rows), *where)
 
     def collides(self, track: Track) -> bool:
-        """Return whether a track collides at places, where that is not minded yet; it counts then.
+        """Return whether a track collides at places with the wrist either way; it counts then.
 
-        It does with the wrist either way, so its motion would, however finely it is cut.
+        So would its motion, however finely it is cut. Not asked where collisions are left out.
         """
         search, q = self._search, self.matrices[track.matrix].nodes.along(track.rows)
         if search.sampler.collisions:
