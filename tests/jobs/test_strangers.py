@@ -105,6 +105,20 @@ def test_the_least_motion_is_found_though_tracks_sweep_over_what_is_shut(drawn, 
 @pytest.mark.parametrize(
     "drawn",
     [
+        (20263305, 55, 0),  # the chain in the way of a box begins to collide within micrometres
+        (20263305, 17, 1),  # only in larger boxes, with places cut finer
+    ],
+)
+def test_the_least_motion_is_found_along_what_is_shut(drawn, tmp_path):
+    draw_job(*drawn, tmp_path)
+    job = opl.load_job(tmp_path / "job.yaml")
+    plan = search_path(job.search, problem_of(job)).plan
+    assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)
+
+
+@pytest.mark.parametrize(
+    "drawn",
+    [
         (20262805, 7, 0),  # with what is beyond the limits, its walls would be crossed
         (20263203, 69, 0),  # where chains are shut is told only by a closer look at collisions
     ],
