@@ -204,17 +204,13 @@ class BoxNodes:
         return bulging(self._columns.places, nodes.t_along(track.rows), *where)
 
     def collides(self, track: Track) -> bool:
-        """Return whether a track collides at places with the wrist either way; it counts then.
+        """Return whether a track collides at places with the wrist either way.
 
-        So would its motion, however finely it is cut. Not asked where collisions are left out.
+        So would its motion, however finely it is cut.
         """
-        search, q = self._search, self.matrices[track.matrix].nodes.along(track.rows)
-        if search.sampler.collisions:
-            return False
-        scene, flips = self.problem.scene.collision, search.sampler.flips
-        hit = all(scene.first_colliding(q * sign + shift) < len(q) for sign, shift in flips)
-        search.collided += int(hit)
-        return hit
+        q = self.matrices[track.matrix].nodes.along(track.rows)
+        scene, flips = self.problem.scene.collision, self._search.sampler.flips
+        return all(scene.first_colliding(q * sign + shift) < len(q) for sign, shift in flips)
 
     def check(self, track: Track, learn: Learn) -> tuple[Plan | None, Array | None, bool]:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free.

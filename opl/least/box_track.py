@@ -80,8 +80,10 @@ class BoxTracks:
             )
             if learn(bars(places, ladders, blocked)) or not rows:
                 return None
-            return self.plan(columns, NO_PASSAGES, box, room, partial(steep, learn))
-        if coarse.collides(track):
+            return self.plan(columns, NO_PASSAGES, box, room, partial(learn_if_steep, learn))
+        # where collisions are left out, they are looked for on whole motions only
+        if not self._search.sampler.collisions and coarse.collides(track):
+            self._search.collided += 1
             return None
         bulges = coarse.bulges(track, box.widened(BULGE * room))
         if any(bulge.steep for bulge in bulges) and learn(bulges):
@@ -136,7 +138,7 @@ class BoxTracks:
         return BoxNodes(self._search, at, passages.rows, inner, spare, spacing)
 
 
-def steep(learn: Learn, bulges: Sequence[Bulge]) -> bool:
+def learn_if_steep(learn: Learn, bulges: Sequence[Bulge]) -> bool:
     """Learn of bulges where one is steep; return whether anything was.
 
     Of a track past rows: rows tell where it sinks between places, these would but be cut finer.

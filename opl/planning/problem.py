@@ -161,9 +161,13 @@ class GrindingProblem:
             found[block] = self.solutions(columns[block])[:, :, ik_branch]
         return found
 
-    def free_nodes(self, nodes: NodeMatrix) -> np.ndarray:
-        """Return which nodes exist and do not cut into the wheel, shape (N, n_rows)."""
-        return np.ascontiguousarray(nodes.exists & ~self.cuts[:, nodes.position_index])
+    def free_nodes(self, nodes: NodeMatrix, columns: slice | int = slice(None)) -> np.ndarray:
+        """Return which nodes exist and do not cut into the wheel, shape (N, n_rows).
+
+        Of all columns, of some, or those of one, shape (n_rows,).
+        """
+        cuts = self.cuts[columns][..., nodes.position_index]
+        return np.ascontiguousarray(nodes.exists[columns] & ~cuts)
 
     def over_nodes(
         self, places: Array, points: CutterPoints, t: Array, matrices: Sequence[NodeMatrix]

@@ -106,11 +106,10 @@ def explain_free_moves(cell: WorkCell, cut_off: Counter[tuple[FreeMove, Blocker]
 
 def free_at(problem: GrindingProblem, column: int) -> bool:
     """Return whether any node of a column is free of limits, wheel and robot collisions."""
-    collides, cuts = problem.scene.collision.collides, problem.cuts[column]
+    collides = problem.scene.collision.collides
     return any(
-        not collides(nodes.at(column, np.flatnonzero(exists & ~cuts[nodes.position_index]))).all()
+        not collides(nodes.at(column, np.flatnonzero(problem.free_nodes(nodes, column)))).all()
         for nodes in problem.field.matrices
-        if (exists := nodes.exists[column]).any()
     )
 
 

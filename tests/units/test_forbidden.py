@@ -122,9 +122,7 @@ def test_a_box_is_split_between_postures_at_any_wall_where_no_place_is_given():
     proof = BoxProof(lambda _: IMAGES[:1], lambda *_: (), 3.0, 1e-4)
     for wall in walls:
         proof.add(wall)
-    while (candidate := proof.take_next()) is None:
-        pass
-    assert len(candidate.keys[1]) == 2
+    assert len(proposed(proof).keys[1]) == 2
     assert not proof.split_keys([0.5])
     assert proof.split_keys()
     proof.put_back()
@@ -133,63 +131,51 @@ def test_a_box_is_split_between_postures_at_any_wall_where_no_place_is_given():
 
 
 class OnlySeenClosely(LowCells):
-    """Forbids what `LowCells` does where it is looked at closely."""
+    """Forbids what `LowCells` does of a piece once it is looked at so closely, and notes where."""
 
-    seen = None
+    def __init__(self, walls, shares, looks):
+        super().__init__(walls, shares)
+        self._looks, self.seen = looks, []
 
     def clear(self, piece, flip, first, end, looks):
-        if looks > 1:
-            self.seen = piece
-        none = np.zeros(len(piece.pad_low))
-        if self.seen is not piece:
+        if looks >= self._looks:
+            self.seen.append((piece, first, end))
+        if not any(seen is piece for seen, *_ in self.seen):
+            none = np.zeros(len(piece.pad_low))
             return none, none + 1.0
         return super().clear(piece, flip, first, end, looks)
 
 
-def test_chains_are_looked_at_closely_only_where_they_are_asked_for():
-    chain = replace(ramp(0.5, 1), chain=((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)))
-    walls = [ramp(0.0, 0), chain]
-    forbidden = OnlySeenClosely(walls, [(0.0, 0.0), (0.4, 0.4)])
-    proof = BoxProof(lambda _: IMAGES, lambda *_: (), 3.0, 1e-4, forbidden)
-    for wall in walls:
-        proof.add(wall)
+def proposed(proof):
+    """Return the first candidate of a proof."""
     while (candidate := proof.take_next()) is None:
         pass
-    assert candidate.bound == pytest.approx(0.0, abs=1e-3)
+    return candidate
+
+
+def proof_with_a_chain(cells, share, looks, images):
+    """Return a proof of a column and a chain of cells, a share of which is seen closely only."""
+    chain = replace(ramp(0.5, 1), chain=((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)))
+    walls = [ramp(0.0, 0), replace(chain, pieces=(chain.pieces[0].part(0, cells),))]
+    forbidden = OnlySeenClosely(walls, [(0.0, 0.0), (share, share)], looks)
+    proof = BoxProof(lambda _: images, lambda *_: (), 3.0, 1e-4, forbidden)
+    for wall in walls:
+        proof.add(wall)
+    assert proposed(proof).bound == pytest.approx(0.0, abs=1e-3)
+    return proof, forbidden
+
+
+def test_chains_are_looked_at_closely_only_where_they_are_asked_for():
+    proof, _ = proof_with_a_chain(10, 0.4, 2, IMAGES)
     assert not proof.clear([0.0], chains=False)
     assert proof.clear([0.0], chains=True)
     proof.put_back()
-    while (candidate := proof.take_next()) is None:
-        pass
-    assert candidate.bound == pytest.approx(0.4, abs=1e-3)
-
-
-class OnlySeenAsCloselyAsCanBe(LowCells):
-    """Forbids what `LowCells` does where it is looked at a third time, and notes where that is."""
-
-    def __init__(self, walls, shares):
-        super().__init__(walls, shares)
-        self.seen = []
-
-    def clear(self, piece, flip, first, end, looks):
-        if looks > 2:
-            self.seen.append((first, end))
-        none = np.zeros(len(piece.pad_low))
-        return super().clear(piece, flip, first, end, looks) if self.seen else (none, none + 1.0)
+    assert proposed(proof).bound == pytest.approx(0.4, abs=1e-3)
 
 
 @pytest.mark.parametrize("cells", [1, 10])
 def test_one_cell_of_a_chain_alone_is_looked_at_as_closely_as_can_be(cells):
-    chain = replace(ramp(0.5, 1), chain=((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)))
-    chain = replace(chain, pieces=(chain.pieces[0].part(0, cells),))
-    walls = [ramp(0.0, 0), chain]
-    forbidden = OnlySeenAsCloselyAsCanBe(walls, [(0.0, 0.0), (0.05, 0.05)])
-    proof = BoxProof(lambda _: IMAGES[:1], lambda *_: (), 3.0, 1e-4, forbidden)
-    for wall in walls:
-        proof.add(wall)
-    while (candidate := proof.take_next()) is None:
-        pass
-    assert candidate.bound == pytest.approx(0.0, abs=1e-3)
+    proof, forbidden = proof_with_a_chain(cells, 0.05, 3, IMAGES[:1])
     assert not proof.clear([0.0], chains=False)
     assert proof.clear([0.0], chains=True) == (cells == 1)
-    assert forbidden.seen == ([(0, 1)] if cells == 1 else [])
+    assert [where for _, *where in forbidden.seen] == ([[0, 1]] if cells == 1 else [])
