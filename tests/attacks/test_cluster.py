@@ -25,29 +25,43 @@ CHILD = {**os.environ, **EPOCH, "PYTHONPATH": str(Path(opl.__file__).parents[1])
 SMALL = {"passes.max_step_mm": 40, "search.contact_positions": 15}
 
 
+def started(scheduler, home):
+    """Return the address of a scheduler that is starting, whose port is one that was free."""
+    deadline = time.monotonic() + 60.0
+    while scheduler.poll() is None and time.monotonic() < deadline:
+        with suppress(FileNotFoundError, json.JSONDecodeError):  # not there, or half written
+            return json.loads((home / "scheduler.json").read_text())["address"]
+        time.sleep(0.1)
+    raise AssertionError(f"no scheduler in 60 s:\n{(home / 'scheduler.err').read_text()}")
+
+
 @pytest.fixture(scope="module")
 def machines(tmp_path_factory):
     """Start a scheduler and two workers that stand in folders of their own; yield its address."""
     home = tmp_path_factory.mktemp("cluster")
-    port = 38786
-    address = f"tcp://127.0.0.1:{port}"
     scheduler = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1",
-                 "--port", str(port), "--no-dashboard"]  # fmt: skip
-    processes = [subprocess.Popen(scheduler, cwd=home, env=CHILD, stderr=subprocess.DEVNULL)]
-    for number in range(2):
-        place = home / str(number)
-        place.mkdir()
-        worker = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1",
-                  "--no-dashboard", "--local-directory", str(place)]  # fmt: skip
-        processes.append(subprocess.Popen(worker, cwd=place, env=CHILD, stderr=subprocess.DEVNULL))
-    client = distributed.Client(address, timeout="60s", set_as_default=False)
-    client.wait_for_workers(2, timeout=60)
-    yield address, client
-    client.close()
-    for process in processes:
-        process.terminate()
-    for process in processes:
-        process.wait(30)
+                 "--port", "0", "--scheduler-file", "scheduler.json", "--no-dashboard"]  # fmt: skip
+    with (home / "scheduler.err").open("w") as errors:
+        processes = [subprocess.Popen(scheduler, cwd=home, env=CHILD, stderr=errors)]
+    try:
+        address = started(processes[0], home)
+        for number in range(2):
+            place = home / str(number)
+            place.mkdir()
+            worker = [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads",
+                      "1", "--no-dashboard", "--local-directory", str(place)]  # fmt: skip
+            processes.append(
+                subprocess.Popen(worker, cwd=place, env=CHILD, stderr=subprocess.DEVNULL)
+            )
+        client = distributed.Client(address, timeout="60s", set_as_default=False)
+        client.wait_for_workers(2, timeout=60)
+        yield address, client
+        client.close()
+    finally:
+        for process in processes:
+            process.terminate()
+        for process in processes:
+            process.wait(30)
 
 
 def made(folder):
