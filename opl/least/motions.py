@@ -94,17 +94,37 @@ class Motions:
         Up to the size of the best, and of what placements hold in the box. Places are cut finer as
         long as `goes_on` says so.
         """
-        for share in LARGER if placements else ():
-            larger = box.widened(share * box.size)
-            if larger.size >= self.value:
-                break
-            best, looks = self.best, 0
-            while looks == 0 or (looks < MOST_LOOKS and goes_on()):
-                looks += 1
-                columns, passages, inner = self._space.look(larger, placements, self._settings)
-                learnt = self.learn_in(columns, passages, inner)
-                if self.best is not best:
-                    return True
-                if not learnt:
-                    break
-        return False
+        larger = self._larger(box, placements)
+        return any(self._look_in(one, placements, goes_on) for one in larger)
+
+    def look_far_about(
+        self, box: JointBox, placements: Sequence[Placement], goes_on: Callable[[], bool]
+    ) -> bool:
+        """Do the same in few of those boxes, as long as `goes_on` says so.
+
+        For the smallest that holds a motion by bisection, as if all that are larger held one.
+        """
+        boxes, found = self._larger(box, placements), False
+        while boxes and goes_on():
+            middle = len(boxes) // 2
+            if self._look_in(boxes[middle], placements, goes_on):
+                boxes, found = boxes[:middle], True
+            else:
+                boxes = boxes[middle + 1 :]
+        return found
+
+    def _larger(self, box: JointBox, placements: Sequence[Placement]) -> list[JointBox]:
+        """Return the larger boxes about one that are smaller than the best motion."""
+        larger = [box.widened(share * box.size) for share in LARGER] if placements else []
+        return [one for one in larger if one.size < self.value]
+
+    def _look_in(
+        self, box: JointBox, placements: Sequence[Placement], goes_on: Callable[[], bool]
+    ) -> bool:
+        """Look for a motion in a box, with places cut finer; return whether a better one is."""
+        best, looks, learnt = self.best, 0, True
+        while looks == 0 or (learnt and looks < MOST_LOOKS and goes_on()):
+            looks += 1
+            columns, passages, inner = self._space.look(box, placements, self._settings)
+            learnt = self.learn_in(columns, passages, inner) and self.best is best
+        return self.best is not best

@@ -35,6 +35,7 @@ from opl.walls.placement import Placement
 
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
+NEARLY_DONE = 0.8  # of the work allowed: then motions are sought in boxes much larger, too
 
 
 class OptimalSearch:
@@ -69,6 +70,7 @@ class OptimalSearch:
         tracks = TrackSearch(problem, self._sampler, settings.costs, most, push_away)
         self.motions = Motions(space, tracks, settings, fallback, largest)
         self._proven = 0.0
+        self._looks_far = True  # as long as a better motion comes of it
         self._given_up = 0  # boxes without a motion near the bound
         self._hoped = Hope(fallback is not None)
         self.forbidden: Forbidden | None = None  # of collisions, once they are known to matter
@@ -128,6 +130,9 @@ class OptimalSearch:
         self._sampler.mirrored = candidate.mirrored
         allowed = self._settings.missed(self.proof.threshold)
         placements, missed = self._families.hold(box, candidate.keys, self._places, allowed)
+        if placements and self._looks_far and self.work_share >= NEARLY_DONE:
+            self._looks_far = self.motions.look_far_about(box, placements, self._goes_on)
+            self._lower()
         best, collided = self.plan, self.motions.collided
         learnt = self._learn(box, placements, missed[:MOST_ADDED])
         if self.plan is best and self.motions.collided > collided and not self._sampler.collisions:

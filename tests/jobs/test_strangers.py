@@ -1,6 +1,7 @@
 """The random jobs of benchmarks/strangers.py are jobs, and the same seed draws the same ones."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -97,6 +98,16 @@ def test_the_least_motion_is_found_where_it_was_not(drawn, tmp_path):
     job = opl.load_job(tmp_path / "job.yaml")
     plan = search_path(job.search, problem_of(job)).plan
     assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)
+
+
+def test_with_little_work_a_motion_is_sought_in_larger_boxes_before_it_is_done(tmp_path):
+    """The bound rises slowly, and no box proposed meanwhile holds a motion."""
+    draw_job(20261203, 10, 0, tmp_path)
+    job = opl.load_job(tmp_path / "job.yaml")
+    little = replace(job.search.optimal, max_subproblems=3200)
+    plan = search_path(replace(job.search, optimal=little), problem_of(job)).plan
+    assert plan.open_because == "the work allowed for the proof was done before it was complete"
+    assert plan.lower_bound >= 0.92 * plan.path.joint_range_sum
 
 
 @pytest.mark.parametrize(
