@@ -15,11 +15,9 @@ from opl.least.rows import Bulge, Row, broken_at, bulging, shut_edges
 from opl.least.sinking import (
     first_sunk,
     leads_are_deep,
-    past_help,
     places_between,
     struck_between,
     sunk_at,
-    until_sunk,
 )
 from opl.planning.costs import PushAway, track_cost
 from opl.planning.filling import BrokenEdgeError, fill_in
@@ -223,7 +221,7 @@ class BoxNodes:
         most, end = search.checks + MOST_CHECKS, scene.work + MOST_WORK
         while search.checks < most and scene.work < end:
             before, hits = search.checks, dict[Same, Collides]()
-            tries = until_sunk(problem, twins(self.matrices, track, robot), hits)
+            tries = twins(self.matrices, track, robot)
             left = end - scene.work
             outcome = propose_and_check(problem, self.matrices, tries, before, None, left, hits)
             now = outcome.plan if isinstance(outcome, Found) else outcome
@@ -241,11 +239,9 @@ class BoxNodes:
             if not search.sampler.collisions and leads_are_deep(problem, hits):
                 search.collided += 1
                 return None, None, False
-            if sunk is not None:  # other tracks only where neither places nor depth help this one
-                at_place = np.isin(np.arange(len(places)), list(deep))
-                if not (past_help(places, sunk) & ~(at_place[:-1] | at_place[1:])).any():
-                    return None, sunk, False
-            search.collided += int(sunk is None)
+            if sunk is not None:
+                return None, sunk, False
+            search.collided += 1
             if not self._swept:
                 self.sweep()
             nodes_are_free = self.matrices[track.matrix].free[np.arange(len(places)), track.rows]
@@ -254,7 +250,7 @@ class BoxNodes:
                 if struck and learn(struck):
                     return None, None, True
             if (following := self.smoothest()) is None:
-                return None, sunk, False
+                break
             track = following
         return None, None, False
 

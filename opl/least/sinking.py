@@ -9,7 +9,7 @@ more places are taken in.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from opl.cell.workcell import PART, WHEEL
 from opl.geometry.frames import Array
 from opl.least.rows import MOST_PARTS, SMALLEST_EDGE, Bulge
 from opl.motion.motion import Phase
-from opl.planning.open_matrix import Track
 from opl.planning.plan import Same
 from opl.planning.problem import GrindingProblem
 from opl.planning.track_check import Collides
@@ -31,7 +30,6 @@ ALONG = *LEADS, Phase.GRINDING
 USELESS = 0.5  # of what was too deep: where so much still is, sparing depth is of no use
 MORE = 1.25  # times what was too deep: what is spared for it
 HARDLY = 1e-6  # [m] too deep: what can be spared nearly anywhere
-NEAR, SHUT = 0.25, 1e-4  # cutter points, and [m] too deep: what so near places is shut
 BESIDE = 0.1  # cutter points: places so near are as deep
 DEEP = 2e-5  # [m] too deep: what had better not be spared where places help
 
@@ -93,17 +91,6 @@ def struck_between(problem: GrindingProblem, collided: Mapping[Same, Collides]) 
     return struck
 
 
-def past_help(places: Array, sunk: Array) -> np.ndarray:
-    """Return between which places a motion is so deep that neither places nor depth help, (n - 1,).
-
-    It slides over contact positions at which the part cuts into the wheel.
-    """
-    apart = np.diff(places)
-    return np.asarray(
-        ((apart <= SMALLEST_EDGE) & (sunk > DEEP)) | ((apart <= NEAR) & (sunk > SHUT))
-    )
-
-
 def sunk_at(collided: Mapping[Same, Collides]) -> dict[int, float]:
     """Return the columns at which a motion sinks too deep, and at which contact positions."""
     deep = {}
@@ -128,19 +115,6 @@ def first_sunk(problem: GrindingProblem, collided: Mapping[Same, Collides]) -> A
 def leads_are_deep(problem: GrindingProblem, collided: Mapping[Same, Collides]) -> bool:
     """Return whether some motion sinks so deep on its leads that places are of no help."""
     return any((sunk_between(problem, one, LEADS) > DEEP).any() for one in collided.values())
-
-
-def until_sunk(
-    problem: GrindingProblem, tracks: Sequence[Track], collided: Mapping[Same, Collides]
-) -> Iterator[Track]:
-    """Yield tracks, all with the same part at the same places, until the motion of one sinks.
-
-    Those of others would do so as well; what collides is noted in ``collided`` meanwhile.
-    """
-    for track in tracks:
-        if first_sunk(problem, collided) is not None:
-            return
-        yield track
 
 
 def shallower(sunk: Array, before: Array | None) -> bool:

@@ -16,7 +16,6 @@ from opl.least.sinking import (
     HARDLY,
     MORE,
     leads_are_deep,
-    past_help,
     places_between,
     places_for,
     shallower,
@@ -124,12 +123,6 @@ def test_what_sinks_deeper_is_cut_into_more_parts_and_what_hardly_does_is_spared
     assert told == [(1.0, 2.0, 2), (3.0, 4.0, 2)]
     spare = spare_for(places, np.zeros(5), sunk[:1].repeat(4) * [1, 0, 0, 0])
     np.testing.assert_allclose(spare, [HARDLY, HARDLY, 0.0, 0.0, 0.0])
-
-
-def test_deep_between_places_that_are_near_nothing_helps():
-    places, deep = np.array([0.0, 1.0, 1.2, 1.201, 3.0]), np.array([1e-3, 1e-3, 3e-5, 1e-3])
-    assert past_help(places, deep).tolist() == [False, True, True, False]
-    assert not past_help(places, np.array([1e-3, 3e-5, 1e-5, 1e-3])).any()
 
 
 def distances(columns):
