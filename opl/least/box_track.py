@@ -16,7 +16,7 @@ from opl.geometry.frames import Array
 from opl.least.box_nodes import SAMPLES, BoxNodes, Learn, TrackSearch
 from opl.least.passages import NO_PASSAGES, Passages
 from opl.least.postures import Columns
-from opl.least.rows import Bulge, bars, crossed, levels
+from opl.least.rows import Bulge, bars, crossed
 from opl.least.sinking import DEEP, places_for, shallower, spare_for
 from opl.planning.open_matrix import Track
 from opl.planning.plan import Plan
@@ -129,10 +129,9 @@ class BoxTracks:
         inner = cut_at(box.widened(room / 2.0), self._search.sampler.limits)
         t, spacing = in_box.sampled(columns.t, columns.q, columns.free, inner, SAMPLES)
         places, one = columns.places, t[:, :1]
-        level = levels(places, passages.rows, inner, one)
         sampler, crossing = self._search.sampler, crossed(places, passages.crossings, one)
         free = nearest_free(columns, inner) if sampler.collisions else one[:, :0]
-        t = np.concatenate([t, level, crossing, free], axis=1)
+        t = np.concatenate([t, crossing, free], axis=1)
         sampler.work += len(t) * t.shape[1] ** 2 / EDGES_OF_WORK
         at = sampler.at(places, columns.points, columns.placements, t)
         return BoxNodes(self._search, at, passages.rows, inner, spare, spacing)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.least.stretches import held, passed
+from opl.least.stretches import passed
 from opl.search.box import JointBox
 from opl.search.ladder import Ladder
 
@@ -50,21 +50,6 @@ class Bulge:
     last: float
     parts: int
     steep: bool
-
-
-def levels(places: Array, rows: Sequence[Row], box: JointBox, otherwise: Array) -> Array:
-    """Return the contact positions of the rows that a box holds at each place, shape (n, k).
-
-    Where there are fewer than at another place, ``otherwise``, shape (n, 1), is repeated.
-    """
-    counts = np.zeros(len(places), dtype=np.int64)
-    found = np.empty((len(places), 0))
-    if rows:
-        given = np.array(places), _one_after_the_other(rows), box.lower, box.upper, SAME_PLACE, SAME
-        held(*given, counts, found)
-        found = np.repeat(otherwise, counts.max(), axis=1)
-        held(*given, counts, found)
-    return found
 
 
 def _one_after_the_other(rows: Sequence[Row]) -> tuple[Array, Array, np.ndarray, Array]:

@@ -1,4 +1,4 @@
-"""Stretches of rows that a box holds, and edges that pass the rows elsewhere: compiled loops.
+"""Edges that pass rows outside of a box: compiled loops.
 
 A row is places at one contact position with a posture each, as of `opl.least.rows`.
 """
@@ -43,40 +43,6 @@ _ROWS = "Tuple((float64[:,::1],float64[::1],int64[::1],float64[::1]))"
 
 
 @kernel(
-    f"void(float64[::1],{_ROWS},float64[::1],float64[::1],float64,float64,int64[::1],"
-    "float64[:,::1])",
-)
-def held(places, rows, low, high, same, room, counts, found):  # type: ignore[no-untyped-def]
-    """Find the rows that a box holds at places.
-
-    Args:
-        places: The places, increasing, shape (n,).
-        rows: Postures of all rows, one row after the other, shape (k, 6); their places, shape (k,);
-            where each row begins among them, and the end, shape (r + 1,); the contact position of
-            each row, shape (r,).
-        low: Lower faces of the box in [rad], shape (6,).
-        high: Upper faces in [rad], shape (6,).
-        same: As of `stretches`.
-        room: How far beyond the ends of a stretch it still holds a place.
-        counts: Filled with how many there are at each place, shape (n,).
-        found: Filled with the contact positions of the first of them, shape (n, most).
-    """
-    q, places_of_rows, begin, t_of_rows = rows
-    ends = np.empty((len(q), 2))
-    counts[:] = 0
-    for row in range(len(t_of_rows)):
-        own = slice(begin[row], begin[row + 1])
-        count = stretches(q[own], places_of_rows[own], low, high, same, ends)
-        for n in range(count):
-            k = np.searchsorted(places, ends[n, 0] - room)
-            while k < len(places) and places[k] < ends[n, 1] + room:
-                if counts[k] < found.shape[1]:
-                    found[k, counts[k]] = t_of_rows[row]
-                counts[k] += 1
-                k += 1
-
-
-@kernel(
     f"void(float64[::1],float64[:,::1],{_ROWS},float64[::1],float64[::1],float64,float64,"
     "int64[:,:,::1])",
 )
@@ -88,7 +54,9 @@ def passed(places, t, rows, low, high, same, room, counts):  # type: ignore[no-u
     Args:
         places: Places of the nodes, increasing, shape (n,).
         t: Their contact positions, shape (n, m).
-        rows: As of `held`.
+        rows: Postures of all rows, one row after the other, shape (k, 6); their places, shape (k,);
+            where each row begins among them, and the end, shape (r + 1,); the contact position of
+            each row, shape (r,).
         low: Lower faces of the box in [rad], shape (6,).
         high: Upper faces in [rad], shape (6,).
         same: As of `stretches`.

@@ -15,7 +15,6 @@ from opl.least.rows import (
     bars,
     broken_at,
     crossed,
-    levels,
     shut_edges,
 )
 from opl.least.stretches import stretches
@@ -163,27 +162,3 @@ def test_edges_are_shut_where_any_row_between_their_ends_lies_outside_of_the_box
     assert 0 < len(expected) < 59 * 49
     np.testing.assert_array_equal(shut_edges(places, t, rows, box), expected)
     assert not len(shut_edges(places, t, [], box))
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_levels_at_a_place_are_the_rows_that_the_box_holds_there(seed):
-    rng = np.random.default_rng(seed)
-    box = JointBox(np.full(6, -0.4), np.full(6, 0.5))
-    rows = random_rows(rng, 40)
-    places = np.sort(rng.uniform(9.5, 14.0, 60))
-    otherwise = rng.uniform(-4.0, 4.0, (60, 1))
-    found = levels(places, rows, box, otherwise)
-    own = [
-        [
-            row.contact_position
-            for row in rows
-            for first, last in inside(row, box)
-            if first - SAME <= place < last + SAME
-        ]
-        for place in places
-    ]
-    assert found.shape == (60, max(len(levels) for levels in own)) and found.shape[1] > 1
-    for k, wanted in enumerate(own):
-        np.testing.assert_array_equal(found[k, : len(wanted)], wanted)
-        assert (found[k, len(wanted) :] == otherwise[k]).all()
-    assert levels(places, [], box, otherwise).shape == (60, 0)
