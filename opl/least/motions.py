@@ -63,11 +63,10 @@ class Motions:
         """What stopped the motions checked last, as of `TrackSearch`."""
         return self._search.stopped
 
-    def keep(self, found: Plan | None) -> bool:
-        """Keep a motion that is better than the best; return whether it is."""
-        better = found is not None and found.path.joint_range_sum < self.value
-        self.best = found if better else self.best
-        return better
+    def keep(self, found: Plan | None) -> None:
+        """Keep a motion that is better than the best."""
+        if found is not None and found.path.joint_range_sum < self.value:
+            self.best = found
 
     def learn_in(self, columns: Columns, passages: Passages, box: JointBox | None) -> bool:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
@@ -81,10 +80,8 @@ class Motions:
             return learnt
 
         room = self._settings.room(box.size)
-        found = self._tracks.plan(columns, passages, box, room, learn)
-        self.keep(found)
-        learnt = learnt or self._search.sampler.doubts.count > doubts
-        return learnt or (found is None and learn(passages.narrow))
+        self.keep(self._tracks.plan(columns, passages, box, room, learn))
+        return learnt or self._search.sampler.doubts.count > doubts
 
     def look_about(
         self, box: JointBox, placements: Sequence[Placement], goes_on: Callable[[], bool]

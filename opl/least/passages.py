@@ -42,7 +42,6 @@ class Passages:
         rows: Contact positions that it passes only where they lie in the box.
         edges: Ends of the edges that its way crosses in [rad], both free, shape (n, 2, 6).
         crossings: Places, and the contact positions at which its way crosses them, shape (k, 2).
-        narrow: Where its way slides past what may be shut, as of `Rectangle.narrow`.
         open: Whether it may be passed by what leaves the box by the room of a motion.
     """
 
@@ -50,7 +49,6 @@ class Passages:
     rows: list[Row]
     edges: Array
     crossings: Array
-    narrow: list[Bulge]
     open: bool
 
     def grown(self, box: JointBox) -> JointBox:
@@ -60,7 +58,7 @@ class Passages:
         return grown(self.edges, np.ones(self.edges.shape[:2], dtype=bool), box) or box
 
 
-NO_PASSAGES = Passages([], [], np.empty((0, 2, 6)), np.empty((0, 2)), [], True)
+NO_PASSAGES = Passages([], [], np.empty((0, 2, 6)), np.empty((0, 2)), True)
 
 
 class Rectangles:
@@ -152,7 +150,6 @@ class Rectangles:
         """
         walls: list[tuple[float, Chain]] = []
         rows: list[Row] = []
-        narrow: list[Bulge] = []
         edges, crossings = [np.empty((0, 2, 6))], [np.empty((0, 2))]
         passed = True
         for places in self._windows():
@@ -183,10 +180,9 @@ class Rectangles:
             edges.append(rectangle.ends_of(ends))
             crossings.append(rectangle.crossings(ends, box))
             rows += rectangle.rows(up, room)
-            narrow += rectangle.narrow(ends)
         walls.sort(key=lambda one: -one[0])
         hardest = [wall for _, wall in walls]
-        of_ways = np.concatenate(edges), np.concatenate(crossings), narrow
+        of_ways = np.concatenate(edges), np.concatenate(crossings)
         return Passages(hardest, rows, *of_ways, passed)
 
     def take_in(self, walls: Sequence[Chain]) -> Sequence[Chain]:

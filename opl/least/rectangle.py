@@ -14,7 +14,7 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.least.box_columns import ColumnSampler
-from opl.least.rows import MOST_PARTS, SMALLEST_EDGE, Bulge, Row
+from opl.least.rows import Row
 from opl.search.box import JointBox
 from opl.search.in_box import missing, missing_chords, nearest_points
 from opl.search.passage import Corner, edges_missed
@@ -140,17 +140,6 @@ class Rectangle:
         _, share = nearest_points(ends, np.ones(ends.shape[:2], dtype=bool), box)
         share = np.clip(share, 0.0, 1.0)
         return np.stack([self._places[k], t[:, 0] + share * (t[:, 1] - t[:, 0])], axis=1)
-
-    def narrow(self, edges: np.ndarray) -> list[Bulge]:
-        """Return between which places a way slides past what is shut at one of both, or in doubt.
-
-        Edges as of `ends_of`. Cut finer, they tell more.
-        """
-        between = edges[edges[:, 0, 0] != edges[:, 1, 0]]
-        shut = between[~self._free[between[..., 0], between[..., 1]].all(axis=1)]
-        k = np.unique(shut[..., 0].min(axis=1))
-        ends = zip(self._places[k].tolist(), self._places[k + 1].tolist(), strict=True)
-        return [Bulge(a, b, MOST_PARTS, True) for a, b in ends if b - a > SMALLEST_EDGE]
 
     def _at_borders(self, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return indices of the edges with a border on them, and of their borders."""

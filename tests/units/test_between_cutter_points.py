@@ -84,21 +84,3 @@ def test_no_edge_passes_a_row_where_the_part_cuts_into_the_wheel():
     edges = shut_edges(places, np.hstack([below, above]), rows, everywhere)
     assert 2 * 4 + 1 in edges  # from below the row at 0 to above it, where it is shut
     assert not set(range(4)) & set(edges.tolist())  # from place 19.5 to 20 it is not
-
-
-def test_a_way_is_narrow_where_it_slides_past_what_is_shut_at_a_place():
-    _, sampler, columns = near_a_box()
-    side = Side(1, above=(Barrier(20.5, 22.0, 1.0),))
-    image, t = replace(columns.placements[0], side=side), np.linspace(-6.0, 6.0, 7)
-    places = np.array([20.0, 20.5, 21.0])
-    where = np.broadcast_to(t, (3, len(t)))
-    free = sampler.at(places, sampler.there(places), [image], where).free
-    rectangle = Rectangle(sampler, places, t, image)
-    every = [(k, j) for k in range(2) for j in range(len(t))]
-    for k, j in every:
-        way = np.array([[[k, j], [k, j + 1]], [[k, j], [k + 1, j]]])
-        found = [(bulge.first, bulge.last) for bulge in rectangle.narrow(way)]
-        shut = not (free[k, j] and free[k + 1, j])
-        assert found == ([(places[k], places[k + 1])] if shut else [])
-    told = [free[k, j] and free[k + 1, j] for k, j in every]
-    assert any(told) and not all(told)
