@@ -78,10 +78,7 @@ PARTS: Mapping[str, Part] = {
     "sinking": Part(
         "that a motion sinks into the wheel between two places, and how to spare that",
         ("least/sinking.py",),
-        [
-            (box_nodes, "first_sunk", lambda problem, hits: None),
-            (box_nodes, "until_sunk", lambda problem, tracks, hits: iter(tracks)),
-        ],
+        [(box_nodes, "first_sunk", lambda problem, hits: None)],
     ),
     "hope": Part(
         "that boxes larger than one that holds a motion are of no interest",

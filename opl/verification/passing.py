@@ -139,18 +139,20 @@ def _passed(
     freedom = np.where(on_flat, SLIDES, ROLLS)
     share, good = _nearest(wheel, start, end, t, freedom, allowed)
     # beside the end of the flat it may slide at one end of the way and roll at the other
-    beside = np.flatnonzero((np.abs(np.abs(t) - wheel.flat_end) <= AT_EDGE) & ~good)
-    at_edge = np.copysign(wheel.flat_end, t[beside])
-    other = np.where(on_flat[beside], ROLLS, SLIDES)
-    share[beside], good[beside] = _nearest(
-        wheel, start[beside], end[beside], at_edge, other, allowed
-    )
+    beside = np.flatnonzero(np.abs(np.abs(t) - wheel.flat_end) <= AT_EDGE)
     # next to the last contact position it may slide or roll no farther
     ending = np.flatnonzero(np.abs(t) >= wheel.last_position - AT_EDGE)
-    at_last = np.copysign(wheel.last_position, t[ending])
-    stays = np.full(len(ending), STAYS)
-    ended, ends = _nearest(wheel, start[ending], end[ending], at_last, stays, allowed)
-    k, share = np.append(k[good], k[ending[ends]]), np.append(share[good], ended[ends])
+    sides = (
+        (beside, wheel.flat_end, np.where(on_flat[beside], ROLLS, SLIDES)),
+        (ending, wheel.last_position, np.full(len(ending), STAYS)),
+    )
+    passing, shares = [k[good]], [share[good]]
+    for own, last, freedom in sides:
+        there = start[own], end[own], np.copysign(last, t[own])
+        share, good = _nearest(wheel, *there, freedom, allowed)
+        passing.append(k[own[good]])
+        shares.append(share[good])
+    k, share = np.concatenate(passing), np.concatenate(shares)
     return np.asarray(at[k] + share * (at[k + 1] - at[k]))
 
 
