@@ -35,7 +35,7 @@ from opl.walls.placement import Placement
 
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
-NEARLY_DONE = 0.8  # of the work allowed: then motions are sought in boxes much larger, too
+NEARLY_DONE = 0.8  # of the work allowed: from then on motions are sought in larger boxes, too
 
 
 class OptimalSearch:

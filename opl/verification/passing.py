@@ -142,17 +142,17 @@ def _passed(
     beside = np.flatnonzero(np.abs(np.abs(t) - wheel.flat_end) <= AT_EDGE)
     # next to the last contact position it may slide or roll no farther
     ending = np.flatnonzero(np.abs(t) >= wheel.last_position - AT_EDGE)
-    sides = (
+    ends = (
         (beside, wheel.flat_end, np.where(on_flat[beside], ROLLS, SLIDES)),
         (ending, wheel.last_position, np.full(len(ending), STAYS)),
     )
-    passing, shares = [k[good]], [share[good]]
-    for own, last, freedom in sides:
-        there = start[own], end[own], np.copysign(last, t[own])
-        share, good = _nearest(wheel, *there, freedom, allowed)
-        passing.append(k[own[good]])
+    before, shares = [k[good]], [share[good]]
+    for own, t_end, other in ends:
+        at_end = np.copysign(t_end, t[own])
+        share, good = _nearest(wheel, start[own], end[own], at_end, other, allowed)
+        before.append(k[own[good]])
         shares.append(share[good])
-    k, share = np.concatenate(passing), np.concatenate(shares)
+    k, share = np.concatenate(before), np.concatenate(shares)
     return np.asarray(at[k] + share * (at[k + 1] - at[k]))
 
 
