@@ -120,6 +120,8 @@ class BoxTracks:
         if (track := coarse.sweep()) is None:
             return None
         closest, track = coarse.closest(track)
+        if (bulges := closest.bulges(track, box.widened(BULGE * room))) and learn(bulges):
+            return None
         return closest.check(track, learn)[0]
 
     def _sampled(

@@ -91,6 +91,7 @@ def test_uncommon_jobs_repeat_and_are_read_or_refused_by_a_key(tmp_path):
         (20262301, 18, 0),  # sweeps lead past where they do, and then no further
         (20263305, 55, 0),  # the chain in the way of a box begins to collide within micrometres
         (20263305, 17, 1),  # only in larger boxes, with places cut finer
+        (20263601, 15, 0),  # what is swept leaves its box between two places, to be cut finer there
     ],
 )
 def test_the_least_motion_is_found_where_it_was_not(drawn, tmp_path):
