@@ -47,6 +47,7 @@ class OptimalSearch:
         fallback: A motion that is known.
         seams: Where full turns are counted from, where that is known.
         untried: Whether no motion was tried, so that none collided.
+        doubtful: Cutter points at which nothing is known to be free.
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class OptimalSearch:
         fallback: Plan | None,
         seams: Seams | None = None,
         untried: bool = False,
+        doubtful: Sequence[int] = (),
     ) -> None:
         self._problem, self._settings = problem, settings
         robot, points, most = problem.cell.robot, problem.points, Travel(np.inf, np.inf)
@@ -84,7 +86,8 @@ class OptimalSearch:
         hoped = min(self.proof.threshold, self._hoped.guess(0.0, largest))
         self._begin_again(self._new_proof(hoped), hoped)
         first = [0.0, float(len(points) // 2), float(len(points) - 1)]
-        self._add(list(dict.fromkeys(first)))
+        self._add(list(dict.fromkeys([*first, *map(float, doubtful)])))
+        self._end_if_shut()
 
     @property
     def finished(self) -> bool:
@@ -224,11 +227,17 @@ class OptimalSearch:
 
     def _hope_for_less(self) -> None:
         """Begin the proof again: no motion is as good as was hoped; or end it if there is none."""
-        if self.plan is None and not crossed_by_any(self.proof.walls, self.forbidden):
-            self._proven = self.motions.value
+        if self._end_if_shut():
             return
         known = self.motions.value, self.plan is not None, self._work.share_of_proof
         self._begin_again(self.proof, self._hoped.more(self.proof.threshold, *known))
+
+    def _end_if_shut(self) -> bool:
+        """End the proof if a pass cannot cross all of its walls; return whether that is so."""
+        shut = self.plan is None and not crossed_by_any(self.proof.walls, self.forbidden)
+        if shut:
+            self._proven = self.motions.value
+        return shut
 
     def _begin_again(self, proof: BoxProof, threshold: float) -> None:
         """Begin a proof again: boxes up to another size are of interest."""

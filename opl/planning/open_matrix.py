@@ -172,6 +172,13 @@ def open_matrices(problem: GrindingProblem) -> list[OpenMatrix]:
     return matrices
 
 
+def columns_shut(matrices: Sequence[OpenMatrix]) -> list[int]:
+    """Return columns in which no node of any matrix is free: the middle one of each run of them."""
+    shut = np.flatnonzero(~np.any([matrix.free.any(axis=1) for matrix in matrices], axis=0))
+    runs = np.split(shut, np.flatnonzero(np.diff(shut) > 1) + 1)
+    return [int(run[len(run) // 2]) for run in runs if len(run)]
+
+
 def close_collisions(
     matrices: Sequence[OpenMatrix], scene: CollisionScene, leave_some: bool = False
 ) -> None:

@@ -8,6 +8,8 @@ from typing import Protocol
 from opl.geometry.frames import Array
 from opl.search.walls import Piece, Wall
 
+AT_ONCE = 32  # cells looked at
+
 
 class Forbidden(Protocol):
     """Tells which parts of cells are forbidden."""
@@ -35,7 +37,7 @@ class Forbidden(Protocol):
 
 
 def crossed_by_any(walls: Sequence[Wall], forbidden: Forbidden | None) -> bool:
-    """Return whether each pass may cross all its walls in one posture, as far as is known.
+    """Return whether each pass may cross all its walls in one posture, as far as one look tells.
 
     Where a pass may not, there is no motion, whatever full turns joints make.
 
@@ -44,17 +46,30 @@ def crossed_by_any(walls: Sequence[Wall], forbidden: Forbidden | None) -> bool:
         forbidden: Tells where they may not be crossed; None if everywhere.
     """
     flips = range(1 if forbidden is None else forbidden.n_flips)
-    left: dict[int, set[tuple[int, int, int]]] = {}
+    passes: dict[int, list[Wall]] = {}
     for wall in walls:
-        open_in = {
-            (piece.family, piece.side, flip)
-            for piece in wall.pieces
+        passes.setdefault(wall.pass_index, []).append(wall)
+
+    def crossed(wall: Wall, family: int, side: int, flip: int) -> bool:
+        own = (one for one in wall.pieces if (one.family, one.side) == (family, side))
+        return any(forbidden is None or _any_left(forbidden, one, flip) for one in own)
+
+    return all(
+        any(
+            all(crossed(wall, *posture, flip) for wall in own)
+            for posture in {(piece.family, piece.side): None for piece in own[0].pieces}
             for flip in flips
-            if forbidden is None or _any_left(*forbidden.clear(piece, flip, 0, 0, 1))
-        }
-        left[wall.pass_index] = left.get(wall.pass_index, open_in) & open_in
-    return all(left.values())
+        )
+        for own in passes.values()
+    )
 
 
-def _any_left(begin: Array, end: Array) -> bool:
-    return bool((begin <= end).any())
+def _any_left(forbidden: Forbidden, piece: Piece, flip: int) -> bool:
+    """Return whether a part of a piece is not known to be forbidden; looks no further than that."""
+    n = len(piece.pad_low)
+    for first in range(0, n, AT_ONCE):
+        end = min(first + AT_ONCE, n)
+        begin, last = forbidden.clear(piece, flip, first, end, 1)
+        if (begin[first:end] <= last[first:end]).any():
+            return True
+    return False

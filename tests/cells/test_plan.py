@@ -206,16 +206,32 @@ def test_a_search_ends_with_a_plan_or_without_proposals_or_with_its_budget_spent
     assert isinstance(try_recursive(shut, Start.NEAREST, most_checks=1000), Exhausted)
 
 
+class GhostsOfPostures(Ghosts):
+    """Ghosts of which no cell of postures is surely full."""
+
+    def collides_throughout(self, q, turned):
+        return np.zeros(len(q), dtype=bool)
+
+
 def test_a_search_that_finds_nothing_in_its_work_says_so_and_ends(monkeypatch):
     monkeypatch.setattr(searches, "MOST_FIRST_CHECKS", 1)
     job = small_job()
     optimal = replace(job.search.optimal, max_subproblems=1)
-    shut = with_scene(one_row_problem(), collision=Ghosts(np.zeros(6), radius=100.0))
+    shut = with_scene(one_row_problem(), collision=GhostsOfPostures(np.zeros(6), radius=100.0))
     with pytest.raises(NoPathError, match="the 2 best motions of the recursive search") as caught:
         searches.search_path(replace(job.search, optimal=optimal), shut)
     least = caught.value.lower_bound
     assert 0.0 <= least <= plan_recursive(one_row_problem()).path.joint_range_sum
     assert f"below {least:.4f} rad" in str(caught.value)
+
+
+def test_that_all_collides_is_proven_before_any_work_is_done(monkeypatch):
+    monkeypatch.setattr(searches, "MOST_FIRST_CHECKS", 1)
+    job = small_job()
+    optimal = replace(job.search.optimal, max_subproblems=1)
+    shut = with_scene(one_row_problem(), collision=Ghosts(np.zeros(6), radius=100.0))
+    with pytest.raises(NoPathError, match="it is proven that no motion"):
+        searches.search_path(replace(job.search, optimal=optimal), shut)
 
 
 def test_what_a_proof_that_ends_early_leaves_over_goes_to_the_recursive_search(monkeypatch):
@@ -227,7 +243,7 @@ def test_what_a_proof_that_ends_early_leaves_over_goes_to_the_recursive_search(m
     assert wanted.checks > 1
     monkeypatch.setattr(searches, "MOST_FIRST_CHECKS", 1)
 
-    def gives_up_at_once(problem, settings, known, follow, otherwise, seams, untried, beside):
+    def gives_up_at_once(problem, settings, known, follow, otherwise, *others):
         assert known is None
         return otherwise(1e6)
 

@@ -125,6 +125,15 @@ def test_walls_prove_that_a_filleted_box_has_no_motion(drawn, tmp_path):
         search_path(job.search, problem_of(job))
 
 
+def test_a_cutter_point_at_which_nothing_is_free_proves_at_once_that_there_is_no_motion(tmp_path):
+    """A whole pass holds the arm in the floor; what is split without knowing that has no end."""
+    draw_job(20263601, 88, 0, tmp_path)
+    job = opl.load_job(tmp_path / "job.yaml")
+    little = replace(job.search.optimal, max_subproblems=200)
+    with pytest.raises(opl.NoPathError, match="proven: no motion along these passes"):
+        search_path(replace(job.search, optimal=little), problem_of(job))
+
+
 def test_leads_that_sink_between_their_configurations_are_not_tried_one_by_one(tmp_path):
     """A channel that is bowed: its leads run along a wall, as deep in the belt as is allowed."""
     draw_job(20262601, 38, 0, tmp_path, families=["channel", "step"])

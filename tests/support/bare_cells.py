@@ -108,6 +108,10 @@ class Ghosts:
         away = np.linalg.norm(np.asarray(q)[:, None] - self._q, axis=-1)
         return (away < self._radius).any(axis=1)
 
+    def collides_throughout(self, q, turned):
+        away = np.linalg.norm(np.asarray(q)[:, None] - self._q, axis=-1)
+        return (away + np.linalg.norm(turned, axis=-1)[:, None] < self._radius).any(axis=1)
+
     def first_colliding(self, q):
         return next((k for k, one in enumerate(q) if self.collides(one[None])[0]), len(q))
 

@@ -114,6 +114,29 @@ def test_a_pass_needs_one_posture_in_which_all_its_walls_can_be_crossed(drawn):
     assert crossed_by_any(walls, None) == with_pieces
 
 
+def test_a_wall_is_looked_at_as_far_as_its_first_cell_that_is_left_and_no_further():
+    corners = np.outer(np.linspace(0.0, 1.0, 101), np.eye(6)[0])
+    nothing = np.zeros((100, 6))
+    piece = Piece(0, Line(np.eye(4)), np.linspace(0.0, 1.0, 101), corners, nothing, nothing)
+    asked = []
+
+    class Cells(LowCells):
+        def clear(self, piece, flip, first, end, looks):
+            asked.append((flip, first, end))
+            low, high = super().clear(piece, flip, 0, 100, looks)
+            outside = np.arange(100) < first, np.arange(100) >= end
+            high[outside[0] | outside[1]] = 1.0  # what is not asked about is not known
+            return low, high
+
+    walls = [Wall(0, 0.0, (piece,))]
+    assert crossed_by_any(walls, Cells(walls, [(5.0, 5.0)]))  # half of it, for either flip
+    assert asked == [(0, 0, 32), (0, 32, 64)]
+    asked.clear()
+    assert not crossed_by_any(walls, Cells(walls, [(10.0, 10.0)]))
+    assert [flip for flip, _, _ in asked] == [0] * 4 + [1] * 4
+    assert asked[3] == (0, 96, 100)
+
+
 def test_a_box_is_split_between_postures_at_any_wall_where_no_place_is_given():
     # two walls of a pass, each crossed by two postures at the same point
     crossed = ramp(0.0, 0).pieces[0]

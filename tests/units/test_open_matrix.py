@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from opl.planning.open_matrix import OpenMatrix, close_collisions
+from opl.planning.open_matrix import OpenMatrix, close_collisions, columns_shut
 
 keys = st.lists(st.integers(0, 60), unique=True)
 
@@ -44,3 +44,12 @@ def test_a_column_keeps_what_is_near_to_a_collision_where_that_is_all_it_has():
     assert matrix.free.tolist() == [[False, True, True], [False, True, True]]
     close_collisions([matrix], OneJoint(0.7), leave_some=True)
     assert matrix.free.tolist() == [[False, False, True], [False, True, True]]
+
+
+def test_of_each_run_of_columns_without_a_free_node_in_any_matrix_the_middle_one_is_named():
+    first = np.array([[1, 0], [0, 0], [0, 0], [0, 0], [0, 1], [0, 0]], dtype=bool)
+    second = np.array([[0, 0], [0, 0], [0, 0], [0, 0], [0, 0], [0, 0]], dtype=bool)
+    matrices = [OpenMatrix(None, free, None) for free in (first, second)]
+    assert columns_shut(matrices) == [2, 5]
+    second[:, 1] = True
+    assert columns_shut(matrices) == []
