@@ -9,6 +9,8 @@ last cutter point of a pass in that cell.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from opl.cell.collision import CollisionScene
@@ -29,6 +31,27 @@ SPARE = 0.2
 Leads = tuple[Array, ...]
 
 
+@dataclass
+class _OverField:
+    """What is known of a place in one posture over the contact positions of the field.
+
+    Attributes:
+        looked: At which it was looked, shape (n,).
+        shut: At which of these all leads are shut.
+        change: Up to where it is behind each as it is there, where the next one is not alike, in
+            belt units; NaN where that is not known.
+    """
+
+    looked: np.ndarray
+    shut: np.ndarray
+    change: Array
+
+    @classmethod
+    def nothing(cls, n: int) -> _OverField:
+        """Return what is known before any is looked at."""
+        return cls(np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), np.full(n, np.nan))
+
+
 class ShutLeads:
     """Tells where leads are shut.
 
@@ -45,7 +68,7 @@ class ShutLeads:
         self._flips = wrist_flips(problem.cell.robot.arm)
         self._scenes: dict[float, tuple[CollisionScene, CollisionScene]] = {}  # by the reserve
         self._leads: dict[bytes, list[Leads]] = {}  # by the place
-        self._known: dict[tuple[bytes, int, int, float], tuple[bool, Array]] = {}
+        self._known: dict[tuple[bytes, int, int, float], _OverField] = {}
         self._over_field: dict[float, dict[bytes, Seen]] = {}  # by the reserve and places of a lead
         points = problem.points
         for index in range(points.n_passes):
@@ -92,30 +115,43 @@ class ShutLeads:
             t: The contact positions in belt units, shape (n,).
             reserve: What leads leave beyond the clearance needed, in [m].
         """
-        key = T_workpiece_cutter.tobytes(), family, flip, reserve
-        if key[0] not in self._leads:
+        if T_workpiece_cutter.tobytes() not in self._leads:
             return np.zeros(len(t), dtype=bool)
+        positions = self._problem.field.contact_positions
+        key = T_workpiece_cutter.tobytes(), family, flip, reserve
         if key not in self._known:
-            self._known[key] = self._where_shut(T_workpiece_cutter, *key[1:])
-        first, changes = self._known[key]
-        return np.asarray((np.searchsorted(changes, t) % 2 == 1) != first)
+            self._known[key] = _OverField.nothing(len(positions))
+        known = self._known[key]
+        before = np.clip(np.searchsorted(positions, t, side="right") - 1, 0, len(positions) - 2)
+        ends = np.unique(np.concatenate([before, before + 1]))
+        if len(new := ends[~known.looked[ends]]):
+            seen = self._over_field.setdefault(reserve, {})
+            at, shut = (positions, positions), known.shut
+            shut[new] = self._shut(T_workpiece_cutter, *key[1:3], *at, reserve, new, seen)[new]
+            known.looked[new] = True
+        differ = known.shut[before] != known.shut[before + 1]
+        between = np.unique(before[differ])
+        if len(new := between[np.isnan(known.change[between])]):
+            known.change[new] = self._where_it_changes(T_workpiece_cutter, *key[1:], new)
+        behind = differ & (t > known.change[before])
+        return np.asarray(known.shut[before + behind])
 
-    def _where_shut(self, T: Array, family: int, flip: int, reserve: float) -> tuple[bool, Array]:
-        """Return whether leads are shut at the least contact position, and where that changes."""
+    def _where_it_changes(
+        self, T: Array, family: int, flip: int, reserve: float, before: np.ndarray
+    ) -> Array:
+        """Return up to where leads are shut, or are not, behind some positions of the field."""
         t = self._problem.field.contact_positions
-        seen = self._over_field.setdefault(reserve, {})
-        shut = self._shut(T, family, flip, t, t, reserve, seen)
-        before = np.flatnonzero(shut[1:] != shut[:-1])
+        shut = self._known[T.tobytes(), family, flip, reserve].shut[before]
         low, high = t[before], t[before + 1]
-        for _ in range(ROUNDS if len(before) else 0):
+        for _ in range(ROUNDS):
             inside = low + np.arange(1, PARTS)[:, None] / PARTS * (high - low)
             there = self._shut(T, family, flip, inside.ravel(), inside.ravel(), reserve)
-            as_before = there.reshape(inside.shape) == shut[before]
+            as_before = there.reshape(inside.shape) == shut
             # up to the first change
             kept = np.logical_and.accumulate(as_before, axis=0).sum(axis=0)
             ends, own = np.concatenate([low[None], inside, high[None]]), np.arange(len(before))
             low, high = ends[kept, own], ends[kept + 1, own]
-        return bool(shut[0]), np.where(shut[before], high, low)
+        return np.asarray(np.where(shut, high, low))
 
     def _shut(
         self,
@@ -125,19 +161,22 @@ class ShutLeads:
         low: Array,
         high: Array,
         reserve: float,
+        asked: np.ndarray | None = None,
         seen: dict[bytes, Seen] | None = None,
     ) -> np.ndarray:
         """Return in which cells every lead is shut, whatever the contact position, shape (n,).
 
-        What was seen of these contact positions, whatever the posture, is kept if asked for.
+        Of all cells, or of those asked about. What was seen of these contact positions, whatever
+        the posture, is kept if wanted.
         """
         if reserve not in self._scenes:
             scene = self._problem.scene.collision.wider(reserve)
             self._scenes[reserve] = scene, scene.against_surroundings(WHERE_BEGUN)
         shut = np.zeros(len(low), dtype=bool)
+        asked = np.arange(len(low)) if asked is None else asked
         for leads in self._leads.get(T.tobytes(), ()):
             # only those of which all leads before are shut
-            left = np.flatnonzero(~shut)
+            left = asked[~shut[asked]]
             for lead in leads:
                 scenes, posture = self._scenes[reserve], (family, self._flips[flip])
                 given = *posture, low, high, *scenes, SPARE * reserve

@@ -466,6 +466,23 @@ def test_leads_that_leave_the_reach_at_once_are_shut_up_to_its_end():
     assert asked > 3
 
 
+def test_leads_are_looked_at_where_they_are_asked_about_and_are_the_same_in_any_order():
+    problem = in_a_narrow_cell(one_row())
+    T = problem.points.Ts_workpiece_cutter[0]
+    last = problem.cell.wheel.last_position
+    t = np.concatenate([np.linspace(-last, last, 801), problem.field.contact_positions])
+    at_once = ShutLeads(problem)
+    wanted = [at_once.at(T, branch, 0, t) for branch in range(4)]
+    assert any(shut.any() and not shut.all() for shut in wanted)
+    in_groups = ShutLeads(problem)
+    for group in np.array_split(np.random.default_rng(7).permutation(len(t)), 60):
+        for branch in range(4):
+            assert (in_groups.at(T, branch, 0, t[group]) == wanted[branch][group]).all()
+    few = ShutLeads(problem)
+    few.at(T, 0, 0, t[400:403])
+    assert 0.0 < few.work < 0.1 * at_once.work
+
+
 def test_every_motion_crosses_a_chain_within_the_pads_of_its_pieces():
     problem = one_row()
     cell, points = problem.cell, problem.points
