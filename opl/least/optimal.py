@@ -174,15 +174,11 @@ class OptimalSearch:
         self._hope(inner)
         allowed = self._settings.missed(self.proof.threshold)
         known, new = columns.missed(box, self._places, allowed)
-        if not missed:
-            shut = not passages.open
-            if self.proof.clear(known, chains=shut) or self.proof.split_keys(known):
-                return True
+        if not missed and self.proof.clear(known, chains=not passages.open):
+            return True
         missed = missed or new[:MOST_ADDED]
         if not missed and not passages.walls:
-            # the box meets the walls that it cannot pass, but perhaps not with these images
-            split = not passages.open and self.proof.split_keys()
-            return split or self._learn_in(columns, passages, inner)
+            return self._learn_in(columns, passages, inner)
         fits = not missed or (inner is not None and inner.size < most)
         if passages.open and fits and self._work.left_for_early:
             best = self.plan

@@ -210,21 +210,6 @@ class BoxProof:
             looks += [(closest, [n]) for n in own if met[n] == 1]
         return any(self._cells.cleared(spans[np.isin(spans[:, WALL], n)], at) for at, n in looks)
 
-    def split_keys(self, places: Sequence[float] | None = None) -> bool:
-        """Split the last subproblem between keys at a wall, if it can: of some places, or of all.
-
-        The box meets the walls of its pass, but perhaps not with one key. One part is put back.
-        """
-        node = self._kept
-        for number, wall in enumerate(self.walls):
-            own = node.spans[node.spans[:, WALL] == number, KEY]
-            if (places is None or wall.place in places) and len(own) and (own != own[0]).any():
-                one, other = parts(node, self._cells, number)
-                self._open.leave([self._part(node, other)])
-                self._kept = self._part(node, one)
-                return True
-        return False
-
     def put_back(self) -> None:
         """Leave the subproblem of the last candidate open."""
         self._open.leave([self._kept])

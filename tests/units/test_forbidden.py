@@ -137,22 +137,6 @@ def test_a_wall_is_looked_at_as_far_as_its_first_cell_that_is_left_and_no_furthe
     assert asked[3] == (0, 96, 100)
 
 
-def test_a_box_is_split_between_postures_at_any_wall_where_no_place_is_given():
-    # two walls of a pass, each crossed by two postures at the same point
-    crossed = ramp(0.0, 0).pieces[0]
-    walls = [ramp(0.0, 0)]
-    walls += [Wall(1, at, (crossed, replace(crossed, family=1))) for at in (1.0, 2.0)]
-    proof = BoxProof(lambda _: IMAGES[:1], lambda *_: (), 3.0, 1e-4)
-    for wall in walls:
-        proof.add(wall)
-    assert len(proposed(proof).keys[1]) == 2
-    assert not proof.split_keys([0.5])
-    assert proof.split_keys()
-    proof.put_back()
-    candidate = proof.take_next()
-    assert len(candidate.keys[1]) == 1
-
-
 class OnlySeenClosely(LowCells):
     """Forbids what `LowCells` does of a piece once it is looked at so closely, and notes where."""
 
