@@ -39,7 +39,7 @@ def plan_optimal(
     otherwise: Callable[[float], Plan | None] | None = None,
     seams: Seams | None = None,
     untried: bool = False,
-    doubtful: Sequence[int] = (),
+    without_nodes: Sequence[int] = (),
     beside: Beside | None = None,
 ) -> Plan:
     """Find the collision-free motion with the least joint range sum, the smoothest of these.
@@ -53,7 +53,7 @@ def plan_optimal(
             none, given how many units of work are left for that.
         seams: Where full turns are counted from, where that is known.
         untried: Whether no motion was tried: else where none is known, those tried collide.
-        doubtful: Cutter points at which nothing is known to be free.
+        without_nodes: Cutter points at which no node is free: walls to begin with.
         beside: What may work beside this process, if anything.
 
     Returns:
@@ -62,7 +62,7 @@ def plan_optimal(
     Raises:
         NoMotionError: If no motion was known and none was found.
     """
-    search = OptimalSearch(problem, settings, fallback, seams, untried, doubtful)
+    search = OptimalSearch(problem, settings, fallback, seams, untried, without_nodes)
     widest = float((problem.cell.robot.upper - problem.cell.robot.lower).sum())
     share = 1.0 if otherwise is None else 1.0 - OTHERWISE_SHARE
 

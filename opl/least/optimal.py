@@ -47,7 +47,7 @@ class OptimalSearch:
         fallback: A motion that is known.
         seams: Where full turns are counted from, where that is known.
         untried: Whether no motion was tried, so that none collided.
-        doubtful: Cutter points at which nothing is known to be free.
+        without_nodes: Cutter points at which no node is free: walls to begin with.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class OptimalSearch:
         fallback: Plan | None,
         seams: Seams | None = None,
         untried: bool = False,
-        doubtful: Sequence[int] = (),
+        without_nodes: Sequence[int] = (),
     ) -> None:
         self._problem, self._settings = problem, settings
         robot, points, most = problem.cell.robot, problem.points, Travel(np.inf, np.inf)
@@ -86,7 +86,7 @@ class OptimalSearch:
         hoped = min(self.proof.threshold, self._hoped.guess(0.0, largest))
         self._begin_again(self._new_proof(hoped), hoped)
         first = [0.0, float(len(points) // 2), float(len(points) - 1)]
-        self._add(list(dict.fromkeys([*first, *map(float, doubtful)])))
+        self._add(list(dict.fromkeys([*first, *map(float, without_nodes)])))
         self._end_if_shut()
 
     @property

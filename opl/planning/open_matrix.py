@@ -172,7 +172,7 @@ def open_matrices(problem: GrindingProblem) -> list[OpenMatrix]:
     return matrices
 
 
-def columns_shut(matrices: Sequence[OpenMatrix]) -> list[int]:
+def columns_without_nodes(matrices: Sequence[OpenMatrix]) -> list[int]:
     """Return columns in which no node of any matrix is free: the middle one of each run of them."""
     shut = np.flatnonzero(~np.any([matrix.free.any(axis=1) for matrix in matrices], axis=0))
     runs = np.split(shut, np.flatnonzero(np.diff(shut) > 1) + 1)

@@ -21,7 +21,7 @@ from opl.planning.multi_start import (
     plan_recursive,
     try_recursive,
 )
-from opl.planning.open_matrix import columns_shut
+from opl.planning.open_matrix import columns_without_nodes
 from opl.planning.plan import Exhausted, Found, OutOfBudget, Plan
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import cut_off_in, explain, leads_stop, no_path
@@ -118,9 +118,9 @@ def _search_range(
     try:
         counted_from = None if seams is None else seams.value()
         untried = isinstance(last, OutOfBudget) and last.checks == 0  # too many points, most likely
-        doubtful = columns_shut(in_turns.matrices) if known is None else []
+        shut = columns_without_nodes(in_turns.matrices) if known is None else []
         best = plan_optimal(
-            problem, search.optimal, known, follow, others, counted_from, untried, doubtful, beside
+            problem, search.optimal, known, follow, others, counted_from, untried, shut, beside
         )
     except NoMotionError as error:
         least, proven, spent = error.lower_bound, error.proven, error.spent

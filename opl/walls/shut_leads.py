@@ -126,22 +126,31 @@ class ShutLeads:
         ends = np.unique(np.concatenate([before, before + 1]))
         if len(new := ends[~known.looked[ends]]):
             seen = self._over_field.setdefault(reserve, {})
-            at, shut = (positions, positions), known.shut
-            shut[new] = self._shut(T_workpiece_cutter, *key[1:3], *at, reserve, new, seen)[new]
+            field = positions, positions, reserve
+            known.shut[new] = self._shut(T_workpiece_cutter, family, flip, *field, new, seen)[new]
             known.looked[new] = True
         differ = known.shut[before] != known.shut[before + 1]
         between = np.unique(before[differ])
         if len(new := between[np.isnan(known.change[between])]):
-            known.change[new] = self._where_it_changes(T_workpiece_cutter, *key[1:], new)
+            given = family, flip, reserve, new, known.shut[new]
+            known.change[new] = self._where_it_changes(T_workpiece_cutter, *given)
         behind = differ & (t > known.change[before])
         return np.asarray(known.shut[before + behind])
 
     def _where_it_changes(
-        self, T: Array, family: int, flip: int, reserve: float, before: np.ndarray
+        self,
+        T: Array,
+        family: int,
+        flip: int,
+        reserve: float,
+        before: np.ndarray,
+        shut: np.ndarray,
     ) -> Array:
-        """Return up to where leads are shut, or are not, behind some positions of the field."""
+        """Return up to which contact positions it stays as it is at some of the field, shape (n,).
+
+        Whether leads are shut there is given, and that this is not so at the next one.
+        """
         t = self._problem.field.contact_positions
-        shut = self._known[T.tobytes(), family, flip, reserve].shut[before]
         low, high = t[before], t[before + 1]
         for _ in range(ROUNDS):
             inside = low + np.arange(1, PARTS)[:, None] / PARTS * (high - low)

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from opl.planning.open_matrix import OpenMatrix, close_collisions, columns_shut
+from opl.planning.open_matrix import OpenMatrix, close_collisions, columns_without_nodes
 
 keys = st.lists(st.integers(0, 60), unique=True)
 
@@ -50,6 +50,6 @@ def test_of_each_run_of_columns_without_a_free_node_in_any_matrix_the_middle_one
     first = np.array([[1, 0], [0, 0], [0, 0], [0, 0], [0, 1], [0, 0]], dtype=bool)
     second = np.array([[0, 0], [0, 0], [0, 0], [0, 0], [0, 0], [0, 0]], dtype=bool)
     matrices = [OpenMatrix(None, free, None) for free in (first, second)]
-    assert columns_shut(matrices) == [2, 5]
+    assert columns_without_nodes(matrices) == [2, 5]
     second[:, 1] = True
-    assert columns_shut(matrices) == []
+    assert columns_without_nodes(matrices) == []
