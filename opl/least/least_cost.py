@@ -21,14 +21,17 @@ from opl.search.way_cells import WayPrices
 from opl.walls.barriers import all_sides
 from opl.walls.columns import ColumnWalls
 from opl.walls.images import Images, seams_of
+from opl.walls.shut_leads import ShutLeads
 from opl.walls.sides import Side
 
 FEWEST = 5  # cutter points of a pass that are looked at first
-MOST_WORK = 3e7  # ways from cell to cell that are looked at, of all passes and rounds
-CLOSE = 0.01  # fraction of it by which a bound may stay below what is known to be attained
+MOST_WORK = 3000.0  # units, of all passes and rounds
+WAYS_OF_WORK = 7000.0  # from cell to cell that cost a unit to look at
+CLOSE = 0.002  # fraction of it by which a bound may stay below what is known to be attained
 ROUNDS = 8  # of cutting cells, before more cutter points are taken in
-SETTLED = 0.005  # by which it may stay below ways over postures: then no more is cut either
+SETTLED = 0.002  # by which it may stay below ways over postures: then no more is cut either
 LITTLE = 0.25  # of what more cutter points may add at the most: so as well
+WIDE = 0.3  # of the widest cell that matters: those that are cut
 HALFWAY = 0.5  # to what is attained: cells are cut through which ways cost no more than that
 SLACK = 1e-9  # rounding of the sums that make a bound, as a fraction of it
 
@@ -57,14 +60,16 @@ def least_cost(
     sides = all_sides(problem)
     walls = ColumnWalls(problem.cell, problem.scene.part, problem.points, images, sides)
     wanted = np.full(problem.points.n_passes, np.inf) if worth is None else worth
-    total = 0.0
+    leads, total, left = ShutLeads(problem), 0.0, MOST_WORK
     for index, most in enumerate(wanted.tolist()):
-        ended, bound = False, 0.0
-        for bound in _PassBound(problem, walls, sides[index], travel, time, index).rising(most):
+        ended, bound, share = False, 0.0, left / (len(wanted) - index)
+        of_pass = _PassBound(problem, walls, leads, sides[index], travel, time, index, share)
+        for bound in of_pass.rising(most):
             ended = not goes_on((total + bound) * (1.0 - SLACK))
             if ended:
                 break
         total += bound
+        left -= share - of_pass.left
         if ended:
             break
     return total * (1.0 - SLACK)
@@ -76,25 +81,29 @@ class _PassBound:
     Args:
         problem: What is to be planned.
         walls: Encloses its cutter points.
+        leads: Tells where it cannot begin or end.
         sides: Those that it may take.
         travel: Price of a radian of joint travel.
         time: Price of a second.
         index: The pass.
+        left: Units of work that may be done.
     """
 
     def __init__(
         self,
         problem: GrindingProblem,
         walls: ColumnWalls,
+        leads: ShutLeads,
         sides: Sequence[Side],
         travel: float,
         time: float,
         index: int,
+        left: float,
     ) -> None:
-        self._problem, self._walls, self._sides = problem, walls, sides
+        self._problem, self._walls, self._leads, self._sides = problem, walls, leads, sides
         self._travel, self._time = travel, time
         self._columns = np.flatnonzero(problem.points.pass_index == index)
-        self._left = MOST_WORK / problem.points.n_passes  # ways that may be looked at
+        self.left = left
 
     def rising(self, worth: float) -> Iterator[float]:
         """Yield the bound as it rises, up to what is worth knowing."""
@@ -108,18 +117,17 @@ class _PassBound:
             places, families = self._with_more(places, families, count)
             for _ in range(ROUNDS):
                 families = [one for one in families if one.reach(len(places))]
-                self._left -= sum(one.in_columns(len(places)).edges for one in families)
-                if self._left < 0.0:
-                    return
                 prices = self._prices(places)
                 families = [self._bounded(len(places), prices, one) for one in families]
                 least = min((float(one.least.min()) for one in families), default=np.inf)
                 proven = max(proven, min(ceiling, least))
                 yield proven
-                if proven >= ceiling * (1.0 - CLOSE):
+                if proven >= ceiling * (1.0 - CLOSE) or self.left < 0.0:
                     return
                 # more than the ceiling is not worth knowing
-                families = [self._seen(one.chosen(one.least < ceiling)) for one in families]
+                families = [one.chosen(one.least < ceiling) for one in families]
+                likely = proven + HALFWAY * (ceiling - proven)
+                families = [self._seen(places, one, likely) for one in families]
                 of_each = [self._attained(len(places), prices, one) for one in families]
                 attained = min(of_each, default=np.inf)
                 adds = count < len(self._columns) and np.isfinite(ceiling)
@@ -144,25 +152,50 @@ class _PassBound:
         matters = cells.least < most
         if np.isinf(attained):
             matters &= cells.seen == STRUCK
+        widest = cells.widths[matters].max(initial=0.0)
+        matters &= cells.widths >= WIDE * widest
         return cut(self._problem, places, cells, matters)
 
-    def _seen(self, cells: PostureCells) -> PostureCells:
-        """Return cells with what is seen of collisions, but for those struck all over."""
-        at = np.flatnonzero(cells.known & (cells.seen == UNSEEN))
-        middle, pads = cells.q[at].mean(axis=1), np.maximum(cells.pad_high, -cells.pad_low)[at]
-        turned = np.abs(np.diff(cells.q[at], axis=1)[:, 0]) / 2.0 + pads
+    def _seen(self, places: np.ndarray, cells: PostureCells, most: float) -> PostureCells:
+        """Return cells with what is seen of collisions and leads, but for those struck all over.
+
+        It is looked at cells through which ways may cost less than so much.
+        """
+        scene, begun = self._problem.scene, self._problem.scene.work + self._leads.work
+        at = np.flatnonzero(cells.known & (cells.seen == UNSEEN) & (cells.least < most))
         struck, surely = np.ones((2, len(at)), dtype=bool)
-        scene = self._problem.scene.collision
-        for sign, shift in self._walls.images.flips:
-            q = middle * sign + shift
-            struck[struck] = scene.collides(q[struck])
-            surely &= struck
-            surely[surely] = scene.collides_throughout(q[surely], turned[surely])
+        for flip in range(len(self._walls.images.flips)):
+            there, all_over = self._struck(places, cells, at[struck], flip)
+            surely[struck] &= all_over
+            struck[struck] = there
+        surely &= struck
         seen = cells.seen.copy()
         seen[at] = np.where(struck, STRUCK, FREE)
         kept = np.ones(len(seen), dtype=bool)
         kept[at] = ~surely
+        self.left -= scene.work + self._leads.work - begun
         return replace(cells, seen=seen).chosen(kept)
+
+    def _struck(
+        self, places: np.ndarray, cells: PostureCells, at: np.ndarray, flip: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return which of some cells are struck in their middle with a flip, and which all over.
+
+        The robot collides there, or the pass cannot begin or end there.
+        """
+        scene, (sign, shift) = self._problem.scene.collision, self._walls.images.flips[flip]
+        q, pads = cells.q[at].mean(axis=1), np.maximum(cells.pad_high, -cells.pad_low)[at]
+        q, turned = q * sign + shift, np.abs(np.diff(cells.q[at], axis=1)[:, 0]) / 2.0 + pads
+        there = scene.collides(q)
+        all_over = there.copy()
+        all_over[there] = scene.collides_throughout(q[there], turned[there])
+        for end in (0, len(places) - 1):
+            own = np.flatnonzero((cells.column[at] == end) & ~all_over)
+            T = self._problem.points.frames_at(places[[end]].astype(float))[0]
+            sure, shut = self._leads.surely(T, cells.family, flip, *cells.t[at[own]].T)
+            there[own] |= shut
+            all_over[own] |= sure
+        return there, all_over
 
     def _counts(self) -> Iterator[int]:
         """Yield how many cutter points are looked at, more and more, all at last."""
@@ -200,8 +233,10 @@ class _PassBound:
     def _bounded(self, n_places: int, prices: WayPrices, family: PostureCells) -> PostureCells:
         """Return cells with what ways through them cost at the least."""
         cells = family.in_columns(n_places)
-        potential = cheapest_over_ends(cells, replace(prices, time=0.0))
-        return replace(family, least=cheapest_ways(cells, prices, potential))
+        potential, over_ends = cheapest_over_ends(cells, replace(prices, time=0.0))
+        least, looked = cheapest_ways(cells, prices, potential)
+        self.left -= (over_ends + looked) / WAYS_OF_WORK
+        return replace(family, least=least)
 
     def _attained(self, n_places: int, prices: WayPrices, family: PostureCells) -> float:
         """Return what the cheapest way over postures costs, of cells that do not seem struck.
@@ -212,5 +247,6 @@ class _PassBound:
         if not free.reach(n_places):
             return np.inf
         cells = free.in_columns(n_places)
-        over = cheapest_over_ends(cells, prices)
+        over, looked = cheapest_over_ends(cells, prices)
+        self.left -= looked / WAYS_OF_WORK
         return float(over[cells.ends.first[-2] :].min())

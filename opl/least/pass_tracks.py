@@ -27,7 +27,7 @@ from opl.walls.shut_leads import RESERVE, ShutLeads
 
 # cutter points of a pass that are looked at first: the more, the more of a staircase the first
 # track is; the fewer, the less it knows of what lies between
-FEW, FEWEST = 17, 5
+FEWS = 17, 5, 2
 WIDER = 1.0, 4.0, 16.0  # times as far to either side, where nothing nearer is free
 CLOSER = 0.25  # times as far to either side next, where the track hardly gets cheaper
 HARDLY = 0.0005  # of its cost
@@ -47,14 +47,12 @@ class PassTracks:
 
     Attributes:
         prices: The same.
-        minds_leads: Whether passes begin and end only where their leads exist, as far as is seen.
     """
 
     def __init__(self, problem: GrindingProblem, prices: CostWeights) -> None:
         self._problem, self.prices = problem, prices
         self._scene = problem.scene.collision.wider(RESERVE)
         self._leads = ShutLeads(problem)
-        self.minds_leads = False
 
     def about(
         self,
@@ -85,7 +83,7 @@ class PassTracks:
         return track
 
     def over_few(
-        self, index: int, count: int = FEW, box: JointBox | None = None
+        self, index: int, count: int = FEWS[0], box: JointBox | None = None
     ) -> dict[int, OwnTrack]:
         """Return the cheapest tracks over so many cutter points of a pass, by IK branch.
 
@@ -166,14 +164,15 @@ class PassTracks:
     def _cheapest(
         self, places: Array, ik_branch: int, t: Array, q: Array, box: JointBox | None
     ) -> OwnTrack | None:
-        """Return the cheapest track over some nodes of one pass that is free at all of its own."""
+        """Return the cheapest track over some nodes of one pass that is free at all of its own.
+
+        It begins and ends where the pass can, as far as is seen.
+        """
         branches = np.full(len(places), ik_branch)
         problem, nodes = self._over(places, branches, t, q)
         (matrix,) = open_matrices(problem)
         if box is not None:
             matrix.free &= matrix.free_inside(box)
-        if self.minds_leads:
-            self._leave_out_leads(places, ik_branch, t, matrix.free)
         cost = track_cost(problem, nodes, self.prices, matrix.free)
         while True:
             found = smoothest(matrix.ladder, matrix.blocked_edges, matrix.free, cost)
@@ -181,19 +180,23 @@ class PassTracks:
                 return None
             along = nodes.along(found.rows)
             struck = np.flatnonzero(self._scene.collides(along)).tolist()
-            if not struck:
-                return OwnTrack(places, branches, nodes.t_along(found.rows), along, found.cost)
             for column in struck:
                 matrix.sweep(self._scene, column, "collides")
+            shut = False
+            for end in (0, len(places) - 1):
+                here = places[end], ik_branch
+                if self._leads_shut(*here, t[end, found.rows[[end]]]).any():
+                    rows, shut = np.flatnonzero(matrix.free[end]), True
+                    matrix.free[end, rows] = ~self._leads_shut(*here, t[end, rows])
+            if not struck and not shut:
+                return OwnTrack(places, branches, nodes.t_along(found.rows), along, found.cost)
 
-    def _leave_out_leads(self, places: Array, ik_branch: int, t: Array, free: np.ndarray) -> None:
-        """Leave out nodes, flags of shape (n, m), where the pass cannot begin or end."""
-        points, last = self._problem.points, len(places) - 1
+    def _leads_shut(self, place: float, ik_branch: int, t: Array) -> np.ndarray:
+        """Return at which contact positions a pass cannot begin or end at a place, shape (n,)."""
         flips = len(wrist_flips(self._problem.cell.robot.arm))
         family, flip = (ik_branch % 4, ik_branch // 4) if flips > 1 else (ik_branch, 0)
-        for column in (0, last):
-            T, rows = points.frames_at(places[[column]])[0], np.flatnonzero(free[column])
-            free[column, rows] = ~self._leads.at(T, family, flip, t[column, rows])
+        T = self._problem.points.frames_at(np.array([place]))[0]
+        return self._leads.at(T, family, flip, t, 0.0)
 
 
 def _spread(columns: np.ndarray, most: int) -> np.ndarray:

@@ -54,6 +54,12 @@ class PostureCells:
             (self.pad_high < UNKNOWN).all(axis=1) & (self.pad_low > -UNKNOWN).all(axis=1)
         )
 
+    @property
+    def widths(self) -> Array:
+        """How far joints turn over each, and pads are apart, all together in [rad], shape (n,)."""
+        turned = np.abs(self.q[:, 1] - self.q[:, 0])
+        return np.asarray((turned + self.pad_high - self.pad_low).sum(axis=1))
+
     def reach(self, n_columns: int) -> bool:
         """Return whether each of so many columns has a cell."""
         return len(np.unique(self.column)) == n_columns
@@ -131,27 +137,27 @@ def cut(
     known = cells.known & chosen
     parts = np.where(known, PARTS, 1)
     source = np.repeat(np.arange(len(parts)), parts)
-    number = np.arange(len(source)) - np.repeat(np.cumsum(parts) - parts, parts)
-    ends = (number[:, None] + np.array([0, 1])) / parts[source][:, None]
-    t = cells.t[source]
-    t = t[:, :1] * (1.0 - ends) + t[:, 1:] * ends
-    chord = cells.q[source]
-    chord = chord[:, :1] * (1.0 - ends[..., None]) + chord[:, 1:] * ends[..., None]
-    frames = problem.points.Ts_workpiece_cutter[places[cells.column[source]]]
-    Ts_base_flange = problem.cell.Ts_base_flange(t, frames[:, None])
-    q = inverse_kinematics(problem.cell.robot.arm, Ts_base_flange)[:, :, cells.family]
-    q = q + 2.0 * np.pi * np.round((chord - q) / (2.0 * np.pi))
-    whole = known[source]
-    finer = np.where(whole, PARTS**2, 1)[:, None]
-    pad_low = (cells.pad_low[source] + ROUND_OFF) / finer - ROUND_OFF
-    pad_high = (cells.pad_high[source] - ROUND_OFF) / finer + ROUND_OFF
-    q = np.where(whole[:, None, None], q, chord)
+    new = np.flatnonzero(known[source])
+    share = np.tile(np.arange(PARTS), np.count_nonzero(known))[:, None] + np.array([0, 1])
+    share = share / PARTS
+    t, q = cells.t[source], cells.q[source]
+    pad_low, pad_high = cells.pad_low[source], cells.pad_high[source]
+    t[new] = t[new, :1] * (1.0 - share) + t[new, 1:] * share
+    chord = q[new, :1] * (1.0 - share[..., None]) + q[new, 1:] * share[..., None]
+    frames = problem.points.Ts_workpiece_cutter[places[cells.column[source[new]]]]
+    Ts_base_flange = problem.cell.Ts_base_flange(t[new], frames[:, None])
+    there = inverse_kinematics(problem.cell.robot.arm, Ts_base_flange)[:, :, cells.family]
+    q[new] = there + 2.0 * np.pi * np.round((chord - there) / (2.0 * np.pi))
+    pad_low[new] = (pad_low[new] + ROUND_OFF) / PARTS**2 - ROUND_OFF
+    pad_high[new] = (pad_high[new] - ROUND_OFF) / PARTS**2 + ROUND_OFF
     # no posture at an end of a cell whose pads are known would be a contradiction; stay safe
-    lost = np.any(np.isnan(q), axis=(1, 2))
-    pad_low[lost], pad_high[lost] = -UNKNOWN, UNKNOWN
-    q[lost] = chord[lost]
+    lost = np.isnan(q[new]).any(axis=(1, 2))
+    pad_low[new[lost]], pad_high[new[lost]] = -UNKNOWN, UNKNOWN
+    q[new[lost]] = chord[lost]
+    seen = cells.seen[source]
+    seen[new] = UNSEEN
     at = places[cells.column[source]]
     return PostureCells(
-        cells.family, cells.side, cells.column[source], t, q, pad_low, pad_high,
-        np.where(whole, UNSEEN, cells.seen[source]).astype(np.int8), cells.least[source],
+        cells.family, cells.side, cells.column[source], t, q, pad_low, pad_high, seen,
+        cells.least[source],
     ).chosen(~cells.side.excludes(at, at, t[:, 0], t[:, 1]))  # fmt: skip

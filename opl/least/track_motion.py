@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.geometry.toolpath import CutterPoints
 from opl.least.own_track import SAMPLES, OwnTrack, nodes_about
 from opl.least.sinking import first_sunk, places_for
 from opl.planning.costs import track_cost
@@ -25,22 +23,7 @@ MOST_CHECKS = 12
 MOST_WORK = 4000.0  # units
 
 
-@dataclass(frozen=True)
-class Stopped:
-    """No motion of a track, or near to it, was found.
-
-    Attributes:
-        places: Those of the track, and others between them where the part sinks too deep.
-        at_ends: Whether a pass cannot begin or end where it was tried.
-    """
-
-    places: Array
-    at_ends: bool
-
-
-def motion_of_track(
-    problem: GrindingProblem, prices: CostWeights, track: OwnTrack
-) -> Plan | Stopped:
+def motion_of_track(problem: GrindingProblem, prices: CostWeights, track: OwnTrack) -> Plan | Array:
     """Return the motion of a track, or where that is not free, of the cheapest near to it that is.
 
     Any image of it: full turns and flips of the wrist that the whole motion has.
@@ -51,14 +34,15 @@ def motion_of_track(
         track: Through all cutter points.
 
     Returns:
-        The plan, or what stopped it.
+        The plan; the places of the track, and others between them where the part sinks too deep, if
+        there is none.
     """
     t, q = nodes_about(problem, track)
     flips = enumerate(wrist_flips(problem.cell.robot.arm))
     moves = [(track.ik_branch ^ (4 * number), *flip) for number, flip in flips]
     nodes = everywhere(problem.cell, t, q, ~np.isnan(q[..., 0]), moves)
     if not nodes:
-        return Stopped(track.places, False)
+        return track.places
     points = problem.points.at_places(track.places)
     near = problem.over_nodes(track.places, points, t, nodes)
     matrices = open_matrices(near)
@@ -73,14 +57,7 @@ def motion_of_track(
             np.linspace(one.first, one.last, one.parts + 1) for one in places_for(places, sunk)
         ]
         places = np.unique(np.concatenate([places, *wanted]))
-    met = {column for matrix in matrices for column, _ in matrix.causes}
-    return Stopped(places, not met.isdisjoint(_ends(points)))
-
-
-def _ends(points: CutterPoints) -> set[int]:
-    """Return the first and the last column of each pass."""
-    changes = np.flatnonzero(np.diff(points.pass_index))
-    return {0, *changes.tolist(), *(changes + 1).tolist(), len(points) - 1}
+    return places
 
 
 def _cheapest_first(

@@ -16,8 +16,8 @@ import numpy as np
 
 from opl.least.least_cost import least_cost
 from opl.least.own_track import OwnTrack, joined, tracks_of
-from opl.least.pass_tracks import FEW, FEWEST, PassTracks
-from opl.least.track_motion import Stopped, motion_of_track
+from opl.least.pass_tracks import FEWS, PassTracks
+from opl.least.track_motion import motion_of_track
 from opl.motion.figures import figures_of_path
 from opl.planning.plan import ObjectiveValue, Plan
 from opl.planning.problem import GrindingProblem
@@ -119,18 +119,17 @@ class _Proposal:
 def _motion(problem: GrindingProblem, tracks: PassTracks, proposal: _Proposal) -> Plan | None:
     """Return the motion of a proposal, or of one near to it where that is stopped, if any.
 
-    Through more places where the part sinks between them, from where passes can begin and end.
+    Through more places where the part sinks between them.
     """
     passes = [tracks.through_places(track, proposal.box) for track in proposal.passes]
     for _ in range(MOST_TURNS):
         track = joined(passes)
         found = motion_of_track(problem, tracks.prices, track)
-        if not isinstance(found, Stopped):
+        if isinstance(found, Plan):
             return found
-        if len(found.places) == len(track.places) and (tracks.minds_leads or not found.at_ends):
+        if len(found) == len(track.places):
             break
-        tracks.minds_leads |= found.at_ends
-        more = [tracks.with_places(track, found.places, proposal.box) for track in passes]
+        more = [tracks.with_places(track, found, proposal.box) for track in passes]
         passes = [track for track in more if track is not None]
         if len(passes) < len(more):
             break
@@ -177,8 +176,8 @@ def _on_branches(
 ) -> list[list[OwnTrack | None]]:
     """Return tracks of all passes: cheap ones on one IK branch, and the cheapest on several."""
     passes = range(n_passes)
-    # in boxes, tracks of smaller ones are known
-    begun = [[tracks.over_few(index, few, box) for index in passes] for few in _fews(box)]
+    fews = FEWS if box is None else FEWS[:1]  # in boxes, tracks of smaller ones are known
+    begun = [[tracks.over_few(index, few, box) for index in passes] for few in fews]
     begun = [one for one in begun if all(one)]
     branches, pairs = list[int](), list[tuple[int, int]]()
     for one in begun:
@@ -199,10 +198,6 @@ def _on_branches(
     if all(of_passes):
         chosen.append([min(one, key=lambda track: track.cost) for one in of_passes])
     return chosen
-
-
-def _fews(box: JointBox | None) -> Sequence[int]:
-    return (FEW, FEWEST) if box is None else (FEW,)
 
 
 def _cheapest(costs: Mapping[int, float]) -> list[int]:

@@ -20,16 +20,21 @@ from opl.search.way_cells import Cells, WayPrices
 BLOCK = 8  # cells beside each other that are left out at once
 
 
-def cheapest_over_ends(cells: Cells, prices: WayPrices) -> Array:
-    """Return the cost of the cheapest way to each of `Cells.ends` over others, shape (m,)."""
+def cheapest_over_ends(cells: Cells, prices: WayPrices) -> tuple[Array, int]:
+    """Return the cost of the cheapest way to each of `Cells.ends` over others, shape (m,).
+
+    And how many ways from cell to cell were looked at.
+    """
     ends = cells.ends
     total, nothing = np.zeros((2, len(ends.start)))
-    _fill(ends, prices, nothing, nothing, False, total)
-    return np.asarray(total)
+    looked = _fill(ends, prices, nothing, nothing, False, total)
+    return np.asarray(total), looked
 
 
-def cheapest_ways(cells: Cells, prices: WayPrices, potential: Array) -> Array:
+def cheapest_ways(cells: Cells, prices: WayPrices, potential: Array) -> tuple[Array, int]:
     """Return what a way through each cell costs at the least, shape (n,).
+
+    And how many ways from cell to cell were looked at.
 
     Args:
         cells: The cells.
@@ -39,16 +44,16 @@ def cheapest_ways(cells: Cells, prices: WayPrices, potential: Array) -> Array:
     """
     start, end = (np.ascontiguousarray(one) for one in cells.at_ends(potential))
     forward, backward = np.zeros((2, len(start)))
-    _fill(cells, prices, start, end, False, forward)
-    _fill(cells, prices, start, end, True, backward)
-    return np.asarray(forward + backward)
+    looked = _fill(cells, prices, start, end, False, forward)
+    looked += _fill(cells, prices, start, end, True, backward)
+    return np.asarray(forward + backward), looked
 
 
 def _fill(
     cells: Cells, prices: WayPrices, start: Array, end: Array, backwards: bool, total: Array
-) -> None:
+) -> int:
     """Fill in costs as `_pass_on` does."""
-    _pass_on(
+    looked = _pass_on(
         np.array(cells.start, order="C"),
         np.array(cells.along, order="C"),
         np.array(cells.pad_low, order="C"),
@@ -66,6 +71,7 @@ def _fill(
         backwards,
         total,
     )
+    return int(looked)
 
 
 @kernel("float64(float64,float64[:,::1],float64[:,::1],int64,int64,int64)")
@@ -148,7 +154,7 @@ def _edge(  # type: ignore[no-untyped-def]
 
 
 @kernel(
-    "void(float64[:,::1],float64[:,::1],float64[:,::1],float64[:,::1],float64[::1],float64[::1],"
+    "int64(float64[:,::1],float64[:,::1],float64[:,::1],float64[:,::1],float64[::1],float64[::1],"
     "int64[::1],float64,float64,float64[::1],float64[::1],float64,float64[::1],float64[::1],"
     "boolean,float64[::1])"
 )
@@ -156,13 +162,13 @@ def _pass_on(  # type: ignore[no-untyped-def]
     start, along, pad_low, pad_high, t_low, t_high, first, travel, time, seconds, max_speed,
     contact_speed, potential, potential_end, backwards, total,
 ):  # fmt: skip
-    """Fill in the cost of the cheapest way from one end to each cell.
+    """Fill in the cost of the cheapest way from one end to each cell; return how many were tried.
 
     Of a way from the first column the potential at the cell is taken off; of one from the last, it
     is added where that begins. Cells beside each other are looked at one by one only where a box
     around them is near enough.
     """
-    n_columns, n_joints = len(first) - 1, start.shape[1]
+    n_columns, n_joints, looked = len(first) - 1, start.shape[1], 0
     begin = n_columns - 1 if backwards else 0
     for cell in range(first[begin], first[begin + 1]):
         total[cell] = 0.0
@@ -205,6 +211,7 @@ def _pass_on(  # type: ignore[no-untyped-def]
             else:
                 own = -max(potential[cell], potential_end[cell])
             nearest = 0
+            looked += blocks
             for block in range(blocks):
                 away, lasts = 0.0, least
                 for joint in range(n_joints):
@@ -226,6 +233,7 @@ def _pass_on(  # type: ignore[no-untyped-def]
                 block = nearest if turn == 0 else turn - int(turn <= nearest)
                 if far[block] >= best:
                     continue
+                looked += BLOCK
                 for come in range(begin + block * BLOCK, min(begin + (block + 1) * BLOCK, end)):
                     a, b = (cell, come) if backwards else (come, cell)  # from a to b
                     cost = _edge(
@@ -235,3 +243,4 @@ def _pass_on(  # type: ignore[no-untyped-def]
                     )  # fmt: skip
                     best = min(best, cost)
             total[cell] = best
+    return looked

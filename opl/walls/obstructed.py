@@ -79,7 +79,8 @@ class Obstructions:
 
         def surely(_: np.ndarray, low: Array, high: Array) -> tuple[np.ndarray, np.ndarray]:
             ends = along(low), along(high)
-            shut, shut_there = self._leads.surely(piece, flip, *ends)
+            place = piece.line.T_workpiece_cutter
+            shut, shut_there = self._leads.surely(place, piece.family, flip, *ends)
             if looks > 1:  # walls were held against the wheel in larger cells
                 cut, cut_there = surely_cuts_on(self._problem, piece.line, *ends)
                 shut, shut_there = shut | cut, shut_there | cut_there

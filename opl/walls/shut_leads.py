@@ -19,7 +19,6 @@ from opl.motion.free_leads import SHARES
 from opl.motion.motion import MoveKind
 from opl.motion.straight_moves import WHERE_BEGUN
 from opl.planning.problem import GrindingProblem
-from opl.search.walls import Piece
 from opl.walls.images import wrist_flips
 from opl.walls.lead_cells import LeadCells, Seen
 
@@ -80,25 +79,26 @@ class ShutLeads:
                 )
 
     def surely(
-        self, piece: Piece, flip: int, low: Array, high: Array
+        self, T_workpiece_cutter: Array | None, family: int, flip: int, low: Array, high: Array
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return in which cells every lead is surely shut, and in which it is at the middle.
 
         Args:
-            piece: The cells are parts of it.
-            flip: Which flip of its postures.
+            T_workpiece_cutter: The place; None along a contact position, where no pass ends.
+            family: The posture.
+            flip: Which flip of it.
             low: Least contact position of each, shape (n,).
             high: Greatest.
 
         Returns:
-            Two flags, each of shape (n,); all false where a piece is not at the end of a pass.
+            Two flags, each of shape (n,); all false where that is not at the end of a pass.
         """
-        T = piece.line.T_workpiece_cutter
-        if T is None:
+        if T_workpiece_cutter is None:
             return np.zeros(len(low), dtype=bool), np.zeros(len(low), dtype=bool)
-        near = self.at(T, piece.family, flip, (low + high) / 2.0)
+        near = self.at(T_workpiece_cutter, family, flip, (low + high) / 2.0)
         surely = near.copy()
-        surely[near] = self._shut(T, piece.family, flip, low[near], high[near], 0.0)
+        own = T_workpiece_cutter, family, flip
+        surely[near] = self._shut(*own, low[near], high[near], 0.0)
         return surely, near
 
     def at(

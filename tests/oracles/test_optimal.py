@@ -416,7 +416,9 @@ def test_no_lead_is_free_where_it_is_surely_shut(changed):
         for piece, flip in product(wall.pieces, range(2)):
             corners = np.arange(len(piece.at))
             at = np.interp(np.linspace(0.0, corners[-1], 8 * corners[-1] + 1), corners, piece.at)
-            surely, near = shut_leads.surely(piece, flip, at[:-1], at[1:])
+            surely, near = shut_leads.surely(
+                piece.line.T_workpiece_cutter, piece.family, flip, at[:-1], at[1:]
+            )
             assert not (surely & ~near).any()
             all_cells += len(surely)
             branch = piece.family + 4 * flip

@@ -56,8 +56,8 @@ def test_no_way_that_is_drawn_costs_less_than_what_is_told_of_any_cell_it_passes
     cells, random = drawn(seed, apart=apart), np.random.default_rng(seed + 1000)
     n_columns = len(cells.first) - 1
     prices = prices_of(travel, time, n_columns)
-    potential = cheapest_over_ends(cells, prices_of(travel, 0.0, n_columns))
-    told = cheapest_ways(cells, prices, potential)
+    potential, _ = cheapest_over_ends(cells, prices_of(travel, 0.0, n_columns))
+    told, _ = cheapest_ways(cells, prices, potential)
     begun = np.array(cells.first[:-1])
     for _ in range(300):
         # ways between cells near to each other, of which some are cheap
@@ -78,7 +78,8 @@ def test_of_cells_without_length_the_cheapest_way_is_that_of_all_there_are(
 ):
     cells = drawn(seed, n_columns=3, n_cells=17, long=0.0, apart=apart)
     prices = prices_of(travel, time, 3)
-    told = cheapest_ways(cells, prices, cheapest_over_ends(cells, prices_of(travel, 0.0, 3)))
+    potential, _ = cheapest_over_ends(cells, prices_of(travel, 0.0, 3))
+    told, _ = cheapest_ways(cells, prices, potential)
     columns = [range(first, end) for first, end in pairwise(cells.first)]
     least = np.full(len(cells.start), np.inf)
     for way in product(*columns):
@@ -91,6 +92,6 @@ def test_of_cells_without_length_the_cheapest_way_is_that_of_all_there_are(
 def test_of_short_cells_hardly_less_is_told_than_of_their_ends(apart):
     """Also where the nearest full turn of a joint differs from end to end of a cell."""
     cells = drawn(3, long=0.01, apart=apart)
-    over_ends = cheapest_over_ends(cells, PRICE_OF_TRAVEL)
-    told = cheapest_ways(cells, PRICE_OF_TRAVEL, over_ends)
+    over_ends, _ = cheapest_over_ends(cells, PRICE_OF_TRAVEL)
+    told, _ = cheapest_ways(cells, PRICE_OF_TRAVEL, over_ends)
     assert 0.98 * over_ends[cells.ends.first[-2] :].min() < told.min()
