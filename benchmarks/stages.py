@@ -17,8 +17,9 @@ from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
 from opl.files.kernels import load_kernels
 from opl.job.values import Job
+from opl.planning.depths import wheel_distances
 from opl.planning.multi_start import plan_recursive
-from opl.planning.problem import GrindingProblem, build_problem, wheel_distances
+from opl.planning.problem import GrindingProblem, build_problem
 from opl.planning.scene import planning_scene
 from opl.planning.survey import widest_branch
 from opl.verification.replay import replay

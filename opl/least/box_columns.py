@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from opl.cell.wheel_cuts import shut_along
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.least.doubts import Doubts
@@ -18,7 +19,6 @@ from opl.planning.turned import blocks_of
 from opl.search.box import JointBox
 from opl.search.in_box import about_nearest, hidden, missing, nearest_points, sampled
 from opl.search.joint_limits import about
-from opl.walls.cut_cells import shut_along
 from opl.walls.families import GROWN, grown
 from opl.walls.images import Seams, image_within_limits, wrist_flips
 from opl.walls.placement import Placement, allowed, families_of, placed

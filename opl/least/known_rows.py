@@ -11,8 +11,9 @@ from collections.abc import Hashable, Sequence
 import numpy as np
 
 from opl.geometry.frames import Array
+from opl.planning.depths import nearer_nodes
 from opl.planning.nodes import inverse_solutions
-from opl.planning.problem import GrindingProblem, nearer_nodes
+from opl.planning.problem import GrindingProblem
 from opl.planning.turned import blocks_of
 
 MOST_KNOWN = 2**26  # bytes; beyond that all are forgotten

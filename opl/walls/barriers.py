@@ -12,9 +12,10 @@ from functools import cache
 
 import numpy as np
 
+from opl.cell.wheel_cuts import shut_along
 from opl.geometry.frames import Array
 from opl.planning.problem import GrindingProblem
-from opl.walls.cut_cells import cells_of, shut_along
+from opl.walls.cut_cells import cells_of
 from opl.walls.sides import Barrier, Side, sides_of
 
 MOST_LOOKED_AT = 8  # runs of cutter points of a pass, those that part most first

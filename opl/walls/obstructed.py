@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from opl.cell.wheel_cuts import halved
 from opl.geometry.frames import Array
 from opl.planning.problem import GrindingProblem
 from opl.search.walls import Piece
 from opl.walls.columns import ColumnWalls
-from opl.walls.cut_cells import halved, surely_cuts_on
+from opl.walls.cut_cells import surely_cuts_on
 from opl.walls.shut_leads import ShutLeads
 
 # into how many parts a cell is cut at each look, halvings of what is all in collision then, but not

@@ -23,9 +23,9 @@ from opl.planning.multi_start import (
 )
 from opl.planning.open_matrix import open_matrices
 from opl.planning.plan import Exhausted, Found, OutOfBudget, Pause, propose_and_check
-from opl.planning.problem import CLOSE
 from opl.planning.reasons import explain, unreachable_points
 from opl.planning.settings import Start
+from opl.planning.shut_ways import CLOSE
 from opl.planning.survey import NodeState, survey_nodes
 from opl.planning.turned import Kept
 from opl.run import searches
@@ -260,7 +260,7 @@ def test_no_track_passes_a_contact_position_that_is_shut_on_the_way(monkeypatch)
     # told to be shut at cutter points alone, it is open between them, where the part is measured
     assert (np.diff(problem.points.arc_length) > CLOSE).all()
     assert replace(problem, wheel_distance=layer).sides is None
-    monkeypatch.setattr("opl.planning.problem.CLOSE", 1.0)
+    monkeypatch.setattr("opl.planning.shut_ways.MOST_PARTS", 1)
     shut = replace(problem, wheel_distance=layer)
     matrices = open_matrices(shut)
     tracks = list(islice(tracks_from_best_start(matrices), 5))

@@ -26,8 +26,8 @@ from opl.motion.motion import Motion, MoveKind
 from opl.motion.path import PassEnd
 from opl.motion.whole_motion import UnreachableApproachError
 from opl.planning import plan as plan_module
+from opl.planning.depths import nearer_nodes
 from opl.planning.multi_start import plan_recursive
-from opl.planning.problem import nearer_nodes
 from opl.planning.settings import ObjectiveWeights
 from opl.planning.so_far import ENDED
 from opl.planning.track_check import NoMotion

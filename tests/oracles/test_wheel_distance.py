@@ -15,7 +15,7 @@ from opl.cell.wheel_triangle import TOLERANCE
 from opl.geometry.frames import inverse, pose
 from opl.geometry.mesh import TriangleMesh
 from opl.geometry.wheel import ContactWheel
-from opl.planning.problem import wheel_distances
+from opl.planning.depths import wheel_distances
 from tests.support.planned import small_problem
 
 EXACT = np.inf  # whatever is needed is not kept: everything is measured to the end

@@ -5,7 +5,7 @@ import numpy as np
 from opl.files.resources import folder
 from opl.job.load import load_job
 from opl.least.doubts import Doubts
-from opl.planning.problem import nearer_nodes
+from opl.planning.depths import nearer_nodes
 from tests.support.planned import problem_of, small_problem, with_positions
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from opl.walls.cut_cells import MOST_HALVINGS, halved
+from opl.cell.wheel_cuts import MOST_HALVINGS, halved
 
 
 def cut(surely_from, **given):

@@ -10,7 +10,7 @@ from opl.files.resources import folder
 from opl.job.load import load_job
 from opl.least import known_rows
 from opl.least.known_rows import KnownRows
-from opl.planning.problem import nearer_nodes
+from opl.planning.depths import nearer_nodes
 from tests.support.boxes import near_a_box
 from tests.support.planned import problem_of, small_problem, with_positions
 

@@ -7,10 +7,10 @@ import pytest
 
 from opl.least.box_columns import ColumnSampler
 from opl.planning import open_matrix, turned
+from opl.planning.depths import nearer_nodes, wheel_distances
 from opl.planning.multi_start import tracks_from_best_start
 from opl.planning.nodes import build_nodes
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
-from opl.planning.problem import nearer_nodes, wheel_distances
 from opl.planning.symmetry import twins
 from opl.planning.turned import Kept
 from opl.search.joint_limits import UNLIMITED
