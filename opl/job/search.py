@@ -142,7 +142,7 @@ class SearchSection(Document):
         "smoother path.",
     )
     max_subproblems: Annotated[int, between(1, 10_000_000)] = Field(
-        default=16000,
+        default=13000,
         description="Work that the proof of the least joint range sum may take at the most, in "
         "units of one to three milliseconds on two slow cores. It is counted, not measured: "
         "numbers in linear programs, postures sampled and held against a box, distances, collision "

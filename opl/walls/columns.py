@@ -64,7 +64,7 @@ class ColumnWalls:
         self._points = points
         self.images = images
         self._sides = sides or [[ANY_SIDE]] * points.n_passes
-        self.made = 0.0  # walls made so far; one cell cut finer is part of one
+        self.made = 0.0  # walls made so far; a cell cut finer or looked at is part of one
 
     def columns(self, places: Sequence[float]) -> list[Wall]:
         """Return the walls at fractional cutter points, all contact positions each."""
