@@ -132,7 +132,8 @@ def _hollows(laid: LaidPasses, wheel: ContactWheel, penetration: float) -> Itera
     """Yield where the surface is too hollow for the wheel.
 
     Across the path the wheel is round: a hollow of a smaller radius takes neither its flat nor its
-    edges. Along the path its flat is straight and bridges any hollow; its edges enter.
+    edges. Along the path its flat is straight and bridges any hollow as long as that; its edges
+    enter. How long a hollow is, curvature at a point does not tell: a wave may be ground beside it.
     """
     along, across = laid.bending[:, 0, 0], laid.bending[:, 1, 1]
     tight = across < -1.0 / wheel.radius
@@ -152,14 +153,15 @@ def _hollows(laid: LaidPasses, wheel: ContactWheel, penetration: float) -> Itera
         hint = (
             "only an edge of the wheel can grind there"
             if wheel.max_roll > 0.0
-            else "it cannot be ground: the part may not roll about the wheel's edges (max_roll_deg)"
+            else "no wheel grinds it whose edges the part may not roll about (max_roll_deg)"
         )
         yield (
             "hollow",
             bridged,
             f"radius {-1e3 / along[deepest]:.1f} mm along the path at cutter point {deepest} "
             f"against the wheel's flat of {1e3 * wheel.width:g} mm, which would cut in "
-            f"{1e3 * sunk[deepest]:.2g} mm ({1e3 * penetration:g} mm allowed): {hint}",
+            f"{1e3 * sunk[deepest]:.2g} mm ({1e3 * penetration:g} mm allowed): where the hollow is "
+            f"that long, {hint}",
         )
 
 
