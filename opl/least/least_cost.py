@@ -159,7 +159,7 @@ class _PassBound:
     def _seen(self, places: np.ndarray, cells: PostureCells, most: float) -> PostureCells:
         """Return cells with what is seen of collisions and leads, but for those struck all over.
 
-        It is looked at cells through which ways may cost less than so much.
+        Cells through which no way costs less than so much are not looked at.
         """
         scene, begun = self._problem.scene, self._problem.scene.work + self._leads.work
         at = np.flatnonzero(cells.known & (cells.seen == UNSEEN) & (cells.least < most))

@@ -20,6 +20,7 @@ WITHIN = 7  # halvings of the way between cutter points that is too deep in the 
 # parts of a way whose ends are looked at where that is not sure, and [m] between two of them: no
 # more and no closer
 MOST_PARTS, CLOSE = 64, 5e-5
+CLOSE_IN_BAND = 1e-3  # [m] the same where the part is less deep than somewhere else in its band
 
 
 def shut_ways(
@@ -27,7 +28,8 @@ def shut_ways(
 ) -> np.ndarray:
     """Return on which contact positions it cuts in from a cutter point to the next, (N - 1, M).
 
-    Of whole bands: surely, or as far as places close together tell.
+    Of bands that are shut, surely or as far as places close together tell, those at which it cuts
+    in at some places between as well.
 
     Args:
         scene: The part and the wheel.
@@ -48,6 +50,13 @@ def shut_ways(
     sure = shut_along(scene.cell, scene.part, points, before, before + 1.0, t, WITHIN)
     for k, a, b in (bands[n] for n in _opening(scene, points, edge, t, np.flatnonzero(~sure))):
         shut[k, a:b] = False
+    length, parts = np.abs(np.diff(points.arc_length)), 1
+    while len(left := np.flatnonzero(shut.any(axis=1) & (length > parts * CLOSE_IN_BAND))):
+        parts *= 2
+        t_left = np.broadcast_to(contact_positions, (len(left), len(contact_positions)))
+        for share in np.arange(1, parts, 2) / parts:
+            between = points.at_places(left + share)
+            shut[left] = nearer_nodes(scene, between, t_left, shut[left])
     return np.asarray(shut)
 
 

@@ -261,6 +261,7 @@ def test_no_track_passes_a_contact_position_that_is_shut_on_the_way(monkeypatch)
     assert (np.diff(problem.points.arc_length) > CLOSE).all()
     assert replace(problem, wheel_distance=layer).sides is None
     monkeypatch.setattr("opl.planning.shut_ways.MOST_PARTS", 1)
+    monkeypatch.setattr("opl.planning.shut_ways.CLOSE_IN_BAND", 1.0)
     shut = replace(problem, wheel_distance=layer)
     matrices = open_matrices(shut)
     tracks = list(islice(tracks_from_best_start(matrices), 5))
