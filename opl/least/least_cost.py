@@ -1,9 +1,10 @@
 """What travel and time on the wheel cost at the least, at any contact positions.
 
 Some cutter points of each pass are known as cells of the contact position, with the postures over
-each enclosed, but for those in which the robot surely collides. A motion passes a cell of each in
-order, all on one side of each barrier, so it costs no less than the cheapest way through them; the
-cells that matter are cut finer, and more cutter points taken in, until that no longer rises.
+each enclosed, but for those in which the robot surely collides or the pass cannot begin or end. A
+motion passes a cell of each in order, all on one side of each barrier, so it costs no less than the
+cheapest way through them; the cells that matter are cut finer, and more cutter points taken in,
+until that no longer rises.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ def least_cost(
 ) -> float:
     """Return what no motion along the passes costs less than, whatever its contact positions.
 
-    Of those that keep the clearances of the plan. Each pass lies on one IK branch; moves between
-    passes are not charged for.
+    Of those that keep the clearances of the plan, with leads as the process sets them. Each pass
+    lies on one IK branch; moves between passes are not charged for.
 
     Args:
         problem: What is to be planned.
