@@ -31,6 +31,7 @@ class BrokenEdgeError(Exception):
 
 
 MOST_HALVINGS = 6  # of a move between intermediate nodes
+SAME_PLACE = 1e-6  # cutter points: places this close are one
 
 
 def fill_in(
@@ -41,7 +42,8 @@ def fill_in(
     Contact position, origin, axis z and axis x of the cutter frame are interpolated linearly, and
     the inverse kinematics is solved on the same IK branch, nearest to the joint interpolation. Near
     a singularity joints turn far from place to place: there as well nodes are put in, until no step
-    is larger than that from node to node may be.
+    is larger than that from node to node may be. Where the contact passes an end of the flat is one
+    in any case.
 
     `rows` are those of the track in each column, one for each cutter point, shape (N,).
 
@@ -50,12 +52,14 @@ def fill_in(
     """
     columns = np.arange(len(rows))
     q_node, t_node = nodes.along(rows), nodes.t_along(rows)
+    same_pass = np.diff(points.pass_index) == 0
     counts = [
-        middle_count(change, rule.max_contact_step) if same_pass else 0
-        for change, same_pass in zip(np.diff(t_node), np.diff(points.pass_index) == 0, strict=True)
+        middle_count(change, rule.max_contact_step) if joined else 0
+        for change, joined in zip(np.diff(t_node), same_pass, strict=True)
     ]
     places = [k + np.arange(n + 1) / (n + 1) for k, n in enumerate(counts)]
     place = np.concatenate([*places, columns[-1:].astype(float)])
+    place = np.sort(np.append(place, _at_flat_end(cell, t_node, same_pass, place)))
     for _ in range(MOST_HALVINGS):
         t = np.interp(place, columns, t_node)
         ik_branch = nodes.ik_branch[place.astype(int)]
@@ -71,6 +75,24 @@ def fill_in(
         halves = (place[coarse] + place[coarse + 1]) / 2.0
         place = np.insert(place, coarse + 1, halves)
     raise BrokenEdgeError(int(place[coarse[0]]), "continuity")
+
+
+def _at_flat_end(cell: WorkCell, t_node: Array, same_pass: np.ndarray, place: Array) -> Array:
+    """Return at which places a track passes an end of the wheel's flat, but for some, shape (k,).
+
+    There the contact begins or ends to roll, and joints change their direction all at once: halving
+    a move across such a place halves the contact error, of any other it leaves a quarter.
+    """
+    found = [np.empty(0)]
+    for end in (-cell.wheel.flat_end, cell.wheel.flat_end):
+        passed = (t_node[:-1] - end) * (t_node[1:] - end) < 0.0
+        before = np.flatnonzero(passed & same_pass)
+        share = (end - t_node[before]) / (t_node[before + 1] - t_node[before])
+        found.append(before + share)
+    there = np.concatenate(found)
+    after = np.searchsorted(place, there)
+    apart = np.minimum(there - place[after - 1], place[after] - there)
+    return np.asarray(there[apart > SAME_PLACE])
 
 
 def _solve(

@@ -197,6 +197,28 @@ def test_a_smaller_error_gets_more_nodes():
     np.testing.assert_array_equal(fine.q[[0, -1]], coarse.q)
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_contact_that_begins_to_roll_has_a_node_there(side):
+    # halved alone, the move across the end of the flat kept over 5 micrometres of error, and was
+    # given up as a jump of the joints
+    end = small_problem().cell.wheel.flat_end
+    cell, points, nodes, rows = two_points(t=(side * (end - 2.0), side * (end + 3.0)))
+    rule = replace(small_problem().interpolation, max_contact_step=10.0)
+    coarse = fill_in(cell, points, nodes, rows, replace(rule, max_contact_error=1.0))
+    np.testing.assert_allclose(coarse.cutter_point, [0.0, 0.4, 1.0], rtol=1e-9)
+    assert coarse.contact_position[1] == pytest.approx(side * end, abs=1e-9)
+    fine = fill_in(cell, points, nodes, rows, replace(rule, max_contact_error=1e-6))
+    assert fine.n_intermediate < 64
+
+
+def test_a_node_at_the_end_of_the_flat_is_no_second_one():
+    end = small_problem().cell.wheel.flat_end
+    cell, points, nodes, rows = two_points(t=(end - 1.5, end + 1.5))
+    rule = replace(small_problem().interpolation, max_contact_step=1.5, max_contact_error=1.0)
+    path = fill_in(cell, points, nodes, rows, rule)
+    np.testing.assert_allclose(path.cutter_point, [0.0, 0.5, 1.0], atol=1e-9)
+
+
 def test_nothing_is_interpolated_between_passes_on_opposite_sides():
     cell, points, nodes, rows = two_points()
     frames = points.Ts_workpiece_cutter.copy()
