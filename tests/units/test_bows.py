@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from opl.cell.robot import forward_kinematics
 from opl.geometry.frames import inverse
-from opl.motion.bows import bowed_lines, freedom, off_contact
+from opl.motion.bows import BETWEEN, bowed_lines, freedom, off_contact
 from opl.verification.contact import LEVER, contact_positions, misfit
 from tests.support.planned import small_motion, small_problem
 
@@ -29,10 +29,14 @@ def coarse(every):
 
 
 def farthest(motion, before):
-    """Return how far off the way from a configuration to the next is, by the proof's measure."""
+    """Return how far off the way from a configuration to the next is, by the proof's measure.
+
+    Between the two: how far off lines are at configurations themselves is asked elsewhere
+    (`opl.motion.line_error`), and may be most where a corner of the passes is cut.
+    """
     problem = small_problem()
     cell, points = problem.cell, problem.points
-    share = np.linspace(0.0, 1.0, 17)[:, None]
+    share = np.linspace(BETWEEN[0], BETWEEN[-1], 13)[:, None]
     q = motion.q[before] + share * (motion.q[before + 1] - motion.q[before])
     T_contact0_base = inverse(cell.wheel.T_base_contact(np.zeros(1)))[0]
     Ts = T_contact0_base @ forward_kinematics(cell.robot, q) @ cell.T_flange_workpiece
