@@ -235,11 +235,11 @@ class BoxNodes:
             passes, t = problem.points.pass_index[list(deep)], np.array(list(deep.values()))
             if search.sampler.doubts.note(passes, t):
                 return None, None, True
-            # leads that are shut are left out with what collides
-            if not search.sampler.collisions and leads_are_deep(problem, hits):
-                search.collided += 1
+            leads_are_shut = leads_are_deep(problem, hits)
+            if leads_are_shut and not search.sampler.collisions:
+                search.collided += 1  # they are left out with what collides
                 return None, None, False
-            if sunk is not None:
+            if sunk is not None and not leads_are_shut:
                 return None, sunk, False
             search.collided += 1
             if not self._swept:

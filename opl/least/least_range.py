@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from opl.files.beside import Beside
@@ -12,9 +12,6 @@ from opl.planning.problem import GrindingProblem
 from opl.planning.settings import OptimalSettings
 from opl.planning.so_far import ENDED, Follow, SoFar, to_the_end
 from opl.walls.images import Seams
-
-# of the work at the least: a motion sought in another way, where the proof found none
-OTHERWISE_SHARE = 0.3
 
 
 class NoMotionError(Exception):
@@ -36,7 +33,6 @@ def plan_optimal(
     settings: OptimalSettings,
     fallback: Plan | None,
     follow: Follow = to_the_end,
-    otherwise: Callable[[float], Plan | None] | None = None,
     seams: Seams | None = None,
     untried: bool = False,
     without_nodes: Sequence[int] = (),
@@ -49,8 +45,6 @@ def plan_optimal(
         settings: What is wanted.
         fallback: A motion that is known, if one is: joints and contact should travel no further.
         follow: Given the joint range sum of the best motion and its lower bound after every step.
-        otherwise: Looks for a motion in another way, where the proof finds none, nor that there is
-            none, given how many units of work are left for that.
         seams: Where full turns are counted from, where that is known.
         untried: Whether no motion was tried: else where none is known, those tried collide.
         without_nodes: Cutter points at which no node is free: walls to begin with.
@@ -64,25 +58,12 @@ def plan_optimal(
     """
     search = OptimalSearch(problem, settings, fallback, seams, untried, without_nodes)
     widest = float((problem.cell.robot.upper - problem.cell.robot.lower).sum())
-    share = 1.0 if otherwise is None else 1.0 - OTHERWISE_SHARE
-
-    def goes_on() -> bool:
+    ended = False
+    while not search.finished and not ended:
+        search.step()
         value = None if search.plan is None else search.motions.value
-        return follow(SoFar(min(search.work_share, 1.0), value, search.lower_bound))
-
-    def go_on(share: float) -> bool:
-        """Work up to a share of the work allowed; return whether that was ended before."""
-        while not search.finished and (search.plan is not None or search.work_share < share):
-            search.step()
-            if not goes_on() and search.plan is not None:
-                return True
-        return False
-
-    ended = go_on(share)
-    if search.plan is None and otherwise is not None and search.lower_bound <= widest:
-        left = max(OTHERWISE_SHARE, 1.0 - search.work_share)  # a step may take more than was left
-        search.keep(otherwise(left * settings.max_subproblems))
-        ended = go_on(1.0)
+        so_far = SoFar(min(search.work_share, 1.0), value, search.lower_bound)
+        ended = not follow(so_far) and search.plan is not None
     if search.plan is None:
         least = search.lower_bound
         raise NoMotionError(least, least > widest, search.work_share >= 1.0)

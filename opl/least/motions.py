@@ -18,7 +18,7 @@ from opl.walls.placement import Placement
 
 # of a box that holds all, but no motion that is found: how much larger boxes are where one is
 # sought instead, so that what cannot be proven is not left far from the bound
-LARGER = tuple(0.0005 * 2.0**k for k in range(9))
+LARGER = tuple(0.0005 * 2.0**k for k in range(14))
 MOST_LOOKS = 3  # at each of these, with places cut finer by what the look before told
 
 
@@ -109,6 +109,22 @@ class Motions:
             else:
                 boxes = boxes[middle + 1 :]
         return found
+
+    def look_anywhere(self, goes_on: Callable[[], bool]) -> bool:
+        """Look for a motion in a box of all joint positions; return whether one is found.
+
+        In every posture in turn, as long as `goes_on` says so. The smoothest track over places is
+        sought there, which knows what collides and not how small the box might be.
+        """
+        sampler, space = self._search.sampler, self._space
+        for flip, limits in enumerate(space.walls.images.limits):
+            sampler.mirrored = flip > 0
+            for placements in space.families.anywhere(limits):
+                if not goes_on():
+                    return False
+                if self._look_in(limits, placements, goes_on):
+                    return True
+        return False
 
     def _larger(self, box: JointBox, placements: Sequence[Placement]) -> list[JointBox]:
         """Return the larger boxes about one that are smaller than the best motion."""

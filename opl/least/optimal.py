@@ -36,6 +36,8 @@ from opl.walls.placement import Placement
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
 NEARLY_DONE = 0.8  # of the work allowed: from then on motions are sought in larger boxes, too
+LAST_CHANCE = 0.9  # of it: then, where none is known, one of whatever size is
+ANYWHERE_SHARE = 0.3  # as much work, in shares of that allowed and beyond it, may be done for that
 
 
 class OptimalSearch:
@@ -72,6 +74,7 @@ class OptimalSearch:
         tracks = TrackSearch(problem, self._sampler, settings.costs, most, push_away)
         self.motions = Motions(space, tracks, settings, fallback, largest)
         self._proven = 0.0
+        self._looked_anywhere = fallback is not None
         self._looks_far = True  # as long as a better motion comes of it
         self._given_up = 0  # boxes without a motion near the bound
         self._hoped = Hope(fallback is not None)
@@ -94,8 +97,13 @@ class OptimalSearch:
         """Whether there is nothing left to do."""
         closed = self.proof.closed and self.proof.threshold >= self.motions.value
         done = closed or self._proven >= self.motions.value
-        ended = self._given_up >= MOST_GIVEN_UP or self.work_share >= 1.0
+        ended = self._ends and self._looked_anywhere
         return done or ended or self.motions.value <= AT_REST
+
+    @property
+    def _ends(self) -> bool:
+        """Whether the proof is given up, or its work done."""
+        return self._given_up >= MOST_GIVEN_UP or self.work_share >= 1.0
 
     @property
     def work_share(self) -> float:
@@ -124,6 +132,9 @@ class OptimalSearch:
         self._proven = self.lower_bound
 
     def _work_on_one(self) -> None:
+        if not self._looked_anywhere and (self._ends or self.work_share >= LAST_CHANCE):
+            self._look_anywhere()
+            return
         if self.proof.closed:
             self._hope_for_less()
             return
@@ -156,6 +167,17 @@ class OptimalSearch:
         else:
             self._given_up += 1
             self.proof.give_up()
+
+    def _look_anywhere(self) -> None:
+        """Look for a motion of whatever size, if none is known."""
+        self._looked_anywhere = True
+        if self.plan is not None:
+            return
+        if not self._sampler.collisions:
+            self._begin_minding()
+        most = self.work_share + ANYWHERE_SHARE
+        self.motions.look_anywhere(lambda: self.work_share < most)
+        self._lower()
 
     def _goes_on(self) -> bool:
         return self.work_share < 1.0
@@ -202,9 +224,13 @@ class OptimalSearch:
             self.proof.threshold = self._hoped.told(size, self.proof.threshold)
 
     def _mind_collisions(self) -> None:
-        """Begin again without what collides: the robot does wherever a motion might have been."""
-        self._leave_out_collisions()
+        """Leave open what was worked on: the robot collides wherever a motion might have been."""
         self.proof.put_back()  # before what is proven is noted
+        self._begin_minding()
+
+    def _begin_minding(self) -> None:
+        """Begin again without what collides."""
+        self._leave_out_collisions()
         self._hoped = Hope(self.plan is not None)
         minding = self._new_proof(hoped := self._hoped.guess(self.lower_bound, self.motions.value))
         for wall in self.proof.walls:
@@ -252,11 +278,6 @@ class OptimalSearch:
         learnt = self.motions.learn_in(columns, passages, box)
         self._lower()
         return learnt
-
-    def keep(self, found: Plan | None) -> None:
-        """Keep a motion that is better than the best."""
-        self.motions.keep(found)
-        self._lower()
 
     def _lower(self) -> None:
         """Look only for what is better than the best motion."""

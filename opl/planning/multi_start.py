@@ -10,19 +10,10 @@ import numpy as np
 
 from opl.geometry.frames import Array
 from opl.planning.open_matrix import OpenMatrix, Track, open_matrices
-from opl.planning.plan import (
-    OutOfBudget,
-    Pause,
-    Plan,
-    Same,
-    SearchOutcome,
-    first_free,
-    propose_and_check,
-)
+from opl.planning.plan import Pause, Plan, SearchOutcome, first_free, propose_and_check
 from opl.planning.problem import GrindingProblem
 from opl.planning.settings import Start
 from opl.planning.symmetry import twins
-from opl.planning.track_check import Collides
 from opl.search.impasse import passable
 from opl.search.recursive import Descent, add_dead_ends, descend
 
@@ -40,39 +31,20 @@ def plan_recursive(problem: GrindingProblem, start: Start = Start.BEST) -> Plan:
     return first_free(problem, matrices, _tracks(problem, matrices, start))
 
 
-class RecursiveSearch:
-    """The recursive search, some motions at a time.
+def try_recursive(
+    problem: GrindingProblem, start: Start, most_checks: int | None, most_work: float = np.inf
+) -> SearchOutcome:
+    """Return what the recursive search finds within a number of checked motions, and work.
 
     Args:
         problem: What is to be planned.
         start: From which start nodes.
-
-    Attributes:
-        matrices: What is blocked, and why.
+        most_checks: None for no limit.
+        most_work: In units.
     """
-
-    def __init__(self, problem: GrindingProblem, start: Start) -> None:
-        self._problem = problem
-        self.matrices = open_matrices(problem)
-        self._tracks = _tracks(problem, self.matrices, start)
-        self._checks = 0
-        self._collided: dict[Same, Collides] = {}
-
-    def go_on(self, most_checks: int | None, most_work: float = np.inf) -> SearchOutcome:
-        """Return what is found within a number of motions more to be checked, and work."""
-        most = None if most_checks is None else self._checks + most_checks
-        outcome = propose_and_check(
-            self._problem, self.matrices, self._tracks, self._checks, most, most_work,
-            self._collided,
-        )  # fmt: skip
-        if isinstance(outcome, OutOfBudget):
-            self._checks = outcome.checks
-        return outcome
-
-
-def try_recursive(problem: GrindingProblem, start: Start, most_checks: int) -> SearchOutcome:
-    """Return what the recursive search finds within a number of checked motions."""
-    return RecursiveSearch(problem, start).go_on(most_checks)
+    matrices = open_matrices(problem)
+    tracks = _tracks(problem, matrices, start)
+    return propose_and_check(problem, matrices, tracks, 0, most_checks, most_work)
 
 
 def held_back(problem: GrindingProblem, matrices: list[OpenMatrix]) -> bool:

@@ -135,9 +135,15 @@ class Exhausted:
 
 @dataclass(frozen=True)
 class OutOfBudget:
-    """A search ended before it came to an end: as much was done as is allowed."""
+    """A search ended before it came to an end: as much was done as is allowed.
+
+    Attributes:
+        checks: How many motions were checked.
+        matrices: What is blocked so far, and why.
+    """
 
     checks: int
+    matrices: list[OpenMatrix]
 
 
 Same = tuple[bytes, bytes]  # IK branches and contact positions of a track
@@ -176,7 +182,7 @@ def propose_and_check(
         if isinstance(track, Pause):
             proposing += track.work
             if done() >= most_work:
-                return OutOfBudget(checks)
+                return OutOfBudget(checks, matrices)
             continue
         matrix = matrices[track.matrix]
         # full turns bring the same bodies to the same places
@@ -192,7 +198,7 @@ def propose_and_check(
         if isinstance(found, Collides):
             collided[same] = found
         if checks == most_checks or done() >= most_work:
-            return OutOfBudget(checks)
+            return OutOfBudget(checks, matrices)
     return Exhausted(checks, matrices)
 
 

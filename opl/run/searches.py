@@ -15,12 +15,7 @@ from opl.least.least_range import NoMotionError, plan_optimal
 from opl.least.weighted import plan_weighted
 from opl.motion.figures import Figures, figures_of_path, figures_of_points
 from opl.motion.short_ways import shortened
-from opl.planning.multi_start import (
-    RecursiveSearch,
-    held_back,
-    plan_recursive,
-    try_recursive,
-)
+from opl.planning.multi_start import held_back, plan_recursive, try_recursive
 from opl.planning.open_matrix import columns_without_nodes
 from opl.planning.plan import Exhausted, Found, OutOfBudget, Plan
 from opl.planning.problem import GrindingProblem
@@ -101,40 +96,32 @@ def _search_range(
     beside: Beside | None,
 ) -> tuple[Plan, Plan | None]:
     """Return the plan of least joint range sum, and the recursive one where there is one."""
-    in_turns = RecursiveSearch(problem, search.start)
-    last = in_turns.go_on(MOST_FIRST_CHECKS, MOST_FIRST_WORK)
+    last = try_recursive(problem, search.start, MOST_FIRST_CHECKS, MOST_FIRST_WORK)
     known = last.plan if isinstance(last, Found) else None
     if isinstance(last, Exhausted) and cut_off_in(last.matrices):
         raise no_path(problem, last.matrices)
-
-    def otherwise(work: float) -> Plan | None:
-        nonlocal last
-        last = in_turns.go_on(None, work)
-        return last.plan if isinstance(last, Found) else None
-
-    # where all that is proposed collides, the proof knows better where not to look; it knows all
-    # contact positions, and gives each pass its own IK branch; so only it can say that none is free
-    others = None if isinstance(last, Exhausted) else otherwise
     try:
         counted_from = None if seams is None else seams.value()
         untried = isinstance(last, OutOfBudget) and last.checks == 0  # too many points, most likely
-        shut = columns_without_nodes(in_turns.matrices) if known is None else []
+        shut = [] if isinstance(last, Found) else columns_without_nodes(last.matrices)
         best = plan_optimal(
-            problem, search.optimal, known, follow, others, counted_from, untried, shut, beside
+            problem, search.optimal, known, follow, counted_from, untried, shut, beside
         )
     except NoMotionError as error:
         least, proven, spent = error.lower_bound, error.proven, error.spent
     else:
-        return best, last.plan if isinstance(last, Found) else None
+        return best, known
     assert not isinstance(last, Found), "what was found is a plan"
     if isinstance(last, Exhausted) and (proven or cut_off_in(last.matrices)):
         raise no_path(problem, last.matrices, f"proven: {NONE_IS_FREE}")
     if proven:
-        reasons = explain(problem, in_turns.matrices)
-        at_leads = leads_stop(in_turns.matrices)
+        reasons = explain(problem, last.matrices)
+        at_leads = leads_stop(last.matrices)
         raise NoPathError(f"no path: it is proven that {NONE_IS_FREE}", reasons, at_leads=at_leads)
     reasons = list[str]()
     tried = f"the {last.checks} best motions of the recursive search are not free"
+    if last.checks == 1:
+        tried = "the best motion of the recursive search is not free"
     if isinstance(last, Exhausted):
         tried = f"at {len(problem.field.contact_positions)} contact positions none is free"
         if held_back(problem, last.matrices):
@@ -150,7 +137,7 @@ def _search_range(
         "robot, may help",
         reasons,
         lower_bound=least,
-        at_leads=leads_stop(in_turns.matrices),
+        at_leads=leads_stop(last.matrices),
     )
 
 
@@ -179,8 +166,7 @@ def _search_best(
         weights = ObjectiveWeights(0.0, travel, time)
     known, recursive = list[Plan](), None
     if weights.joint_range == 0.0:
-        first = RecursiveSearch(problem, search.start)
-        found = first.go_on(MOST_FIRST_CHECKS, MOST_FIRST_WORK)
+        found = try_recursive(problem, search.start, MOST_FIRST_CHECKS, MOST_FIRST_WORK)
         recursive = found.plan if isinstance(found, Found) else None
     if recursive is None:
 

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
+from operator import itemgetter
 
 import numpy as np
 
@@ -221,6 +223,21 @@ class Families:
             found.append(Fit(placement, missing, row))
         return found
 
+    def anywhere(self, limits: JointBox) -> list[list[Placement]]:
+        """Return images that all passes might use within limits, as near to the middle as may be.
+
+        Of each family in turn, and of another for passes with a cutter point that it does not
+        grind. First those of which most passes use the family.
+        """
+        fits = [self._fits(index, limits, None) for index in range(len(self._passes))]
+        found = []
+        for family in self._unrolled:
+            chosen = [min(of_pass, key=partial(_foreign, family)) for of_pass in fits]
+            own = [fit.placement.family == family for fit in chosen]
+            if any(own) and all(np.isfinite(fit.missing).all() for fit in chosen):
+                found.append((-sum(own), [fit.placement for fit in chosen]))
+        return [placements for _, placements in sorted(found, key=itemgetter(0))]
+
     def hold(
         self,
         box: JointBox,
@@ -256,6 +273,11 @@ class Families:
                 missed.append((float(missing[worst]), float(columns[worst])))
         missed.sort(reverse=True)
         return placements, list(dict.fromkeys(place for _, place in missed))
+
+
+def _foreign(family: int, fit: Fit) -> tuple[float, bool]:
+    """Return what a box misses of a pass, and whether that is placed by another family."""
+    return float(fit.missing.max()), fit.placement.family != family
 
 
 def _misfit(fit: Fit, known: np.ndarray) -> tuple[float, float]:

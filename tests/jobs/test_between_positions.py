@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 import opl
-from opl.planning.multi_start import RecursiveSearch, plan_recursive
+from opl.planning.multi_start import plan_recursive, try_recursive
 from opl.planning.plan import Exhausted
 from opl.planning.settings import Start
 from opl.run.searches import search_path
@@ -28,7 +28,7 @@ def narrow(tmp_path_factory):
 def test_a_motion_between_the_contact_positions_is_found(narrow):
     job, least = narrow
     problem = problem_of(job)
-    assert isinstance(RecursiveSearch(problem, Start.BEST).go_on(None), Exhausted)
+    assert isinstance(try_recursive(problem, Start.BEST, None), Exhausted)
     found = search_path(job.search, problem)
     assert found.recursive is None
     assert found.plan.gap <= 1e-3

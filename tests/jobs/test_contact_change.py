@@ -8,7 +8,7 @@ import pytest
 import opl
 from benchmarks.stranger_jobs import draw_job
 from opl.job.methods import Method, Objective
-from opl.planning.multi_start import RecursiveSearch, held_back
+from opl.planning.multi_start import held_back, try_recursive
 from opl.planning.settings import Start
 from opl.run.remedies import find_remedies
 from opl.run.searches import search_path
@@ -74,9 +74,7 @@ def test_where_it_shuts_the_field_the_search_goes_on_and_the_key_is_named(barely
     assert search_path(barely_open.search, problem_of(barely_open)).plan is not None
     job = with_change(barely_open, 0.5)
     problem = problem_of(job)
-    recursive = RecursiveSearch(problem, Start.BEST)
-    recursive.go_on(None)
-    assert held_back(problem, recursive.matrices)
+    assert held_back(problem, try_recursive(problem, Start.BEST, None).matrices)
     with pytest.raises(opl.NoPathError, match=r"40 contact positions .* search.max_contact_change"):
         search_path(job.search, problem)
 

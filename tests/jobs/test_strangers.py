@@ -111,6 +111,16 @@ def test_with_little_work_a_motion_is_sought_in_larger_boxes_before_it_is_done(t
     assert plan.lower_bound >= 0.92 * plan.path.joint_range_sum
 
 
+def test_where_nearly_all_is_free_there_is_a_motion_though_no_box_near_the_bound_has_one(tmp_path):
+    """The bound stays far below what is found; a third of the field, in one posture, is free."""
+    draw_job(20263702, 11, 1, tmp_path, uncommon=True)
+    job = opl.load_job(tmp_path / "job.yaml")
+    little = replace(job.search.optimal, max_subproblems=1000)
+    plan = search_path(replace(job.search, optimal=little), problem_of(job)).plan
+    assert plan.open_because == "the work allowed for the proof was done before it was complete"
+    assert 0.0 < plan.lower_bound < plan.path.joint_range_sum < 1.0
+
+
 @pytest.mark.parametrize(
     "drawn",
     [
