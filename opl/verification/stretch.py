@@ -184,7 +184,7 @@ class Replaying:
         """Check part against wheel as bodies; return whether they collide."""
         motion, cell = self._motion, self._cell
         grinding = motion.kind[move] in ON_WHEEL
-        touching_down = grinding and motion.kind[move - 1] is MoveKind.APPROACH
+        touching_down = grinding and motion.kind[move - 1] not in ON_WHEEL
         free = not grinding and motion.kind[move] not in ALONG_LEAD
         off_wheel = cell.pairs.required.get(frozenset((PART, WHEEL)), cell.required_clearance)
         needed = off_wheel if free else -cell.max_belt_penetration

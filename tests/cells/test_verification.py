@@ -304,6 +304,17 @@ def test_a_configuration_that_cuts_into_the_wheel_is_caught(which):
     assert 1.0 < depth < 2.2
 
 
+def test_a_pass_that_a_free_move_touches_down_for_is_proven():
+    """Leads are cut short: of an approach nothing may be left but where it begins."""
+    approach = indices(tiny_motion(), MoveKind.APPROACH)
+    kept = np.setdiff1d(np.arange(len(tiny_motion())), approach)
+    near = tiny_timed().take(kept)
+    after = np.searchsorted(kept, approach[0])
+    assert near.motion.kind[after] is MoveKind.GRIND and near.motion.kind[after - 1].is_free
+    verification = replay_tiny(near)
+    assert not [finding for finding in verification.findings if finding.kind == "contact"]
+
+
 def test_a_configuration_that_leaves_the_wheel_is_caught():
     index = indices(tiny_motion(), MoveKind.GRIND)[8]
     verification = replay_tiny(moved_into_wheel(index, -0.001))
