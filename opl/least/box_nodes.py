@@ -213,8 +213,9 @@ class BoxNodes:
     def check(self, track: Track, learn: Learn) -> tuple[Plan | None, Array | None, bool]:
         """Return the plan of a track, or of the next smoothest, if its whole motion is free.
 
-        One that sinks is the last: others do so as well. `sunk_between` of it, if it does; and
-        whether something was learnt of where motions collide, or sink at a place, instead.
+        One that sinks is the last: others do so as well, but not where its leads are too deep.
+        `sunk_between` of it, if it does; and whether something was learnt of where motions collide,
+        or sink at a place, instead.
         """
         search, places, problem = self._search, self._columns.places, self.problem
         scene, robot = problem.scene, problem.cell.robot

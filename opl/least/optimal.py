@@ -36,7 +36,7 @@ from opl.walls.placement import Placement
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
 NEARLY_DONE = 0.8  # of the work allowed: from then on motions are sought in larger boxes, too
-LAST_CHANCE = 0.9  # of it: then, where none is known, one of whatever size is
+LAST_CHANCE = 0.9  # of it: from then on one of whatever size is sought, where none is known
 ANYWHERE_SHARE = 0.3  # as much work, in shares of that allowed and beyond it, may be done for that
 
 
@@ -174,7 +174,7 @@ class OptimalSearch:
         if self.plan is not None:
             return
         if not self._sampler.collisions:
-            self._begin_minding()
+            self._begin_without_collisions()
         most = self.work_share + ANYWHERE_SHARE
         self.motions.look_anywhere(lambda: self.work_share < most)
         self._lower()
@@ -226,10 +226,10 @@ class OptimalSearch:
     def _mind_collisions(self) -> None:
         """Leave open what was worked on: the robot collides wherever a motion might have been."""
         self.proof.put_back()  # before what is proven is noted
-        self._begin_minding()
+        self._begin_without_collisions()
 
-    def _begin_minding(self) -> None:
-        """Begin again without what collides."""
+    def _begin_without_collisions(self) -> None:
+        """Begin the proof again without what collides, from the walls that there are."""
         self._leave_out_collisions()
         self._hoped = Hope(self.plan is not None)
         minding = self._new_proof(hoped := self._hoped.guess(self.lower_bound, self.motions.value))

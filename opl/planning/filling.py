@@ -78,18 +78,22 @@ def fill_in(
 
 
 def _at_flat_end(cell: WorkCell, t_node: Array, same_pass: np.ndarray, place: Array) -> Array:
-    """Return at which places a track passes an end of the wheel's flat, but for some, shape (k,).
+    """Return at which places a track passes an end of the wheel's flat, shape (k,).
 
     There the contact begins or ends to roll, and joints change their direction all at once: halving
     a move across such a place halves the contact error, of any other it leaves a quarter.
+
+    Args:
+        cell: The cell.
+        t_node: Contact position of each node in belt units, shape (N,).
+        same_pass: Whether a node and the next are of one pass, shape (N - 1,).
+        place: Fractional cutter points that are known, ascending: none of them is returned.
     """
-    found = [np.empty(0)]
-    for end in (-cell.wheel.flat_end, cell.wheel.flat_end):
-        passed = (t_node[:-1] - end) * (t_node[1:] - end) < 0.0
-        before = np.flatnonzero(passed & same_pass)
-        share = (end - t_node[before]) / (t_node[before + 1] - t_node[before])
-        found.append(before + share)
-    there = np.concatenate(found)
+    ends = np.array([[-cell.wheel.flat_end], [cell.wheel.flat_end]])
+    passed = same_pass & ((t_node[:-1] - ends) * (t_node[1:] - ends) < 0.0)
+    which, before = np.nonzero(passed)
+    share = (ends[which, 0] - t_node[before]) / (t_node[before + 1] - t_node[before])
+    there = before + share
     after = np.searchsorted(place, there)
     apart = np.minimum(there - place[after - 1], place[after] - there)
     return np.asarray(there[apart > SAME_PLACE])

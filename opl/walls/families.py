@@ -232,7 +232,7 @@ class Families:
         fits = [self._fits(index, limits, None) for index in range(len(self._passes))]
         found = []
         for family in self._unrolled:
-            chosen = [min(of_pass, key=partial(_foreign, family)) for of_pass in fits]
+            chosen = [min(of_pass, key=partial(_in_family, family)) for of_pass in fits]
             own = [fit.placement.family == family for fit in chosen]
             if any(own) and all(np.isfinite(fit.missing).all() for fit in chosen):
                 found.append((-sum(own), [fit.placement for fit in chosen]))
@@ -275,8 +275,8 @@ class Families:
         return placements, list(dict.fromkeys(place for _, place in missed))
 
 
-def _foreign(family: int, fit: Fit) -> tuple[float, bool]:
-    """Return what a box misses of a pass, and whether that is placed by another family."""
+def _in_family(family: int, fit: Fit) -> tuple[float, bool]:
+    """Return what a box misses of a pass, and whether another family than this places it."""
     return float(fit.missing.max()), fit.placement.family != family
 
 

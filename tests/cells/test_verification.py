@@ -304,7 +304,7 @@ def test_a_configuration_that_cuts_into_the_wheel_is_caught(which):
     assert 1.0 < depth < 2.2
 
 
-def test_a_pass_that_a_free_move_touches_down_for_is_proven():
+def test_a_pass_that_is_touched_down_for_from_the_end_of_a_free_move_is_proven():
     """Leads are cut short: of an approach nothing may be left but where it begins."""
     approach = indices(tiny_motion(), MoveKind.APPROACH)
     kept = np.setdiff1d(np.arange(len(tiny_motion())), approach)
