@@ -27,7 +27,6 @@ PARTS = 8  # into which a stretch between two places is cut
 SHORTEST = 1.0 / 500.0  # of the stretch between cutter points that is still cut
 AROUND = 12  # cutter points on either side of what is cut
 MOST_REFINED = 12  # times that rectangles are cut finer for one box
-ONE_BY_ONE = 2  # of these, before what lies around is cut finer, too
 # of what all ways miss a box by: what each edge of a wall misses it by; the next boxes would only
 # slip past walls that are nearer
 LESS = 0.97
@@ -97,8 +96,6 @@ class Rectangles:
             whole = bulge.last - bulge.first == 1.0
             if bulge.steep or not whole:
                 more.append(self._cut(bulge.first, bulge.last))
-            if bulge.steep and whole and self._refined >= ONE_BY_ONE:
-                self._halve_around(bulge)
         places = np.union1d(self.places, np.concatenate(more))
         new = len(places) > len(self.places)
         self.places = places
@@ -116,17 +113,6 @@ class Rectangles:
         finer = np.concatenate(more)
         self._between = np.union1d(self._between, finer)
         return finer
-
-    def _halve_around(self, bulge: Bulge) -> None:
-        """Halve the steps between cutter points around one, farther on either side each time.
-
-        What tracks do not get past mostly is as long as a pass: cut finer where the last track met
-        it, the next would only go around that.
-        """
-        begin, end = self._ends_of_pass(bulge.first)
-        far = 2.0**self._refined
-        first, last = max(bulge.first - far, begin), min(bulge.last + far, end)
-        self._between = np.union1d(self._between, np.arange(first, last) + 0.5)
 
     def _cut_along(
         self, rectangle: Rectangle, corners: Sequence[Corner], box: JointBox, most: float
