@@ -11,7 +11,7 @@ from opl.least.passages import Passages
 from opl.least.postures import Columns
 from opl.least.rows import Bulge
 from opl.least.search_space import SearchSpace
-from opl.planning.plan import Plan
+from opl.planning.plan import AT_REST, Plan
 from opl.planning.settings import OptimalSettings
 from opl.search.box import JointBox
 from opl.walls.placement import Placement
@@ -19,6 +19,7 @@ from opl.walls.placement import Placement
 # of a box that holds all, but no motion that is found: how much larger boxes are where one is
 # sought instead, so that what cannot be proven is not left far from the bound
 LARGER = tuple(0.0005 * 2.0**k for k in range(14))
+SETTLED = 0.02  # by which fraction a motion may be larger than a box in which none is found
 MOST_LOOKS = 3  # at each of these, with places cut finer by what the look before told
 
 
@@ -47,6 +48,8 @@ class Motions:
         self._search, self.best = search, known
         self._space, self._settings, self._largest = space, settings, largest
         self._tracks = BoxTracks(search)
+        # a motion of whatever size, in which flip of the wrist, and the image that each pass uses
+        self._large: tuple[Plan | None, bool, Sequence[Placement]] | None = None
 
     @property
     def value(self) -> float:
@@ -123,8 +126,39 @@ class Motions:
                 if not goes_on():
                     return False
                 if self._look_in(limits, placements, goes_on):
+                    self._large = self.best, sampler.mirrored, placements
                     return True
         return False
+
+    @property
+    def may_be_smaller(self) -> bool:
+        """Whether the best is one of whatever size still, and no smaller one was sought."""
+        return self._large is not None and self._large[0] is self.best
+
+    def make_smaller(self, goes_on: Callable[[], bool], least: float) -> None:
+        """Look for motions in boxes about the middle of one of whatever size, by bisection.
+
+        As if boxes smaller than one that holds none held none, nor those below a size in [rad].
+        """
+        if self._large is None:
+            return
+        _, self._search.sampler.mirrored, placements = self._large
+        self._large = None
+        while self.value - least > max(SETTLED * self.value, AT_REST) and goes_on():
+            about = self._about_best((least + self.value) / 2.0, placements)
+            if not self._look_in(about, placements, goes_on):
+                least = about.size
+
+    def _about_best(self, size: float, placements: Sequence[Placement]) -> JointBox:
+        """Return a box of a size in [rad] about the middle of the best motion.
+
+        Of the image that placements make of it.
+        """
+        assert self.best is not None
+        sampler, path = self._search.sampler, self.best.path
+        there, t = sampler.there(path.cutter_point), path.contact_position[:, None]
+        q = sampler.at(path.cutter_point, there, placements, t).q[:, 0]
+        return JointBox(q.min(axis=0), q.max(axis=0)).scaled(size)
 
     def _larger(self, box: JointBox, placements: Sequence[Placement]) -> list[JointBox]:
         """Return the larger boxes about one that are smaller than the best motion."""

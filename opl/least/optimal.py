@@ -37,7 +37,8 @@ MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
 NEARLY_DONE = 0.8  # of the work allowed: from then on motions are sought in larger boxes, too
 LAST_CHANCE = 0.9  # of it: from then on one of whatever size is sought, where none is known
-ANYWHERE_SHARE = 0.3  # as much work, in shares of that allowed and beyond it, may be done for that
+# in shares of the work allowed, and beyond it: what may be done for that, and to make it smaller
+ANYWHERE_SHARE, SMALLER_SHARE = 0.3, 0.2
 
 
 class OptimalSearch:
@@ -97,7 +98,7 @@ class OptimalSearch:
         """Whether there is nothing left to do."""
         closed = self.proof.closed and self.proof.threshold >= self.motions.value
         done = closed or self._proven >= self.motions.value
-        ended = self._ends and self._looked_anywhere
+        ended = self._ends and self._looked_anywhere and not self.motions.may_be_smaller
         return done or ended or self.motions.value <= AT_REST
 
     @property
@@ -134,6 +135,10 @@ class OptimalSearch:
     def _work_on_one(self) -> None:
         if not self._looked_anywhere and (self._ends or self.work_share >= LAST_CHANCE):
             self._look_anywhere()
+            return
+        if self._ends:  # with one of whatever size, which nothing led to
+            most = self.work_share + SMALLER_SHARE
+            self.motions.make_smaller(lambda: self.work_share < most, self.lower_bound)
             return
         if self.proof.closed:
             self._hope_for_less()

@@ -34,6 +34,14 @@ class JointBox:
         step = amount / (2.0 * len(self.lower))
         return JointBox(self.lower - step, self.upper + step)
 
+    def scaled(self, size: float) -> JointBox:
+        """Return the box of a size in [rad] about the same middle, its edges as they are otherwise.
+
+        Not of a box of size 0.
+        """
+        middle, half = (self.lower + self.upper) / 2.0, (self.upper - self.lower) / 2.0
+        return JointBox(middle - half * (size / self.size), middle + half * (size / self.size))
+
     def holds(self, q: Array) -> np.ndarray:
         """Return which ``q``, shape (..., 6), lie inside; round-off at a face is forgiven."""
         inside = (q >= self.lower - 1e-12) & (q <= self.upper + 1e-12)

@@ -30,13 +30,13 @@ def anew():
     space.cache_clear()
 
 
-def motions(known):
-    """Return a search for motions in boxes of that row."""
+def motions(known, largest=None):
+    """Return a search for motions in boxes of that row, of whatever size or below that known."""
     problem, costs = v_row(), SETTINGS.costs
     push_away = PushAway(problem.cell, costs)
     most = Travel(np.inf, np.inf)
     tracks = TrackSearch(problem, space().sampler, costs, most, push_away)
-    largest = recursive(v_row).path.joint_range_sum
+    largest = largest or recursive(v_row).path.joint_range_sum
     return Motions(space(), tracks, SETTINGS, known, largest)
 
 
@@ -71,6 +71,28 @@ def test_none_is_kept_that_is_no_better():
         assert again.value < search.value  # among places that were cut finer
         search = again
     assert again.best is search.best
+
+
+def test_a_motion_of_whatever_size_is_made_smaller():
+    search = motions(None, np.inf)
+    assert search.look_anywhere(always) and search.may_be_smaller
+    large = search.value
+    search.make_smaller(always, 0.0)
+    assert not search.may_be_smaller
+    assert np.ptp(search.best.path.q, axis=0).sum() == pytest.approx(search.value, rel=1e-9)
+    space.cache_clear()
+    least = motions(None)
+    assert least.look_about(*smaller(0.02), always)
+    assert search.value == pytest.approx(least.value, rel=0.01)
+    assert large > 1.2 * search.value
+
+
+def test_a_motion_is_not_made_smaller_than_what_is_proven():
+    search = motions(None, np.inf)
+    assert search.look_anywhere(always)
+    large = search.best
+    search.make_smaller(always, search.value)
+    assert search.best is large
 
 
 @pytest.mark.parametrize("share", [0.02, 0.9])
