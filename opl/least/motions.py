@@ -48,7 +48,7 @@ class Motions:
         self._search, self.best = search, known
         self._space, self._settings, self._largest = space, settings, largest
         self._tracks = BoxTracks(search)
-        # a motion of whatever size, in which flip of the wrist, and the image that each pass uses
+        # what was sought anywhere: the motion, whether its wrist is flipped, the image of each pass
         self._large: tuple[Plan | None, bool, Sequence[Placement]] | None = None
 
     @property
@@ -132,13 +132,14 @@ class Motions:
 
     @property
     def may_be_smaller(self) -> bool:
-        """Whether the best is one of whatever size still, and no smaller one was sought."""
+        """Whether the best is the one that was sought anywhere, and none was sought about it."""
         return self._large is not None and self._large[0] is self.best
 
     def make_smaller(self, goes_on: Callable[[], bool], least: float) -> None:
-        """Look for motions in boxes about the middle of one of whatever size, by bisection.
+        """Bisect boxes about the middle of the motion that was sought anywhere for smaller ones.
 
-        As if boxes smaller than one that holds none held none, nor those below a size in [rad].
+        Between its size and a least one in [rad], as long as `goes_on` says so; as if no box held a
+        motion that is smaller than one in which none is found.
         """
         if self._large is None:
             return

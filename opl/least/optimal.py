@@ -136,7 +136,7 @@ class OptimalSearch:
         if not self._looked_anywhere and (self._ends or self.work_share >= LAST_CHANCE):
             self._look_anywhere()
             return
-        if self._ends:  # with one of whatever size, which nothing led to
+        if self._ends:  # and the best is the one that was sought anywhere: nothing else is left
             most = self.work_share + SMALLER_SHARE
             self.motions.make_smaller(lambda: self.work_share < most, self.lower_bound)
             return

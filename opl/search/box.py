@@ -35,12 +35,13 @@ class JointBox:
         return JointBox(self.lower - step, self.upper + step)
 
     def scaled(self, size: float) -> JointBox:
-        """Return the box of a size in [rad] about the same middle, its edges as they are otherwise.
+        """Return the box of a size in [rad] with the same middle and ratio of edges.
 
-        Not of a box of size 0.
+        Its own size is not 0.
         """
-        middle, half = (self.lower + self.upper) / 2.0, (self.upper - self.lower) / 2.0
-        return JointBox(middle - half * (size / self.size), middle + half * (size / self.size))
+        middle, edges = (self.lower + self.upper) / 2.0, self.upper - self.lower
+        half = edges * (size / self.size / 2.0)
+        return JointBox(middle - half, middle + half)
 
     def holds(self, q: Array) -> np.ndarray:
         """Return which ``q``, shape (..., 6), lie inside; round-off at a face is forgiven."""

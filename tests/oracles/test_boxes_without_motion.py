@@ -12,7 +12,6 @@ from opl.least.motions import LARGER, MOST_LOOKS, Motions
 from opl.least.rows import Bulge
 from opl.least.search_space import SearchSpace, seams_in
 from opl.planning.costs import PushAway
-from opl.search.box import JointBox
 from opl.search.in_box import missing
 from opl.search.smooth import Travel
 from tests.oracles.test_optimal import SETTINGS, recursive, v_row
@@ -43,8 +42,7 @@ def motions(known, largest=None):
 def smaller(share):
     """Return a box that holds all places, smaller by a share about its middle; and placements."""
     box = space().families.smallest_grown()
-    spare = share * (box.upper - box.lower) / 2.0
-    box = JointBox(box.lower + spare, box.upper - spare)
+    box = box.scaled((1.0 - share) * box.size)
     return box, space().families.hold(box, {}, set(), 0.01)[0]
 
 
