@@ -32,8 +32,10 @@ class Interval:
         return self + (-other)
 
     def __mul__(self, other: Interval) -> Interval:
-        ends = [a * b for a in (self.low, self.high) for b in (other.low, other.high)]
-        return outwards(np.minimum.reduce(ends), np.maximum.reduce(ends))
+        a, b = self.low * other.low, self.low * other.high
+        c, d = self.high * other.low, self.high * other.high
+        least = np.minimum(np.minimum(a, b), np.minimum(c, d))
+        return outwards(least, np.maximum(np.maximum(a, b), np.maximum(c, d)))
 
     def __truediv__(self, other: Interval) -> Interval:
         apart = np.where((other.low > 0.0) | (other.high < 0.0), 1.0, np.nan)
