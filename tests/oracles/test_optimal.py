@@ -580,9 +580,13 @@ def weighted(problem, weights, fallback):
     return plan_weighted(problem, weights, SETTINGS.costs, known)
 
 
+@cache
+def least_travel_of_one_row():
+    return weighted(one_row(), ONLY_TRAVEL, recursive(one_row))
+
+
 def test_travel_is_less_than_on_any_track_over_the_contact_positions_of_the_field():
-    problem = one_row()
-    plan = weighted(problem, ONLY_TRAVEL, recursive(one_row))
+    problem, plan = one_row(), least_travel_of_one_row()
     q, _ = at_cutter_points(plan.path)
     on_field = shortest(problem, lambda a, b, *_: np.abs(b - a).sum(axis=1))
     assert plan.checks == 1  # nothing was in the way, so the field is scipy's
@@ -631,8 +635,7 @@ def test_a_weighted_sum_is_what_the_motion_has_and_no_more_than_other_methods_ha
     plan = weighted(problem, WEIGHTS, recursive(one_row))
     assert plan.objective.value == pytest.approx(sum_of(problem, plan, WEIGHTS), abs=1e-12)
     assert 0.0 < plan.objective.lower_bound <= plan.objective.value
-    travel = weighted(problem, ONLY_TRAVEL, recursive(one_row))
-    for other in (recursive(one_row), travel):
+    for other in (recursive(one_row), least_travel_of_one_row()):
         assert plan.objective.value <= sum_of(problem, other, WEIGHTS) + 1e-12
     again = weighted(problem, WEIGHTS, recursive(one_row))
     assert again.motion.q.tobytes() == plan.motion.q.tobytes()

@@ -69,11 +69,9 @@ def test_a_bound_that_rests_on_barriers_is_proven_anew_with_them_alone():
     assert recheck(certificate)[0]
     assert not recheck({**certificate, "barriers": []})[0]
     end = float(len(certificate["pass_index"]) - 1)
-    longer = [(first, end, t) for first, last, t in certificate["barriers"] if last < end]
-    assert longer
-    for one in longer:
-        with pytest.raises(ValueError, match="are not shut"):
-            recheck({**certificate, "barriers": [one]})
+    longer = next((first, end, t) for first, last, t in certificate["barriers"] if last < end)
+    with pytest.raises(ValueError, match="are not shut"):
+        recheck({**certificate, "barriers": [longer]})
 
 
 def test_the_checker_uses_nothing_of_opl():
