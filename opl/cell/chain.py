@@ -101,7 +101,7 @@ def _turn(direction, c, s, T):  # type: ignore[no-untyped-def]
     T[1, 2], T[2, 1] = dy * z - sx, dy * z + sx
 
 
-@kernel()
+@kernel(makes_arrays=True)
 def _pose(c, s, before_joint, axis, directions, base, flange, room, found):  # type: ignore[no-untyped-def]
     """Set the pose of the flange in the base frame, of cosines and sines of the joints."""
     placed, moved, turn = room[0], room[1], room[2]
@@ -133,6 +133,7 @@ def _pose(c, s, before_joint, axis, directions, base, flange, room, found):  # t
     "void(float64[:,::1],float64[:,:,::1],int64[::1],float64[:,::1],float64[:,:],float64[:,:],"
     "float64[:,:,::1])",
     early=True,
+    makes_arrays=True,
 )
 def _poses(q, before_joint, axis, directions, base, flange, found):  # type: ignore[no-untyped-def]
     """Set the poses of the flange in the base frame, see `Chain.poses`."""

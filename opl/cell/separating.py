@@ -124,6 +124,7 @@ def _place_joints(q, n, before_joint, axes, placed, at_zero, turn):  # type: ign
 @kernel(
     "void(" + _GIVEN + "float64[::1],float64[::1],int64[::1],boolean[:,::1],boolean[::1])",
     early=True,
+    makes_arrays=True,
 )
 def separate(  # type: ignore[no-untyped-def]
     q, solids, paired, enough, closer, surely, more, last, apart, best, near, met

@@ -114,7 +114,10 @@ def _bound(T, spheres, slabs, boxes, index, half_width, radius):  # type: ignore
     return value + lowest_along(T, spheres, slabs, boxes, index, gx, gy, gz)
 
 
-@kernel(f"Tuple((float64,int64,int64))(float64[:,::1],{TREE},float64,float64,float64,float64)")
+@kernel(
+    f"Tuple((float64,int64,int64))(float64[:,::1],{TREE},float64,float64,float64,float64)",
+    makes_arrays=True,
+)
 def _part_distance(T, tree, half_width, radius, needed, enough):  # type: ignore[no-untyped-def]
     """Distance of the part in one pose, of which triangle, and how many looks that took."""
     triangles, spheres, slabs, boxes, first, child = tree

@@ -132,7 +132,8 @@ def _node_out(T, half, spheres, slabs, boxes, index, half_width, radius, needed)
 
 @kernel(
     "boolean(float64[:,::1],float64[:,::1],float64[:,:,::1],int64,float64,float64,float64,"
-    "float64[:,::1])"
+    "float64[:,::1])",
+    makes_arrays=True,
 )
 def _triangle_out(T, half, triangles, index, half_width, radius, needed, room):  # type: ignore[no-untyped-def]
     """Return whether a triangle surely keeps a distance all along.
@@ -191,7 +192,10 @@ def _triangle_out(T, half, triangles, index, half_width, radius, needed, room): 
     return True
 
 
-@kernel("boolean(float64[:,::1],float64[:,::1],float64[:,:,::1],int64,float64,float64,float64)")
+@kernel(
+    "boolean(float64[:,::1],float64[:,::1],float64[:,:,::1],int64,float64,float64,float64)",
+    makes_arrays=True,
+)
 def _led_out(T, half, triangles, index, half_width, radius, needed):  # type: ignore[no-untyped-def]
     """Return whether a triangle surely keeps a distance all along in one direction.
 
@@ -213,7 +217,8 @@ def _led_out(T, half, triangles, index, half_width, radius, needed):  # type: ig
 
 
 @kernel(
-    f"Tuple((boolean,int64))(float64[:,::1],float64[:,::1],float64,{TREE},float64,float64,float64)"
+    f"Tuple((boolean,int64))(float64[:,::1],float64[:,::1],float64,{TREE},float64,float64,float64)",
+    makes_arrays=True,
 )
 def _part_out(T, half, bent, tree, half_width, radius, needed):  # type: ignore[no-untyped-def]
     """Whether the part surely keeps a distance on one stretch, and how many looks that took."""

@@ -79,7 +79,7 @@ def _may_cross_rim(a, b, half_width, radius, way):  # type: ignore[no-untyped-de
     return beside >= half_width and max(one, other) + way >= radius
 
 
-@kernel("UniTuple(float64,4)(float64[:,::1],float64,float64,float64)")
+@kernel("UniTuple(float64,4)(float64[:,::1],float64,float64,float64)", makes_arrays=True)
 def way_out(triangle, half_width, radius, enough):  # type: ignore[no-untyped-def]
     """Return minus the length of the shortest way out of a triangle in the wheel, and where to.
 

@@ -24,6 +24,9 @@ _LINEAR_ALGEBRA = "scipy.linalg"
 
 prange = range  # numba's own in a kernel with threads
 
+# an option of numba, for its own use: whether what is compiled counts references to arrays
+_COUNTED = "_nrt"
+
 _made: list[Kernel] = []
 _one_thread = Event()
 
@@ -38,6 +41,8 @@ class Kernel:
         threads: Whether loops over `prange` are shared among threads.
         for_arrays: What does for arrays what it does for scalars, None for the function itself.
         early: Whether it is loaded before it is called where there is time: most runs call it.
+        makes_arrays: Whether it makes arrays or returns one. All others count no references to
+            those that they are given: at each call, that takes as long as what many of them do.
     """
 
     def __init__(
@@ -47,13 +52,17 @@ class Kernel:
         threads: bool,
         for_arrays: Callable[..., Any] | None,
         early: bool,
+        makes_arrays: bool,
     ) -> None:
+        returns = "" if signature is None else signature.partition("(")[0]
+        assert makes_arrays or "[" not in returns, "a kernel that returns an array says that"
         self.__wrapped__ = function
         self.__doc__ = function.__doc__
         self._signature = signature
         self._threads = threads
         self._for_arrays = for_arrays
         self.early = early
+        self._makes_arrays = makes_arrays
 
     def __call__(self, *arguments: Any) -> Any:  # noqa: D102
         assert not self._threads or threads_are_allowed(), "a copy of a process has no threads"
@@ -68,8 +77,11 @@ class Kernel:
             known = {**function.__globals__, "prange": numba.prange}
             function = FunctionType(function.__code__, known)
         types = () if self._signature is None else (self._signature,)
+        options = {"parallel": self._threads}
+        if hasattr(numba.core.options.DefaultOptions, _COUNTED):
+            options[_COUNTED] = self._makes_arrays or self._threads
         # a division by 0 gives what numpy gives: to look for one at each costs up to a quarter
-        made = numba.njit(*types, cache=True, parallel=self._threads, error_model="numpy")
+        made = numba.njit(*types, cache=True, error_model="numpy", **options)
         return made(function)
 
     @cached_property
@@ -95,11 +107,12 @@ def kernel(
     threads: bool = False,
     for_arrays: Callable[..., Any] | None = None,
     early: bool = False,
+    makes_arrays: bool = False,
 ) -> Callable[[Any], Kernel]:
     """Return what makes a `Kernel` of a function, with arguments as there."""
 
     def make(function: FunctionType) -> Kernel:
-        made = Kernel(function, signature, threads, for_arrays, early)
+        made = Kernel(function, signature, threads, for_arrays, early, makes_arrays)
         _made.append(made)
         return made
 

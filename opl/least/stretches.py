@@ -45,6 +45,7 @@ _ROWS = "Tuple((float64[:,::1],float64[::1],int64[::1],float64[::1]))"
 @kernel(
     f"void(float64[::1],float64[:,::1],{_ROWS},float64[::1],float64[::1],float64,float64,"
     "int64[:,:,::1])",
+    makes_arrays=True,
 )
 def passed(places, t, rows, low, high, same, room, counts):  # type: ignore[no-untyped-def]
     """Count the rows at or below nodes, of those that lie outside of a box where an edge is.

@@ -30,7 +30,7 @@ def corner_error(screws: Screws, run: Run, corner: tuple[int, int, int], zone: f
     return float(found)
 
 
-@kernel()
+@kernel(makes_arrays=True)
 def rounded_off(axes, T0, q, places, targets, freedom, tool, i, j, k, zone, most):  # type: ignore[no-untyped-def]
     """Return how far along its normal the contact is off in [m] if the corner at j is cut off.
 

@@ -159,6 +159,7 @@ def chain_of(
     "Tuple((int64[::1],int64[::1],float64[::1]))(float64[:,::1],float64[:,::1],float64[:,::1],"
     "float64[:,:,::1],float64[:,:,::1],int64[::1],float64[:,::1],float64[::1],float64[:,::1])",
     early=True,
+    makes_arrays=True,
 )
 def _lines(axes, T0, q, places, targets, freedom, room, allowed, pace):  # type: ignore[no-untyped-def]
     """Return the lines that keep their contact by where they end: starts, first ones, errors."""
@@ -198,7 +199,7 @@ def _lines(axes, T0, q, places, targets, freedom, room, allowed, pace):  # type:
     return starts[:count], first, errors[:count]
 
 
-@kernel()
+@kernel(makes_arrays=True)
 def _even(pace, i, j, k, ratio):  # type: ignore[no-untyped-def]
     """Return whether the speeds of the lines from i to j and on to k are near enough."""
     if k == i + 2:
@@ -215,6 +216,7 @@ def _even(pace, i, j, k, ratio):  # type: ignore[no-untyped-def]
     "int64[::1],float64[:,::1],float64[::1],float64[:,::1],float64[:,::1],"
     "float64,float64,float64,float64,int64[::1],int64[::1],float64[::1],int64[:,::1],int64[::1])",
     early=True,
+    makes_arrays=True,
 )
 def _chain(  # type: ignore[no-untyped-def]
     axes, T0, q, places, targets, freedom, room, allowed, pace, tool,

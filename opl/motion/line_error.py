@@ -199,6 +199,7 @@ def _pass_by(axes, T0, q, places, targets, freedom, room, pace, i, j, k, least, 
     "void(float64[:,::1],float64[:,::1],float64[:,::1],float64[:,:,::1],float64[:,:,::1],"
     "int64[::1],float64[:,::1],float64[::1],float64[:,::1],int64,int64,float64[::1],float64[::1])",
     early=True,
+    makes_arrays=True,
 )
 def _along(axes, T0, q, places, targets, freedom, room, allowed, pace, i, j, shares, errors):  # type: ignore[no-untyped-def]
     """Fill in where the line from i to j passes the places between, none before the one ahead."""

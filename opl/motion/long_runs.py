@@ -67,7 +67,7 @@ def fewest_of_long(
     return fewest(screws, run, rule, blocked, lines)
 
 
-@kernel()
+@kernel(makes_arrays=True)
 def _kept(  # type: ignore[no-untyped-def]
     axes, T0, q, places, targets, freedom, room, allowed, pace, share, most
 ):
@@ -92,7 +92,7 @@ def _kept(  # type: ignore[no-untyped-def]
     return np.array(kept)
 
 
-@kernel()
+@kernel(makes_arrays=True)
 def _off(axes, T0, q, places, targets, freedom, room, allowed, pace, start, end):  # type: ignore[no-untyped-def]
     """Return whether a line is off by more than is allowed somewhere, and a place that tells so."""
     T, work = np.empty((3, 4)), np.empty((3, 6))

@@ -116,7 +116,7 @@ def _followers(nodes: NodeMatrix, positions: np.ndarray) -> Iterator[np.ndarray]
             yield alike[followed]
 
 
-@kernel("int64[:,::1](float64[:,::1],int64[::1])", early=True)
+@kernel("int64[:,::1](float64[:,::1],int64[::1])", early=True, makes_arrays=True)
 def _nearest_on(q, begin):  # type: ignore[no-untyped-def]
     """Return the postures that are nearest from column to column, from each of the first on.
 

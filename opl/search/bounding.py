@@ -64,6 +64,7 @@ def _kept(bounds, low, high, closing, limits, held):  # type: ignore[no-untyped-
     "int64(float64[:,::1],float64[:,::1],int64[:,::1],int64[::1],int64,float64[:,:,::1],"
     "float64[::1],float64[::1],float64,float64[::1])",
     early=True,
+    makes_arrays=True,
 )
 def tighten(bounds, shifts, spans, pass_index, n_keys, limits, low, high, closing, sizes):  # type: ignore[no-untyped-def]
     """Cut off what no box below a size can hold; return how many spans are left, 0 if none can be.
@@ -148,6 +149,7 @@ def tighten(bounds, shifts, spans, pass_index, n_keys, limits, low, high, closin
 @kernel(
     "float64[::1](float64[:,::1],float64[:,::1],int64[:,::1],float64[::1],float64[::1])",
     early=True,
+    makes_arrays=True,
 )
 def distances(cells, shifts, spans, low, high):  # type: ignore[no-untyped-def]
     """Return by how much a box misses the chords of each span, shape (n,), in [rad]."""

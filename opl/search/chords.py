@@ -98,6 +98,7 @@ def clip(q, low, high, enter, leave):  # type: ignore[no-untyped-def]
     "void(float64[:,::1],float64[:,:,::1],boolean[:,::1],float64[::1],float64[::1],float64[::1],"
     "boolean,float64[:,::1],float64[::1])",
     early=True,
+    makes_arrays=True,
 )
 def sample(t, q, free, low, high, share, whole, found, spacing):  # type: ignore[no-untyped-def]
     """Find contact positions where chords lie in a box.

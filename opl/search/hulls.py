@@ -32,7 +32,8 @@ def _press(cells, shifts, source, cell, side, low, high, point):  # type: ignore
 
 @kernel(
     "float64(float64[:,::1],float64[:,::1],int64[:,::1],float64[::1],float64[::1],float64[::1],"
-    "float64[::1])"
+    "float64[::1])",
+    makes_arrays=True,
 )
 def nearest_end(cells, shifts, spans, low, high, point, place):  # type: ignore[no-untyped-def]
     """Find the end of a cell of a wall that is nearest to a box; return the numbers worked on.
@@ -72,7 +73,8 @@ def nearest_end(cells, shifts, spans, low, high, point, place):  # type: ignore[
 
 @kernel(
     "Tuple((float64,int64,int64,int64,float64))(float64[:,::1],float64[:,::1],int64[:,::1],"
-    "float64[::1],float64[::1],float64[::1])"
+    "float64[::1],float64[::1],float64[::1])",
+    makes_arrays=True,
 )
 def least_pressed(cells, shifts, spans, prices, low, high):  # type: ignore[no-untyped-def]
     """Return what a wall presses out at the least at some prices of faces, in [rad].
@@ -109,7 +111,8 @@ def least_pressed(cells, shifts, spans, prices, low, high):  # type: ignore[no-u
 
 @kernel(
     "UniTuple(float64,2)(float64[:,::1],float64[:,::1],int64[:,::1],float64[::1],float64[::1],"
-    "float64[::1],float64[::1],float64[::1])"
+    "float64[::1],float64[::1],float64[::1])",
+    makes_arrays=True,
 )
 def missed(cells, shifts, spans, low, high, prices, point, place):  # type: ignore[no-untyped-def]
     """Return by how much a box has to grow at the least to meet the hull of a wall, in [rad].
@@ -179,6 +182,7 @@ def missed(cells, shifts, spans, low, high, prices, point, place):  # type: igno
 @kernel(
     "UniTuple(float64,3)(float64[:,::1],float64[:,::1],int64[:,::1],float64[::1],float64[::1])",
     early=True,
+    makes_arrays=True,
 )
 def nearest_point(cells, shifts, spans, low, high):  # type: ignore[no-untyped-def]
     """Return how far the hull of a wall is from a box in [rad], and where it is nearest.

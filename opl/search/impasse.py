@@ -60,7 +60,10 @@ def passable(ladder: Ladder, blocked: np.ndarray, first: int, last: int) -> bool
     return bool((part.free & ~dead)[0].any())
 
 
-@kernel(f"boolean[::1]({EDGE_RULE},int64[::1],boolean[:,::1],int64,boolean[::1],boolean)")
+@kernel(
+    f"boolean[::1]({EDGE_RULE},int64[::1],boolean[:,::1],int64,boolean[::1],boolean)",
+    makes_arrays=True,
+)
 def _reached(edge_rule, blocked, free, column, reach, back):  # type: ignore[no-untyped-def]
     """Return which free rows an edge leads to that begins at a column, from some rows of it.
 

@@ -54,6 +54,7 @@ def nearest_on_chord(a, b, low, high, best):  # type: ignore[no-untyped-def]
     "void(float64[:,:,::1],boolean[:,::1],float64[::1],float64[::1],float64,float64[::1],"
     "float64[::1])",
     early=True,
+    makes_arrays=True,
 )
 def outside(q, free, low, high, longest, missing, at):  # type: ignore[no-untyped-def]
     """Find the point of each column that a box has to grow least for.

@@ -135,7 +135,7 @@ def passage(up: Array, along: Array, most: float) -> list[tuple[Corner, Corner]]
     return edges[::-1]
 
 
-@kernel("int64(boolean[:,::1],boolean[:,::1],int64[::1])")
+@kernel("int64(boolean[:,::1],boolean[:,::1],int64[::1])", makes_arrays=True)
 def _climbed(up, along, before):  # type: ignore[no-untyped-def]
     """Return the first corner reached of the greatest contact position, -1 if none is.
 

@@ -90,7 +90,11 @@ def _add_dead_ends(edge_rule, free, blocked, dead):  # type: ignore[no-untyped-d
             dead[column, here] = not leads_on
 
 
-@kernel(f"Tuple((int64,float64,int64))({_FIELD},int64,float64,int64[::1])", early=True)
+@kernel(
+    f"Tuple((int64,float64,int64))({_FIELD},int64,float64,int64[::1])",
+    early=True,
+    makes_arrays=True,
+)
 def _descend(edge_rule, free, blocked, dead, start, bound, rows):  # type: ignore[no-untyped-def]
     q = edge_rule[0]
     n_columns, n_joints, n_rows = q.shape

@@ -30,7 +30,7 @@ ENOUGH = 0.02  # of what is left to be closed: how near these may come to each o
 NEAR = 3e-3  # of the size of interest: likewise
 
 
-@kernel("int64(float64[:,::1],int64[::1],int64)")
+@kernel("int64(float64[:,::1],int64[::1],int64)", makes_arrays=True)
 def _without_slack(table, basic, n_cuts):  # type: ignore[no-untyped-def]
     """Forget the cuts of a dictionary that hold nothing up; return how many rows are left."""
     kept = 0
@@ -45,6 +45,7 @@ def _without_slack(table, basic, n_cuts):  # type: ignore[no-untyped-def]
     "UniTuple(float64,2)(float64[:,::1],float64[:,::1],int64[:,::1],int64,float64[::1],float64[::1],"
     "float64,float64[:,::1],float64[::1],float64[:,::1])",
     early=True,
+    makes_arrays=True,
 )
 def least_box(  # type: ignore[no-untyped-def]
     cells, shifts, spans, n_walls, low, high, closing, box, lost, prices

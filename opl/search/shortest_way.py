@@ -156,7 +156,8 @@ def _edge(  # type: ignore[no-untyped-def]
 @kernel(
     "int64(float64[:,::1],float64[:,::1],float64[:,::1],float64[:,::1],float64[::1],float64[::1],"
     "int64[::1],float64,float64,float64[::1],float64[::1],float64,float64[::1],float64[::1],"
-    "boolean,float64[::1])"
+    "boolean,float64[::1])",
+    makes_arrays=True,
 )
 def _pass_on(  # type: ignore[no-untyped-def]
     start, along, pad_low, pad_high, t_low, t_high, first, travel, time, seconds, max_speed,

@@ -128,6 +128,7 @@ def smoothest_within(
     f"float64({EDGE_RULE},boolean[:,::1],int64[::1],float64[::1],float64,float64,float64[::1],"
     "float64[::1],float64,float64[:,::1],int64[::1])",
     early=True,
+    makes_arrays=True,
 )
 def _cheapest(  # type: ignore[no-untyped-def]
     edge_rule, free, blocked, joint_weights, contact_weight, time_weight, edge_seconds, max_speed,

@@ -256,6 +256,7 @@ def _in_order(
     "void(float64[:,:,::1],float64[:,:,::1],float64[:,:,::1],float64[:,::1],float64[::1],"
     "float64[::1],int64[:,::1])",
     early=True,
+    makes_arrays=True,
 )
 def _choose(tried, apart, t, even, t_before, t_after, chosen):  # type: ignore[no-untyped-def]
     """Do `_in_order` by dynamic programming over the configurations."""

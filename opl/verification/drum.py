@@ -80,7 +80,7 @@ def _beyond_from(corners, radius, width, x, y, z):  # type: ignore[no-untyped-de
     return _beyond(corners, radius, width, share * x, share * y, beside if z > 0.0 else -beside)
 
 
-@kernel("boolean(float64[:,::1],float64,float64,float64)")
+@kernel("boolean(float64[:,::1],float64,float64,float64)", makes_arrays=True)
 def _is_beyond(corners, radius, width, within):  # type: ignore[no-untyped-def]
     """Return whether some direction tells that a triangle is farther from a drum than ``within``.
 
@@ -115,7 +115,11 @@ def _is_beyond(corners, radius, width, within):  # type: ignore[no-untyped-def]
     return False
 
 
-@kernel("boolean(float64[:,:,::1],float64[:,::1],float64,float64,float64)", early=True)
+@kernel(
+    "boolean(float64[:,:,::1],float64[:,::1],float64,float64,float64)",
+    early=True,
+    makes_arrays=True,
+)
 def _are_beyond(triangles, T, radius, width, within):  # type: ignore[no-untyped-def]
     """Do `Drum.is_beyond` for a part at T in the frame of the drum."""
     corners = np.empty((3, 3))

@@ -47,6 +47,36 @@ def test_kernels_divide_as_numpy_does():
     assert _parted(1.0, 0.0) == np.inf and np.isnan(_parted(0.0, 0.0))
 
 
+@kernel("float64(float64[::1],int64)")
+def _at(x, k):
+    return x[k]
+
+
+def _sum_of_double(x):
+    double, total = 2.0 * x, 0.0
+    for k in range(len(x)):
+        total += _at(double, k)
+    return total
+
+
+def test_only_kernels_that_make_arrays_count_references_to_them(tmp_path, monkeypatch):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    signature = "float64(float64[::1])"
+    made = kernel(signature, makes_arrays=True)(_sum_of_double)
+    assert made(np.arange(4.0)) == 12.0
+    (code,) = made.compiled.inspect_llvm().values()
+    assert "NRT_MemInfo_alloc" in code
+    alone = numba.njit(**_at.compiled.targetoptions)(_at.__wrapped__)
+    assert alone(np.arange(4.0), 3) == 3.0
+    (code,) = alone.inspect_llvm().values()
+    assert "NRT_" not in code.split("cpython")[0]
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "other"))
+    with pytest.raises(numba.core.errors.NumbaError, match="NRT required"):
+        _ = kernel(signature)(_sum_of_double).compiled
+    with pytest.raises(AssertionError, match="that returns an array"):
+        kernel("float64[::1](float64[::1])")(_sum_of_double)
+
+
 def test_types_are_those_of_the_signature():
     with pytest.raises(TypeError, match="No matching definition"):
         _twice("two")
@@ -79,7 +109,7 @@ def test_what_was_kept_is_taken_into_what_is_compiled_later(tmp_path):
 import numpy as np
 from opl.files.kernels import kernel
 
-@kernel("float64(float64[::1])")
+@kernel("float64(float64[::1])", makes_arrays=True)
 def inner(x):
     y = np.empty(len(x))
     for k in range(len(x)):
