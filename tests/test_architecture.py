@@ -6,6 +6,7 @@ import inspect
 import re
 import subprocess
 import sys
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -80,9 +81,15 @@ def modules_of(package):
     }
 
 
-def imports_of(package, name, path):
-    """Return (own modules, other libraries) that a module imports anywhere in its text."""
+@cache
+def all_imports(package):
+    """Return {name: what it imports} of all modules of a package."""
     known = modules_of(package)
+    return {name: imports_of(package, known, name, path) for name, path in known.items()}
+
+
+def imports_of(package, known, name, path):
+    """Return (own modules, other libraries) that a module imports anywhere in its text."""
     own, others = set(), set()
 
     def note(parts):
@@ -124,11 +131,10 @@ def floor_of(name):
 def wrong_imports(package):
     """Return what is wrong with the imports of a package, one line each."""
     found = []
-    for name, path in modules_of(package).items():
+    for name, (own, others) in all_imports(package).items():
         if floor_of(name) is None:
             found.append(f"{name} is on no floor")
             continue
-        own, others = imports_of(package, name, path)
         for other in sorted(own):
             below = floor_of(other) is not None and floor_of(other) < floor_of(name)
             if room_of(other) != room_of(name) and not below:
@@ -145,7 +151,7 @@ def wrong_imports(package):
 
 def cycles(package):
     """Return modules that import each other in a circle, each circle once."""
-    graph = {name: imports_of(package, name, path)[0] for name, path in modules_of(package).items()}
+    graph = {name: own for name, (own, _) in all_imports(package).items()}
     found, done = [], set()
 
     def visit(name, trail):
@@ -233,7 +239,7 @@ def test_guests_in_other_programs_use_nothing_of_opl():
     folder = PACKAGE / "plugins" / "freecad"
     own_names = {path.stem for path in folder.iterdir()}
     for name in guests:
-        own, others = imports_of(PACKAGE, name, modules_of(PACKAGE)[name])
+        own, others = all_imports(PACKAGE)[name]
         assert own <= guests, name
         assert others <= {*sys.stdlib_module_names, *HOSTS, *own_names}, name
     # what talks to the service is the client of opl itself, copied: the folder is whole
@@ -261,7 +267,7 @@ def test_the_search_knows_arrays_and_no_robot():
     searches = [name for name in modules_of(PACKAGE) if room_of(name) == "search"]
     assert "search.recursive" in searches
     for name in searches:
-        own, others = imports_of(PACKAGE, name, modules_of(PACKAGE)[name])
+        own, others = all_imports(PACKAGE)[name]
         own = {other for other in own if room_of(other) != "search"}
         assert own <= {"geometry.frames", "files.kernels"}, name
         assert others <= {*sys.stdlib_module_names, "numpy"}, name
@@ -271,7 +277,7 @@ def test_the_command_line_uses_nothing_but_the_front_door():
     commands = [name for name in modules_of(PACKAGE) if room_of(name) == "cli"]
     assert "cli.commands" in commands
     for name in commands:
-        own, others = imports_of(PACKAGE, name, modules_of(PACKAGE)[name])
+        own, others = all_imports(PACKAGE)[name]
         assert {other for other in own if room_of(other) != "cli"} <= {"__init__"}, name
         assert others <= {*sys.stdlib_module_names, "click", "rich"}, name
 
