@@ -39,7 +39,8 @@ def nearest_on_chord(a, b, low, high, best):  # type: ignore[no-untyped-def]
         if away < best:
             best, place = away, x
         if step < 2:
-            if away == 0.0:
+            # nowhere is nearer than at an end from which it grows
+            if away == 0.0 or (slope > 0.0 if step == 0 else slope < 0.0):
                 break
         elif slope > 0.0:
             right = x
