@@ -83,7 +83,7 @@ def modules_of(package):
 
 @cache
 def all_imports(package):
-    """Return {name: what it imports} of all modules of a package."""
+    """Return {name: (own modules, other libraries)} that all modules of a package import."""
     known = modules_of(package)
     return {name: imports_of(package, known, name, path) for name, path in known.items()}
 

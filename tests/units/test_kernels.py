@@ -69,7 +69,7 @@ def test_only_kernels_that_make_arrays_count_references_to_them(tmp_path, monkey
     alone = numba.njit(**_at.compiled.targetoptions)(_at.__wrapped__)
     assert alone(np.arange(4.0), 3) == 3.0
     (code,) = alone.inspect_llvm().values()
-    assert "NRT_" not in code.split("cpython")[0]
+    assert "NRT_" not in code.split("cpython")[0]  # what follows is what Python calls it by
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "other"))
     with pytest.raises(numba.core.errors.NumbaError, match="NRT required"):
         _ = kernel(signature)(_sum_of_double).compiled
