@@ -24,7 +24,7 @@ from benchmarks.intervals import (
 )
 from benchmarks.recheck_arms import SURE, Flags
 
-TRIED = 16  # triangles of the part that are sought to be deep in the wheel
+TRIED = 64  # triangles of the part that are sought to be deep in the wheel
 WITNESSES = 12  # points of one
 CLOSER = 6  # times that the deepest point is looked for, each time six times as near
 GRID = np.array([(i, j, 12 - i - j) for i in range(13) for j in range(13 - i)]) / 12.0
