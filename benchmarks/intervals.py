@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,9 +127,10 @@ def angle_of(y: Jet, x: Jet) -> Jet:
 
 
 Vector = list[Jet]
+Number = TypeVar("Number", Interval, Jet)
 
 
-def dot(a: Sequence[Jet], b: Sequence[Jet]) -> Jet:
+def dot(a: Sequence[Number], b: Sequence[Number]) -> Number:
     """Return the inner product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 

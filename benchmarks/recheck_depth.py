@@ -5,7 +5,7 @@ Lengths are in [m], angles in [rad], contact positions t in belt units.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,6 @@ from benchmarks.intervals import (
     Array,
     Interval,
     Jet,
-    Vector,
     dot,
     exactly,
     outwards,
@@ -24,10 +23,14 @@ from benchmarks.intervals import (
 )
 from benchmarks.recheck_arms import SURE, Flags
 
-TRIED = 64  # triangles of the part that are sought to be deep in the wheel
+SEEN = 256  # triangles of the part that are looked at along several directions
+TRIED = 64  # that are sought to be deep in the wheel
 WITNESSES = 12  # points of one
 CLOSER = 6  # times that the deepest point is looked for, each time six times as near
 GRID = np.array([(i, j, 12 - i - j) for i in range(13) for j in range(13 - i)]) / 12.0
+# ways out of the wheel that are tried: away from the axle where these points are, tilted
+AWAY = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4.0
+TILTS = np.deg2rad(np.arange(-90.0, 91.0, 10.0))
 
 
 class Wheel:
@@ -111,13 +114,34 @@ class Wheel:
         """Return the triangles that may be too deep, seen from the middle of the wheel."""
         x, y, z = np.moveaxis(triangles, -1, 0)
         # no deeper than along the axle, nor than square to it towards the middle of the triangle
-        beside = np.where(np.ptp(np.sign(x), axis=1) > 1.0, 0.0, np.abs(x).min(axis=1))
+        along = self._width / 2.0 + np.minimum(-x.min(axis=1), x.max(axis=1))
         my, mz = y.mean(axis=1, keepdims=True), z.mean(axis=1, keepdims=True)
         away = np.maximum(np.hypot(my, mz), 1e-9)
         radial = self._radius - ((y * my + z * mz) / away).min(axis=1)
-        hope = np.minimum(self._width / 2.0 - beside, radial)
+        hope = np.minimum(along, radial)
         worth = np.flatnonzero(hope > self._allowed)
-        return worth[np.argsort(-hope[worth], kind="stable")[:TRIED]]
+        worth = worth[np.argsort(-hope[worth], kind="stable")[:SEEN]]
+        ways = self._ways_out(triangles[worth])
+        still_worth = np.flatnonzero(ways > self._allowed)
+        return worth[still_worth[np.argsort(-ways[still_worth], kind="stable")[:TRIED]]]
+
+    def _ways_out(self, triangles: Array) -> Array:
+        """Return how far it is out of the wheel for triangles, along some direction, (n,).
+
+        No triangle is deeper in the wheel than that.
+        """
+        x, across = triangles[:, None, :, 0], triangles[..., 1:]
+        away = AWAY @ across
+        lengths = np.linalg.norm(away, axis=-1, keepdims=True)
+        away = np.where(lengths > 1e-9, away / np.maximum(lengths, 1e-9), (0.0, 1.0))
+        along = away @ across.swapaxes(1, 2)  # of each corner, shape (n, directions, 3)
+        shortest = np.full(len(triangles), np.inf)
+        for tilt in TILTS:
+            c, s = np.cos(tilt), np.sin(tilt)
+            begun = self._radius * c + self._width / 2.0 * abs(s)
+            ways = begun - (c * along + s * x).min(axis=-1)
+            shortest = np.minimum(shortest, ways.min(axis=-1))
+        return shortest
 
     def _witnesses(self, triangle: Array) -> tuple[Array, float]:
         """Return points of a triangle, as shares of its corners, and how deep they show it to be.
@@ -170,14 +194,14 @@ class Wheel:
 
     def _holds(self, points: Array, low: float, high: float) -> bool:
         """Return whether points at rest in the cutter frame are too deep all over a cell."""
-        like = np.empty(len(points))
-        return self.surely_too_deep([still(v, like) for v in points.T], low, high)
+        return self.surely_too_deep([outwards(v, v) for v in points.T], low, high)
 
-    def surely_too_deep(self, points: Vector, low: float, high: float) -> bool:
+    def surely_too_deep(self, points: Sequence[Interval], low: float, high: float) -> bool:
         """Return whether a triangle is, by points of it in the cutter frame, all over a cell."""
-        n = len(points[0].value.low)
-        cell = self.contact(np.full(n, low), np.full(n, high))
-        x, y, z = ((dot(cell[r], points) + cell[r][3]).value for r in range(3))
+        n = len(points[0].low)
+        cell = self.contact(np.array([low]), np.array([high]))
+        rows = [[one.value for one in row] for row in cell]
+        x, y, z = (dot(row, points) + row[3] for row in rows)
         height = z - exactly(np.full(n, self._radius))
         across, along = (np.maximum(np.abs(v.low), np.abs(v.high)) for v in (y, height))
         depth, _, _ = least_of_most(*self._ways(x.low, x.high, np.hypot(across, along)))

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from benchmarks.intervals import Array, Jet, Vector, cross, dot, exactly, outwards, still, unit
+from benchmarks.intervals import (
+    Array,
+    Interval,
+    Jet,
+    Vector,
+    cross,
+    dot,
+    exactly,
+    outwards,
+    still,
+    unit,
+)
 
 
 class Passes:
@@ -19,6 +31,7 @@ class Passes:
     def __init__(self, certificate: dict[str, Any]) -> None:
         self._Ts_workpiece_cutter = np.array(certificate["Ts_workpiece_cutter"])
         self._pass_index = certificate["pass_index"]
+        self._all_along = lru_cache(maxsize=1)(self._frames)
 
     def require_one(self, first: float, last: float) -> None:
         """Do nothing if two places are on one pass.
@@ -62,7 +75,7 @@ class Passes:
         x = unit([x[k] - z[k] * lean for k in range(3)])
         return x, cross(z, x), z, p
 
-    def seen(self, points: Array, first: float, last: float) -> Vector:
+    def seen(self, points: Array, first: float, last: float) -> list[Interval]:
         """Return points of the workpiece in the cutter frame, all the way between two places.
 
         Args:
@@ -70,7 +83,11 @@ class Passes:
             first: From this place
             last: to this one, not past the next cutter point.
         """
-        like = np.ones(len(points))
-        x, y, z, p = self.between(int(first), first * like, last * like)
-        v = [still(points[:, k], like) - p[k] for k in range(3)]
-        return [dot(axis, v) for axis in (x, y, z)]
+        *axes, p = self._all_along(first, last)
+        v = [outwards(of, of) - its for of, its in zip(points.T, p, strict=True)]
+        return [dot(axis, v) for axis in axes]
+
+    def _frames(self, first: float, last: float) -> list[list[Interval]]:
+        """Return axes and origin of the cutter frame all the way between two places."""
+        frames = self.between(int(first), np.array([first]), np.array([last]))
+        return [[one.value for one in column] for column in frames]

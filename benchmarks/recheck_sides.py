@@ -7,7 +7,7 @@ a pass to another. As a pass goes on and never back, it stays above it all the w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations, pairwise
+from itertools import combinations, islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ ANY = -1  # all bits: whatever side the pass stays on
 ABOVE = sum(1 << 2 * k for k in range(31))  # of every barrier
 MOST = 31  # barriers that there are bits for; more are not used
 HALVINGS = 12  # of the way between two cutter points
+FIRST = 3  # triangles that are tried before the way is halved
 
 Chain = list[tuple[float, float]]
 
@@ -69,7 +70,8 @@ class Sides:
         """Return whether the part is surely too deep between two places on a contact position."""
         cutter = self._passes.in_cutter(self._wheel.triangles, (first + last) / 2.0)
         deep = False
-        for triangle, weights in self._wheel.deep_points(cutter, t):
+        most = FIRST if halvings > 0 else None
+        for triangle, weights in islice(self._wheel.deep_points(cutter, t), most):
             deep = True
             points = weights @ self._wheel.triangles[triangle]
             if self._wheel.surely_too_deep(self._passes.seen(points, first, last), t, t):

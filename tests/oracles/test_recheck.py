@@ -15,6 +15,7 @@ import benchmarks
 from benchmarks.certificate import bodies_of, certificate_of, certified, job_of
 from benchmarks.recheck import recheck
 from benchmarks.recheck_bodies import Bodies
+from benchmarks.recheck_depth import Wheel
 from benchmarks.recheck_walls import COARSE, Machine
 from opl.cell.inverse_kinematics import inverse_kinematics
 from opl.cell.robot import forward_kinematics
@@ -72,6 +73,23 @@ def test_a_bound_that_rests_on_barriers_is_proven_anew_with_them_alone():
     longer = next((first, end, t) for first, last, t in certificate["barriers"] if last < end)
     with pytest.raises(ValueError, match="are not shut"):
         recheck({**certificate, "barriers": [longer]})
+
+
+def test_a_triangle_that_is_too_deep_is_looked_at_however_little_it_is():
+    """None is left out for a way out of the wheel that seems short enough."""
+    random = np.random.default_rng(3)
+    size = {"width": 0.05, "radius": 0.1, "max_roll": 0.5}
+    shown = 0
+    for _ in range(200):
+        triangle = random.normal(size=(3, 3)) * random.uniform(0.0, 0.05)
+        claim = {"wheel": size, "triangles": [triangle.tolist()]}
+        some = Wheel({**claim, "penetration": 0.0})
+        _, depth = some._witnesses(triangle - np.array([0.0, 0.0, size["radius"]]))
+        if depth > 1e-4:
+            wheel = Wheel({**claim, "penetration": 0.999 * depth})
+            assert list(wheel.deep_points(wheel.triangles, 0.0))
+            shown += 1
+    assert shown > 50
 
 
 def test_the_checker_uses_nothing_of_opl():
