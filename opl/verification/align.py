@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from opl.files.kernels import kernel
 from opl.geometry.frames import Array, rotation_angle
 from opl.geometry.toolpath import CutterPoints
 from opl.geometry.wheel import MM_PER_M
@@ -48,6 +49,56 @@ class Course:
         return cls(points.pass_index, points.arc_length / feed, sums)
 
 
+@kernel(
+    "void(int64[::1],int64[::1],float64[::1],float64[::1],float64[::1],int64[::1],float64[::1],"
+    "float64[::1],boolean[::1],float64,float64[::1],int64[::1])",
+    makes_arrays=True,
+)
+def _choose(  # type: ignore[no-untyped-def]
+    configuration,
+    point,
+    t,
+    time,
+    own,
+    pass_index,
+    at_feed,
+    turned,
+    at_end,
+    max_step,
+    best,
+    came_from,
+):
+    """Find for each touch after which one it is cheapest, and what it costs up to there.
+
+    ``best`` is what it costs if it is the first one, and what it costs then; ``came_from`` is -1.
+    """
+    rests = np.zeros(len(best), dtype=np.bool_)  # whether it came from the same configuration
+    for m in range(1, len(best)):
+        at = point[m]
+        for before in range(max(0, m - HORIZON), m):
+            last = point[before]
+            cost = best[before] + own[m] + MISSED * (at - last - 1)
+            if last >= at or cost >= best[m]:  # nothing else costs less than 0
+                continue
+            apart = configuration[m] - configuration[before]
+            if pass_index[at] == pass_index[last]:
+                change = abs(t[m] - t[before])
+                # on the flat one configuration may grind two cutter points at different t
+                allowed = max_step * apart + (turned[at] - turned[last]) + STEP_SLACK
+                if apart > 0 and change > allowed:
+                    continue
+                cost += PER_POSITION * change
+                if apart == 0 and not at_end[at] and not rests[before]:
+                    cost += TWICE
+                sooner = at_feed[at] - at_feed[last] - (time[m] - time[before])
+                cost += TOO_SOON * max(sooner, 0.0)
+            elif apart == 0:
+                continue
+            if cost < best[m]:
+                best[m], came_from[m] = cost, before
+                rests[m] = apart == 0
+
+
 def align(
     touches: Touches,
     course: Course,
@@ -85,26 +136,9 @@ def align(
     own = own + np.where(at_end[point] & ~written, ELSEWHERE, 0.0)
     best = own + MISSED * point  # as the first one that is ground
     came_from = np.full(n, -1)
-    rests = np.zeros(n, dtype=bool)  # whether it came from the same configuration
-    for m in range(1, n):
-        before = slice(max(0, m - HORIZON), m)
-        apart = configuration[m] - configuration[before]
-        skipped = point[m] - point[before] - 1
-        same_pass = pass_index[point[m]] == pass_index[point[before]]
-        change = np.where(same_pass, np.abs(t[m] - t[before]), 0.0)
-        cost = best[before] + own[m] + MISSED * skipped + PER_POSITION * change
-        if not at_end[point[m]]:
-            cost = cost + np.where((apart == 0) & ~rests[before], TWICE, 0.0)
-        sooner = at_feed[point[m]] - at_feed[point[before]] - (time[m] - time[before])
-        cost = cost + TOO_SOON * np.where(same_pass, np.maximum(sooner, 0.0), 0.0)
-        # on the flat one configuration may grind two cutter points at different t
-        turned = course.turned[point[m]] - course.turned[point[before]]
-        too_far = (apart > 0) & (change > max_contact_step * apart + turned + STEP_SLACK)
-        cost[(skipped < 0) | too_far | ((apart == 0) & ~same_pass)] = np.inf
-        cheapest = int(cost.argmin())
-        if cost[cheapest] < best[m]:
-            best[m], came_from[m] = cost[cheapest], before.start + cheapest
-            rests[m] = apart[cheapest] == 0
+    candidates = configuration, point, t, time, own
+    along = np.array(pass_index), at_feed, course.turned, at_end
+    _choose(*candidates, *along, float(max_contact_step), best, came_from)
     last = int((best + MISSED * (len(pass_index) - 1 - point)).argmin())
     chosen = [last]
     while came_from[chosen[-1]] >= 0:
