@@ -11,10 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from opl.errors import InputError
-from opl.files.switching import recover, switch
-from opl.files.writing import HIDDEN, check_folder, unwritable
-
-LOCK = HIDDEN + "lock"
+from opl.files.switching import LOCK, recover, switch
+from opl.files.writing import check_folder, unwritable
 
 # what this process holds: folders, and which of them were made for it, by the open lock
 _HELD: dict[int | None, tuple[Path, list[Path]]] = {}

@@ -24,9 +24,11 @@ from pathlib import Path
 
 from opl.files.writing import HIDDEN, sync_folder, write_through
 
+LOCK = HIDDEN + "lock"  # whoever writes to a folder has locked this file in it
 MARK = HIDDEN + "switch"  # in a new state: the names that the switch changes
 WAITING = HIDDEN + "waiting"  # folder of files to be moved one by one, not yet complete
 MOVING = HIDDEN + "moving"  # the same, complete
+MOST_TRIES = 100  # to remove an old state in which others look for the lock
 MOST_LINKS = 1000  # a folder with more files is changed one by one
 
 # the system's ways to say that folders cannot be exchanged here
@@ -73,10 +75,7 @@ def recover(folder: Path) -> None:
         os.unlink(aside / MARK)
         os.rmdir(aside)
     elif aside.is_dir() and not aside.is_symlink():
-        if (folder / MARK).exists():  # exchanged: what is aside is the old state
-            changed = json.loads((folder / MARK).read_bytes())
-            _give_back(aside, folder, {*changed, MARK})
-        os.rmdir(aside)
+        _remove_old(aside, folder)
     (folder / MARK).unlink(missing_ok=True)
     if (folder / MOVING).exists():
         _move_all(folder)
@@ -152,13 +151,25 @@ def _exchange_names(one: Path, other: Path) -> None:
         raise OSError(number, os.strerror(number))
 
 
-def _give_back(old: Path, new: Path, changed: Set[str]) -> None:
-    """Empty the old state; what strangers put there while the folders were exchanged is kept."""
-    for name in os.listdir(old):
-        if name in changed or _same(old / name, new / name):
-            os.unlink(old / name)
-        else:
-            os.replace(old / name, new / name)
+def _remove_old(old: Path, new: Path) -> None:
+    """Remove the old state; what strangers put there while the folders were exchanged is kept.
+
+    But for a lock: a process on its way to the folder may still come upon the old state, and make
+    one in there, which it then finds not to be that of the folder.
+    """
+    exchanged = (new / MARK).exists()
+    changed = {LOCK, MARK, *json.loads((new / MARK).read_bytes())} if exchanged else {LOCK}
+    for tries_left in reversed(range(MOST_TRIES)):
+        for name in os.listdir(old):
+            if name in changed or _same(old / name, new / name):
+                os.unlink(old / name)
+            elif exchanged:
+                os.replace(old / name, new / name)
+        try:
+            return os.rmdir(old)
+        except OSError as error:
+            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST) or tries_left == 0:
+                raise
 
 
 def _same(one: Path, other: Path) -> bool:
