@@ -51,28 +51,18 @@ class Course:
 
 @kernel(
     "void(int64[::1],int64[::1],float64[::1],float64[::1],float64[::1],int64[::1],float64[::1],"
-    "float64[::1],boolean[::1],float64,float64[::1],int64[::1])",
-    makes_arrays=True,
+    "float64[::1],boolean[::1],float64,float64[::1],int64[::1])"
 )
 def _choose(  # type: ignore[no-untyped-def]
-    configuration,
-    point,
-    t,
-    time,
-    own,
-    pass_index,
-    at_feed,
-    turned,
-    at_end,
-    max_step,
-    best,
+    configuration, point, t, time, own, pass_index, at_feed, turned, at_end, max_step, best,
     came_from,
-):
+):  # fmt: skip
     """Find for each touch after which one it is cheapest, and what it costs up to there.
 
-    ``best`` is what it costs if it is the first one, and what it costs then; ``came_from`` is -1.
+    The first five are of the touches, shape (k,), the next four of the cutter points, shape (n,).
+    ``best`` is what each touch costs as the first one, and then what it costs; ``came_from`` is -1,
+    and then the touch before, shape (k,).
     """
-    rests = np.zeros(len(best), dtype=np.bool_)  # whether it came from the same configuration
     for m in range(1, len(best)):
         at = point[m]
         for before in range(max(0, m - HORIZON), m):
@@ -88,15 +78,16 @@ def _choose(  # type: ignore[no-untyped-def]
                 if apart > 0 and change > allowed:
                     continue
                 cost += PER_POSITION * change
-                if apart == 0 and not at_end[at] and not rests[before]:
-                    cost += TWICE
+                if apart == 0 and not at_end[at]:
+                    earlier = came_from[before]
+                    if earlier < 0 or configuration[earlier] != configuration[before]:
+                        cost += TWICE
                 sooner = at_feed[at] - at_feed[last] - (time[m] - time[before])
                 cost += TOO_SOON * max(sooner, 0.0)
             elif apart == 0:
                 continue
             if cost < best[m]:
                 best[m], came_from[m] = cost, before
-                rests[m] = apart == 0
 
 
 def align(

@@ -34,7 +34,7 @@ THAT_NEED_ROOM = ["mkdir", "open", "write", "fsync", "link", "replace", "rename"
 
 
 def put(folder, files):
-    folder.mkdir()
+    folder.mkdir(parents=True)
     for name, content in files.items():
         (folder / name).write_bytes(content)
 
@@ -133,9 +133,7 @@ def fresh(home):
 
 def earlier(home):
     folder = home / "out" / "V"
-    folder.mkdir(parents=True)
-    for name, content in {**OLD, **STRANGERS}.items():
-        (folder / name).write_bytes(content)
+    put(folder, {**OLD, **STRANGERS})
     return folder, {**OLD, **STRANGERS}
 
 
