@@ -24,7 +24,7 @@ from opl.search.walls import Image, Piece, Wall
 PRESSES = 0.05  # share of a face's price below which a wall is not said to hold it
 LEAST_SHARE = 0.01  # of the sum that a joint must turn to be told of
 MOST_HOLDERS = 6
-MOST_SUBPROBLEMS = 500  # for what a box needs without a wall
+MOST_SUBPROBLEMS = 1000  # bounded, for what a box needs without a wall
 MOST_NUMBERS = 3e8  # worked on in linear programs for it
 GAP = 2e-3  # to which these proofs are taken
 
@@ -100,7 +100,7 @@ def _least(proof: BoxProof, value: float) -> tuple[float, Array]:
     On the two faces of each joint, shape (n_walls, 6); 0 where the least box was not found.
     """
     while not proof.closed:
-        if proof.subproblems >= MOST_SUBPROBLEMS or proof.work >= MOST_NUMBERS:
+        if proof.bounded >= MOST_SUBPROBLEMS or proof.work >= MOST_NUMBERS:
             break
         bound = proof.lower_bound
         candidate = proof.take_next()

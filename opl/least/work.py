@@ -25,7 +25,7 @@ FIRST_WORK = 300  # units that may be spent on those at once
 
 def work_of_proof(proof: BoxProof) -> float:
     """Return what was done in branch and bound, in units of work."""
-    return proof.subproblems / SUBPROBLEMS + proof.work / NUMBERS
+    return proof.bounded / SUBPROBLEMS + proof.work / NUMBERS
 
 
 class Work:

@@ -1,4 +1,4 @@
-"""Which wall a subproblem is split at, and into what."""
+"""Which walls a subproblem might be split at, and into what."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from opl.search.joint_limits import cut_at
 from opl.search.subproblems import Relaxation, Subproblem
 
 SMALLEST = 1e-6  # along a wall: a cell that is not cut further
-MOST_TRIED = 4  # walls whose halves are held against the box
+MOST_TRIED = 4  # walls at which it might be
 OTHER_HALF = 0.5  # of the distance of the half that is farther counts
 LEAST_SHARE = 8  # of cells or spans: one of so many on each side at the least
 
 
 def where_to_split(
     node: Subproblem, cells: Cells, limits: Sequence[JointBox], settled: float
-) -> int | None:
-    """Return the wall to be split; None if that gains nothing.
+) -> list[int]:
+    """Return the walls that might be split, the most promising first; none if that gains nothing.
 
     Args:
         node: The subproblem, bounded; what its box is beyond the limits by is cut off that.
@@ -36,7 +36,7 @@ def where_to_split(
     assert node.found is not None
     walls, table = node.spans[:, WALL], cells.table
     if np.count_nonzero(walls == 0) > 1:
-        return 0
+        return [0]
     # what is beyond the limits is no part of the box: walls that it meets there alone, it misses
     box = JointBox(node.found.low, node.found.high)
     inner = cut_at(box, limits, (node.low, node.high))
@@ -52,16 +52,15 @@ def where_to_split(
     score[tiny] = 0.0
     if (score <= settled).all():
         return _met_with_several_keys(node, cells, of_spans, settled)
-    pressed = 1.0 + np.minimum(found.pressed, 1.0)  # a wall that holds a face up counts twice
-    score = np.where(score > settled, score * pressed, 0.0)
+    # a wall that holds a face up counts twice
+    score = np.where(score > settled, score * (1.0 + np.minimum(found.pressed, 1.0)), 0.0)
     best = np.argsort(-score, kind="stable")[:MOST_TRIED]
-    gains = [pressed[wall] * _gain(node, cells, wall) for wall in best[score[best] > 0.0].tolist()]
-    return int(best[np.argmax(gains)])
+    return [int(wall) for wall in best[score[best] > 0.0]]
 
 
 def _met_with_several_keys(
     node: Subproblem, cells: Cells, away: Array, settled: float
-) -> int | None:
+) -> list[int]:
     """Return a wall of a pass all of whose walls a box meets, but not with one key.
 
     None if there is none; ``away`` is how far each span is from the box, in [rad].
@@ -75,8 +74,8 @@ def _met_with_several_keys(
         best = int(np.argmin(missed.max(axis=1)))
         worst = int(np.argmax(missed[best]))
         if missed[best, worst] > settled and np.isfinite(missed[:, worst]).sum() > 1:
-            return int(own[worst])
-    return None
+            return [int(own[worst])]
+    return []
 
 
 def parts(node: Subproblem, cells: Cells, wall: int) -> list[np.ndarray]:
@@ -86,15 +85,19 @@ def parts(node: Subproblem, cells: Cells, wall: int) -> list[np.ndarray]:
     return [np.concatenate([node.spans[:before], half, node.spans[end:]]) for half in halves]
 
 
-def _gain(node: Subproblem, cells: Cells, wall: int) -> float:
-    """Return how far both halves of a wall are from the box found, that which is nearer first.
+def best_by_distance(node: Subproblem, cells: Cells, walls: Sequence[int]) -> int:
+    """Return at which of some walls both halves are farthest from the box found.
 
-    Strong branching without its linear programs (Achterberg, Koch and Martin, Oper. Res. Lett. 33,
-    2005): a box that one half leaves as it is bounds no better there.
+    The half that is nearer counts first, and a wall that holds a face up twice: strong branching
+    without its linear programs, as a box that one half leaves as it is bounds no better there.
     """
     assert node.found is not None
-    away = [_nearest(cells, half, node.found)[0] for half in _halves(node, cells, wall)]
-    return min(away, default=np.inf) + OTHER_HALF * max(away, default=np.inf)
+    gains = []
+    for wall in walls:
+        away = [_nearest(cells, half, node.found)[0] for half in _halves(node, cells, wall)]
+        gain = min(away, default=np.inf) + OTHER_HALF * max(away, default=np.inf)
+        gains.append((1.0 + min(node.found.pressed[wall], 1.0)) * gain)
+    return walls[int(np.argmax(gains))]
 
 
 def _halves(node: Subproblem, cells: Cells, wall: int) -> list[np.ndarray]:

@@ -18,7 +18,7 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.search.bounding import tighten
 from opl.search.box import JointBox
-from opl.search.branching import parts, where_to_split
+from opl.search.branching import best_by_distance, parts, where_to_split
 from opl.search.cells import END, FIRST, KEY, WALL, Cells
 from opl.search.forbidden import Forbidden
 from opl.search.joint_limits import UNLIMITED
@@ -33,6 +33,8 @@ NUMBERS_OF_A_SOURCE = 6  # that it is worth to tell whether a box can hold a pie
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 FURTHER = 1.5  # times a size: cells are at hand for boxes up to there
 FEWEST_BEFORE_ANEW = 256  # subproblems of a tree that is begun anew for walls added since
+FEW = 40  # walls over which linear programs take little time
+OTHER_PART = 0.2  # of what the larger of two bounds rises by counts
 CLOSER = 2, 3  # looks at what is forbidden, each closer than the one before
 
 
@@ -68,7 +70,7 @@ class BoxProof:
     def _begin(self, threshold: float) -> None:
         self.threshold = threshold
         self.stuck = np.inf  # least bound of what could not be split
-        self.subproblems = self._count = 0
+        self.subproblems = self._count = self.bounded = 0  # what might have become one is bounded
         self.work = 0.0  # how many numbers were worked on, about
         self._anew_after = FEWEST_BEFORE_ANEW
         self._plant(0.0)
@@ -140,12 +142,11 @@ class BoxProof:
                 return None
         may_lose = SETTLED * self._gap * self.threshold
         self._kept = node
-        wall = where_to_split(node, self._cells, self._limits_of(node.spans), may_lose)
-        if wall is not None:
-            split = [self._part(node, part) for part in parts(node, self._cells, wall)]
+        walls = where_to_split(node, self._cells, self._limits_of(node.spans), may_lose)
+        if walls:
+            split = self._split(node, walls)
             if self._open.dive_is_due:
-                self.subproblems += len(split) - 1
-                self._open.dive([part for part in split if self._bound(part)])
+                self._open.dive([part for part in split if part.found or self._bound(part)])
             else:
                 self._open.leave(split)
             return None
@@ -222,6 +223,28 @@ class BoxProof:
         lower = self.closing < found.closing * (1.0 - SHARPER)
         return lower or self._cells.changes > found.changes
 
+    def _split(self, node: Subproblem, walls: Sequence[int]) -> list[Subproblem]:
+        """Return what is left of a subproblem, split at the wall where that bounds it best.
+
+        Strong branching (Achterberg, Koch and Martin, Oper. Res. Lett. 33, 2005): a wall is worth
+        what the lesser of the two bounds rises by, and a little of what the other does. But over
+        many walls, or where boxes come soon, distances decide.
+        """
+        if len(walls) > 1 and (not self._open.box_is_late or node.n_walls > FEW):
+            walls = [best_by_distance(node, self._cells, walls)]
+        best, most = [], -np.inf
+        for wall in walls:
+            split = [self._part(node, part) for part in parts(node, self._cells, wall)]
+            if len(walls) == 1:
+                return split
+            if not (left := [part for part in split if self._bound(part)]):
+                return []
+            bounds = [part.bound for part in left] + [self.closing] * (len(split) - len(left))
+            worth = min(bounds) + OTHER_PART * max(bounds)
+            if worth > most:
+                best, most = left, worth
+        return best
+
     def _part(self, node: Subproblem, spans: np.ndarray) -> Subproblem:
         """Return the part of a subproblem that leads through some spans."""
         self._count += 1
@@ -229,6 +252,7 @@ class BoxProof:
 
     def _bound(self, node: Subproblem) -> bool:
         """Bound a subproblem; return whether it is still of interest."""
+        self.bounded += 1
         cells, closing, n_walls = self._cells, self.closing, len(self.walls)
         if len(node.spans) != 1 and node.n_walls <= 1:
             n_walls = 1  # one span of the first wall tells which images of the others matter

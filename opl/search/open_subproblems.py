@@ -14,6 +14,7 @@ import numpy as np
 
 from opl.search.subproblems import Subproblem
 
+LATE = 128  # subproblems taken since the last box: it is late
 DIVE_AFTER = 256  # subproblems that were taken without a box
 ALIKE = 1e-9  # [rad] by which bounds differ and count as the same
 
@@ -32,6 +33,7 @@ class OpenSubproblems:
         self._heap = [root]
         self._next_of_dive: Subproblem | None = None
         self._without_a_box = 0  # taken since the last box or dive
+        self._since_box = 0  # taken, whatever dives there were
         self.diving = False
 
     @property
@@ -45,10 +47,16 @@ class OpenSubproblems:
         """Whether to follow what the one that was taken last is split into."""
         return self.diving or self._without_a_box >= DIVE_AFTER
 
+    @property
+    def box_is_late(self) -> bool:
+        """Whether many subproblems were taken since the last box."""
+        return self._since_box > LATE
+
     def take(self) -> Subproblem:
         """Take out the next of a dive, or the one with the least bound."""
         self.diving = self._next_of_dive is not None
         self._without_a_box = 0 if self.diving else self._without_a_box + 1
+        self._since_box += 1
         node, self._next_of_dive = self._next_of_dive or heapq.heappop(self._heap), None
         return node
 
@@ -69,4 +77,4 @@ class OpenSubproblems:
 
     def note_box(self) -> None:
         """Note that a box came of the one that was taken last."""
-        self._without_a_box = 0
+        self._without_a_box = self._since_box = 0

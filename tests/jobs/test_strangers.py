@@ -105,6 +105,15 @@ def test_the_least_motion_is_found_where_it_was_not(drawn, tmp_path):
     assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)
 
 
+def test_where_no_box_comes_for_long_few_subproblems_do_if_bounds_tell_what_is_split(tmp_path):
+    """Postures at three ends of passes move along a valley: distances tell little there."""
+    draw_job(20264401, 18, 1, tmp_path)
+    job = opl.load_job(tmp_path / "job.yaml")
+    little = replace(job.search.optimal, max_subproblems=4000)
+    plan = search_path(replace(job.search, optimal=little), problem_of(job)).plan
+    assert plan.lower_bound >= plan.path.joint_range_sum * (1.0 - 1e-3)
+
+
 def test_with_little_work_a_motion_is_sought_in_larger_boxes_before_it_is_done(tmp_path):
     """The bound rises slowly, and no box proposed meanwhile holds a motion."""
     draw_job(20261203, 10, 0, tmp_path)

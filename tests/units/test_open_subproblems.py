@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from opl.search.open_subproblems import DIVE_AFTER, OpenSubproblems
+from opl.search.open_subproblems import DIVE_AFTER, LATE, OpenSubproblems
 from opl.search.subproblems import Subproblem
 
 NOTHING = np.empty((0, 5), dtype=np.int64), 0, np.zeros(6), np.zeros(6)
@@ -59,3 +59,15 @@ def test_a_dive_that_ends_without_a_box_is_followed_by_another_later_only():
     left.dive([])
     assert left.take().bound == 1.0
     assert not left.dive_is_due
+
+
+def test_a_box_is_late_until_the_next_whatever_dives_end_without_one():
+    left = after_a_while()
+    assert LATE < DIVE_AFTER and left.box_is_late
+    left.dive([node(0.5, 3)])
+    left.take()
+    left.dive([])
+    left.take()
+    assert left.box_is_late
+    left.note_box()
+    assert not left.box_is_late
