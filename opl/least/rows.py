@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.least.stretches import passed
 from opl.search.box import JointBox
+from opl.search.impasse import barred
 from opl.search.ladder import Ladder
 
 SMALLEST_EDGE = 1.0 / 500.0  # of that between cutter points that is still given places
@@ -120,12 +121,13 @@ def broken_at(places: Array, column: int) -> list[Bulge]:
 def bars(
     places: Array, ladders: Sequence[Ladder], blocked_edges: Sequence[np.ndarray]
 ) -> list[Bulge]:
-    """Return between which places no track of a ladder gets further, from its start or its end.
+    """Return between which places no track of a ladder gets further, onwards or back.
 
-    It would get past what is shut, or joints would turn further than an edge may. Where that is so
-    only at places that are as close as they may be, what tracks do that sweep over the wheel before
-    may be to blame: then it is told of those that do not. The edges that are blocked in each ladder
-    are sorted keys, as of `shut_edges`.
+    From its start or end, and from where it would go on had it got past one. It would get past what
+    is shut, or joints would turn further than an edge may. Where that is so only at places that are
+    as close as they may be, what tracks do that sweep over the wheel before may be to blame: then
+    it is told of those that do not. The edges that are blocked in each ladder are sorted keys, as
+    of `shut_edges`.
     """
     found = _bars(places, ladders, blocked_edges)
     return found or _bars(places, [_unswept(one, places) for one in ladders], blocked_edges)
@@ -136,8 +138,8 @@ def _bars(
 ) -> list[Bulge]:
     found: list[Bulge] = []
     for ladder, blocked in zip(ladders, blocked_edges, strict=True):
-        for k, turned in (_ends(ladder, blocked, way) for way in (1, -1)):
-            if k >= 0 and places[k + 1] - places[k] > SMALLEST_EDGE:
+        for k, turned in (end for back in (False, True) for end in _ends(ladder, blocked, back)):
+            if places[k + 1] - places[k] > SMALLEST_EDGE:
                 shut, least = not np.isfinite(turned).any(), turned.min(initial=np.inf)
                 parts = 2 if shut else int(np.clip(np.ceil(least), 2, MOST_PARTS))
                 found.append(Bulge(float(places[k]), float(places[k + 1]), parts, shut))
@@ -154,25 +156,12 @@ def _unswept(ladder: Ladder, places: Array) -> Ladder:
     return replace(ladder, max_contact_change=np.minimum(ladder.contact_changes, most))
 
 
-def _ends(ladder: Ladder, blocked: np.ndarray, way: int) -> tuple[int, Array]:
-    """Return over which edge tracks get no further, and how far joints would turn over it.
-
-    From the start onwards with a way of 1, from the end back with -1; -1 where they get through.
-    """
-    reached = ladder.free[0 if way > 0 else -1]
-    for k in range(len(ladder.free) - 1)[::way]:
-        there = ladder.free[k + 1 if way > 0 else k]
-        if ladder.off_wheel[k]:
-            reached = there
-            continue
-        before, after = (reached, there) if way > 0 else (there, reached)
-        turned = _turned(ladder, k, blocked, before, after)
-        turned = turned if way > 0 else turned.T
-        reached = there.copy()
-        reached[there] = (turned <= 1.0).any(axis=0)
-        if not reached.any():
-            return k, turned
-    return -1, np.empty(0)
+def _ends(ladder: Ladder, blocked: np.ndarray, back: bool) -> Iterator[tuple[int, Array]]:
+    """Yield over which edges tracks get no further, and how far joints would turn over each."""
+    shut, reached = barred(ladder, blocked, back)
+    for k in np.flatnonzero(shut).tolist():
+        before, after = (ladder.free, reached) if back else (reached, ladder.free)
+        yield k, _turned(ladder, k, blocked, before[k], after[k + 1])
 
 
 def _turned(

@@ -38,6 +38,20 @@ def impasses(ladder: Ladder, blocked: np.ndarray) -> list[tuple[int, int]]:
     return found
 
 
+def barred(ladder: Ladder, blocked: np.ndarray, back: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return over which edges no track gets, from the start on or back from the end.
+
+    Beyond one it is as if tracks came from every free node. `blocked` as for `impasses`.
+
+    Returns:
+        Which edges, shape (n_columns - 1,), and which nodes are reached, shape (n_columns, n_rows).
+    """
+    free = np.ascontiguousarray(ladder.free)
+    shut, reached = np.zeros(len(free) - 1, dtype=bool), np.zeros_like(free)
+    _walk(ladder.edge_rule, blocked, free, back, shut, reached)
+    return shut, reached
+
+
 def passable(ladder: Ladder, blocked: np.ndarray, first: int, last: int) -> bool:
     """Return whether a track leads from one column to another, by the others between them.
 
@@ -78,3 +92,23 @@ def _reached(edge_rule, blocked, free, column, reach, back):  # type: ignore[no-
                 found[end] = True
                 break
     return found
+
+
+@kernel(
+    f"void({EDGE_RULE},int64[::1],boolean[:,::1],boolean,boolean[::1],boolean[:,::1])",
+    makes_arrays=True,
+)
+def _walk(edge_rule, blocked, free, back, shut, reached):  # type: ignore[no-untyped-def]
+    """Fill in what `barred` returns."""
+    n = len(free)
+    reached[n - 1 if back else 0] = free[n - 1 if back else 0]
+    for step in range(n - 1):
+        edge = n - 2 - step if back else step
+        here, there = (edge + 1, edge) if back else (edge, edge + 1)
+        if edge_rule[2][edge]:  # off the wheel
+            reached[there] = free[there]
+            continue
+        reached[there] = _reached(edge_rule, blocked, free, edge, reached[here], back)
+        if not reached[there].any():
+            shut[edge] = True
+            reached[there] = free[there]

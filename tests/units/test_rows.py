@@ -31,7 +31,7 @@ EDGES = (COLUMNS - 1) * ROWS * ROWS
     st.sets(st.integers(0, EDGES - 1)),
     st.lists(st.booleans(), min_size=COLUMNS * ROWS, max_size=COLUMNS * ROWS),
 )
-def test_bars_are_where_the_longest_tracks_from_either_end_stop(blocked, free):
+def test_bars_are_where_the_longest_tracks_stop_from_either_end_and_beyond_each(blocked, free):
     free = np.array(free).reshape(COLUMNS, ROWS)
     free[0, 0] = free[-1, 0] = True
     ladder = Ladder(
@@ -44,22 +44,33 @@ def test_bars_are_where_the_longest_tracks_from_either_end_stop(blocked, free):
     )
     shut = np.isin(np.arange(EDGES), sorted(blocked)).reshape(COLUMNS - 1, ROWS, ROWS)
 
-    def goes(track, first=0):
+    def goes(track, first):
         return all(free[k, row] for k, row in enumerate(track, first)) and not any(
             shut[k, row, after] for k, (row, after) in enumerate(itertools.pairwise(track), first)
         )
 
-    def longest(most):
-        return max(
-            length
-            for length in range(1, COLUMNS + 1)
-            if any(most(track) for track in itertools.product(range(ROWS), repeat=length))
-        )
+    def stops(first_of):
+        """Return how many columns are behind each place where tracks stop, in their direction."""
+        found, begin = set(), 0
+        while begin < COLUMNS:
+            length = max(
+                (
+                    length
+                    for length in range(1, COLUMNS - begin + 1)
+                    for track in itertools.product(range(ROWS), repeat=length)
+                    if goes(track, first_of(begin, length))
+                ),
+                default=1,  # nothing is free
+            )
+            begin += length
+            found.add(begin)
+        return found - {COLUMNS}
 
-    on, back = longest(goes), longest(lambda track: goes(track, COLUMNS - len(track)))
+    on = stops(lambda begin, length: begin)
+    back = stops(lambda begin, length: COLUMNS - begin - length)
     found = bars(np.arange(COLUMNS) / 10.0, [ladder], [np.flatnonzero(shut)])
-    expected = [] if on == COLUMNS else sorted({(on - 1) / 10.0, (COLUMNS - 1 - back) / 10.0})
-    assert sorted(bar.first for bar in found) == pytest.approx(expected)
+    expected = sorted({(n - 1) / 10.0 for n in on} | {(COLUMNS - 1 - n) / 10.0 for n in back})
+    assert sorted({bar.first for bar in found}) == pytest.approx(expected)
 
 
 def test_a_bar_is_told_once_though_tracks_of_several_images_end_there():
