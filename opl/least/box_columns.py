@@ -12,6 +12,7 @@ from opl.cell.wheel_cuts import shut_along
 from opl.geometry.frames import Array
 from opl.geometry.toolpath import CutterPoints
 from opl.least.doubts import Doubts
+from opl.least.flat_ends import FlatEnds
 from opl.least.known_rows import KnownRows
 from opl.least.postures import Columns
 from opl.planning.problem import GrindingProblem
@@ -57,7 +58,12 @@ class ColumnSampler:
         self._limits = tuple(limits)
         self.flips = wrist_flips(problem.cell.robot.arm)
         self.work = 0.0  # what was sampled so far, in units of work
-        self.doubts = Doubts(problem)
+        self.doubts, self.ends = Doubts(problem), FlatEnds(problem)
+
+    @property
+    def learnt(self) -> int:
+        """How often motions told where the part is too deep."""
+        return self.doubts.count + self.ends.count
 
     @property
     def limits(self) -> Sequence[JointBox]:
@@ -205,7 +211,10 @@ class ColumnSampler:
 
     def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m)."""
-        return self._known.cuts(places, t, self.doubts.at(there.pass_index, t))
+        passes, at_end = there.pass_index, self.ends.are_at(t)
+        cuts = self._known.cuts(places, t, self.doubts.at(passes, t) | at_end)
+        spends = self._known.spends(places, t, self.ends.spared(passes), at_end & ~cuts)
+        return np.asarray(cuts | spends)
 
     def spared(self, columns: Columns, spare: Array) -> Columns:
         """Leave out postures that leave less than some depth of that allowed, by place in [m]."""

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from opl.geometry.frames import Array
 from opl.least.box_columns import LESS, ColumnSampler
+from opl.least.over_ends import learn_of_ends, shut_over_ends, sunk_over_ends
 from opl.least.postures import Columns
-from opl.least.rows import Bulge, Row, broken_at, bulging, shut_edges
+from opl.least.rows import Bulge, Learn, Row, broken_at, bulging, shut_edges
 from opl.least.sinking import (
     first_sunk,
     leads_are_deep,
@@ -37,8 +38,6 @@ ROUNDS = 3  # of sampling closer around a track
 MOST_CHECKS = 16  # of motions in one box; those begun with a track are all made
 MOST_WORK = 5000.0  # units on them, most of them spent on free moves that are not there
 MOST_ROUNDS = 6  # of asking nodes of a track for their clearance
-
-Learn = Callable[[Sequence[Bulge]], bool]  # told where places are wanted; whether that is new
 
 
 @dataclass
@@ -108,7 +107,8 @@ class BoxNodes:
         self.problem = problem.over_nodes(places, points, t, matrices)
         self.matrices = open_matrices(self.problem)
         self._swept = False
-        shut = shut_edges(columns.places, columns.t, rows, box)
+        over_ends = shut_over_ends(sampler, columns, t)
+        shut = np.union1d(shut_edges(places, t, rows, box), over_ends)
         for matrix in self.matrices:
             matrix.shut = shut
 
@@ -236,6 +236,10 @@ class BoxNodes:
             passes, t = problem.points.pass_index[list(deep)], np.array(list(deep.values()))
             if search.sampler.doubts.note(passes, t):
                 return None, None, True
+            if sunk is not None:
+                after = sunk_over_ends(problem, hits)
+                if learn_of_ends(search.sampler, self._columns, after, sunk, learn):
+                    return None, None, True
             leads_are_shut = leads_are_deep(problem, hits)
             if leads_are_shut and not search.sampler.collisions:
                 search.collided += 1  # they are left out with what collides

@@ -13,10 +13,10 @@ from functools import partial
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.least.box_nodes import SAMPLES, BoxNodes, Learn, TrackSearch
+from opl.least.box_nodes import SAMPLES, BoxNodes, TrackSearch
 from opl.least.passages import NO_PASSAGES, Passages
 from opl.least.postures import Columns
-from opl.least.rows import Bulge, bars, crossed
+from opl.least.rows import Bulge, Learn, bars, crossed
 from opl.least.sinking import DEEP, places_for, shallower, spare_for
 from opl.planning.open_matrix import Track
 from opl.planning.plan import Plan
@@ -44,7 +44,8 @@ class BoxTracks:
     def tried(self, columns: Columns, passages: Passages, box: JointBox) -> bool:
         """Return whether the last that were asked about here were the same: so is the motion."""
         images = tuple(placement.key for placement in columns.placements)
-        sampled = columns.t.tobytes(), columns.free.tobytes(), len(passages.rows)
+        learnt = self._search.sampler.learnt
+        sampled = columns.t.tobytes(), columns.free.tobytes(), len(passages.rows), learnt
         before, self._tried = self._tried, (box.size, images, sampled)
         return before == self._tried
 
@@ -133,7 +134,7 @@ class BoxTracks:
         places, one = columns.places, t[:, :1]
         sampler, crossing = self._search.sampler, crossed(places, passages.crossings, one)
         free = nearest_free(columns, inner) if sampler.collisions else one[:, :0]
-        t = np.concatenate([t, crossing, free], axis=1)
+        t = np.concatenate([t, crossing, free, sampler.ends.contact_positions(len(t))], axis=1)
         sampler.work += len(t) * t.shape[1] ** 2 / EDGES_OF_WORK
         at = sampler.at(places, columns.points, columns.placements, t)
         return BoxNodes(self._search, at, passages.rows, inner, spare, spacing)

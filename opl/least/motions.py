@@ -20,7 +20,7 @@ from opl.walls.placement import Placement
 # sought instead, so that what cannot be proven is not left far from the bound
 LARGER = tuple(0.0005 * 2.0**k for k in range(14))
 SETTLED = 0.02  # by which fraction a motion may be larger than a box in which none is found
-MOST_LOOKS = 3  # at each of these, with places cut finer by what the look before told
+MOST_LOOKS = 6  # at each of these, with places cut finer by what the look before told
 
 
 class Motions:
@@ -75,7 +75,7 @@ class Motions:
         """Look for a motion in a box; return whether something was learnt of the box instead."""
         if box is None or self._tracks.tried(columns, passages, box):
             return False
-        learnt, doubts = False, self._search.sampler.doubts.count
+        learnt, before = False, self._search.sampler.learnt
 
         def learn(bulges: Sequence[Bulge]) -> bool:
             nonlocal learnt
@@ -84,7 +84,7 @@ class Motions:
 
         room = self._settings.room(box.size)
         self.keep(self._tracks.plan(columns, passages, box, room, learn))
-        return learnt or self._search.sampler.doubts.count > doubts
+        return learnt or self._search.sampler.learnt > before
 
     def look_about(
         self, box: JointBox, placements: Sequence[Placement], goes_on: Callable[[], bool]

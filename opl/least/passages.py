@@ -205,7 +205,7 @@ class Rectangles:
         image = placements[index]
         turned = *image.shift, *(image.center * image.loose)
         which = image.family, image.number, image.side.number, *turned
-        left_out = self._sampler.collisions, self._sampler.mirrored
+        left_out = self._sampler.collisions, self._sampler.mirrored, self._sampler.learnt
         key = places[0], places[-1], len(places), index, *map(float, (*left_out, *which))
         if key not in self._known:
             for old in [old for old in self._known if old[3] == index and old[:3] != key[:3]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,6 +51,9 @@ class Bulge:
     last: float
     parts: int
     steep: bool
+
+
+Learn = Callable[[Sequence[Bulge]], bool]  # told where places are wanted; whether that is new
 
 
 def _one_after_the_other(rows: Sequence[Row]) -> tuple[Array, Array, np.ndarray, Array]:
