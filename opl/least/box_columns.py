@@ -91,7 +91,7 @@ class ColumnSampler:
         there = self.there(places)
         positions = problem.field.contact_positions
         grid = np.broadcast_to(positions, (len(places), len(positions)))
-        cuts = self._cuts(places, there, grid)
+        cuts = self._cuts(places, grid)
         t = np.empty((len(places), FINE))
         for block in blocks_of(*grid.shape):
             coarse = self._coarse(places[block], there.pass_index[block], placements)
@@ -201,7 +201,7 @@ class ColumnSampler:
         angles = self._known.angles(places, t, families_of(passes, placements))
         self.work += (self._known.solved - solved) / SOLVED_OF_WORK + t.size / KNOWN_OF_WORK
         q = placed(angles, self._seams.start, passes, placements)
-        free = ~np.isnan(q[..., 0]) & ~self._cuts(places, there, t)
+        free = ~np.isnan(q[..., 0]) & ~self._cuts(places, t)
         free &= allowed(places, passes, placements, t)
         free[free] = image_within_limits(problem.cell.robot, self.flips, q[free])
         if self.collisions:
@@ -209,9 +209,10 @@ class ColumnSampler:
             self._leave_out_leads(places, there, placements, t, free, reserve)
         return Columns(places, there, tuple(placements), t, q, free)
 
-    def _cuts(self, places: Array, there: CutterPoints, t: Array) -> np.ndarray:
+    def _cuts(self, places: Array, t: Array) -> np.ndarray:
         """Return where the part would sink too deep into the wheel, shape (n, m)."""
-        passes, at_end = there.pass_index, self.ends.are_at(t)
+        # their own passes: those of places that are points of their own count from 0 again
+        passes, at_end = self._problem.points.pass_index[places.astype(int)], self.ends.are_at(t)
         cuts = self._known.cuts(places, t, self.doubts.at(passes, t) | at_end)
         spends = self._known.spends(places, t, self.ends.spared(passes), at_end & ~cuts)
         return np.asarray(cuts | spends)

@@ -14,6 +14,7 @@ from opl.least.over_ends import BESIDE, CLOSE, learn_of_ends, shut_over_ends, su
 from opl.least.rows import MOST_PARTS
 from opl.motion.collision_check import CollidingMove
 from opl.planning.track_check import Collides
+from tests.support.boxes import near_a_box
 from tests.support.planned import small_problem
 from tests.units.test_sinking import motion_of_a_track
 
@@ -114,3 +115,19 @@ def test_where_the_flat_ends_it_is_known_by_the_number_itself():
     assert ends.contact_positions(3).shape == (3, 0)
     ends.note(0, 0.0)
     assert ends.contact_positions(3).tolist() == [[-END, END]] * 3
+
+
+def test_what_a_pass_spares_is_its_own_wherever_its_places_are_looked_at_alone():
+    _, sampler, columns = near_a_box()
+    passes, last = columns.points.pass_index, PROBLEM.points.n_passes - 1
+    found = {}
+    for index in (0, last):
+        own = columns.places[passes == index]
+        ends = np.tile([-END, END], (len(own), 1))
+        given_places = own, sampler.there(own), [columns.placements[index]], ends
+        assert sampler.at(*given_places).free.any()
+        found[index] = given_places
+    for _ in range(2):  # the first time it only takes note of the pass
+        sampler.ends.note(last, 1e3)
+    assert sampler.at(*found[0]).free.any()
+    assert not sampler.at(*found[last]).free.any()
