@@ -20,7 +20,7 @@ from opl.walls.placement import Placement
 # sought instead, so that what cannot be proven is not left far from the bound
 LARGER = tuple(0.0005 * 2.0**k for k in range(14))
 SETTLED = 0.02  # by which fraction a motion may be larger than a box in which none is found
-MOST_LOOKS = 6  # at each of these, with places cut finer by what the look before told
+MOST_LOOKS = 3  # at each of these, with places cut finer by what the look before told
 
 
 class Motions:
