@@ -21,7 +21,7 @@ from opl.least.sinking import (
     sunk_at,
 )
 from opl.planning.costs import PushAway, track_cost
-from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.filling import BrokenEdgesError, fill_in
 from opl.planning.open_matrix import Track, close_collisions, open_matrices
 from opl.planning.plan import Found, Plan, Same, propose_and_check
 from opl.planning.problem import GrindingProblem
@@ -191,8 +191,8 @@ class BoxNodes:
         problem, nodes = self.problem, self.matrices[track.matrix].nodes
         try:
             path = fill_in(problem.cell, problem.points, nodes, track.rows, problem.interpolation)
-        except BrokenEdgeError as broken:
-            return broken_at(self._columns.places, broken.column)
+        except BrokenEdgesError as broken:
+            return broken_at(self._columns.places, list(broken.causes))
         if path.joint_range_sum <= box.size:
             return []
         spanned = nodes.along(track.rows)

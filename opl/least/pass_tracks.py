@@ -14,7 +14,7 @@ import numpy as np
 from opl.geometry.frames import Array
 from opl.least.own_track import ABOUT, OwnTrack, nodes_about
 from opl.planning.costs import track_cost
-from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.filling import BrokenEdgesError, fill_in
 from opl.planning.nodes import NodeMatrix
 from opl.planning.open_matrix import open_matrices
 from opl.planning.problem import GrindingProblem
@@ -146,8 +146,8 @@ class PassTracks:
         rows = np.zeros(len(track.places), dtype=int)
         try:
             path = fill_in(problem.cell, problem.points, nodes, rows, problem.interpolation)
-        except BrokenEdgeError as broken:
-            return np.array([broken.column])
+        except BrokenEdgesError as broken:
+            return np.array(list(broken.causes))
         turned = np.abs(np.diff(path.q, axis=0)).sum(axis=1)
         between = np.bincount(path.cutter_point[:-1].astype(int), turned, len(track.places) - 1)
         told = np.abs(np.diff(track.q, axis=0)).sum(axis=1)

@@ -115,10 +115,10 @@ def bulging(places: Array, t: Array, edge: np.ndarray, excess: Array) -> list[Bu
     return found
 
 
-def broken_at(places: Array, column: int) -> list[Bulge]:
-    """Return the way from a place to the next, cut further: it cannot be made as it is."""
-    first, last = places[column : column + 2].tolist()
-    return [Bulge(first, last, MOST_PARTS, True)] if last - first > SMALLEST_EDGE else []
+def broken_at(places: Array, columns: Sequence[int]) -> list[Bulge]:
+    """Return ways from a place to the next, cut further: they cannot be made as they are."""
+    edges = [(float(places[column]), float(places[column + 1])) for column in columns]
+    return [Bulge(*edge, MOST_PARTS, True) for edge in edges if edge[1] - edge[0] > SMALLEST_EDGE]
 
 
 def bars(

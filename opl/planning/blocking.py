@@ -16,7 +16,7 @@ from opl.motion.collision_check import CollidingMove
 from opl.motion.motion import Motion, MoveKind
 from opl.motion.path import PassEnd
 from opl.motion.whole_motion import UnreachableApproachError
-from opl.planning.filling import BrokenEdgeError
+from opl.planning.filling import BrokenEdgesError
 from opl.planning.open_matrix import FreeMove, OpenMatrix
 from opl.planning.problem import GrindingProblem
 from opl.planning.track_check import Blocked, Collides, NoFreeMove
@@ -37,8 +37,9 @@ def block(problem: GrindingProblem, matrix: OpenMatrix, rows: np.ndarray, blocke
             _block_fault(problem, matrix, track, ends, blocked.motion, fault)
     elif isinstance(blocked, NoFreeMove):
         _block_link(problem, matrix, track, blocked)
-    elif isinstance(blocked.error, BrokenEdgeError):
-        _block_edge(matrix, track, blocked.error.column, blocked.error.cause)
+    elif isinstance(blocked.error, BrokenEdgesError):
+        for column, cause in blocked.error.causes.items():
+            _block_edge(matrix, track, column, cause)
     else:
         column = blocked.error.column
         matrix.block_node(column, track[column], f"approach: {blocked.error.cause}")

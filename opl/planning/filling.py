@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from opl.cell.full_turns import nearest_turn
@@ -16,18 +18,19 @@ from opl.planning.settings import Interpolation
 from opl.search.ladder import middle_count
 
 
-class BrokenEdgeError(Exception):
-    """An edge between two nodes cannot be made on the wheel.
+class BrokenEdgesError(Exception):
+    """Edges between nodes of a track cannot be made on the wheel.
 
     Args:
-        column: The cutter point the edge starts from.
-        cause: ``reach``, ``limits of`` those by name, or ``continuity``.
+        causes: ``reach``, ``limits of`` those by name, or ``continuity``, by the cutter point that
+            an edge starts from: of all that are broken for the first of these that any is.
     """
 
-    def __init__(self, column: int, cause: str) -> None:
-        super().__init__(f"edge from cutter point {column}: {cause}")
-        self.column = column
-        self.cause = cause
+    def __init__(self, causes: Mapping[int, str]) -> None:
+        super().__init__(
+            ", ".join(f"edge from cutter point {column}: {why}" for column, why in causes.items())
+        )
+        self.causes = causes
 
 
 MOST_HALVINGS = 6  # of a move between intermediate nodes
@@ -48,7 +51,7 @@ def fill_in(
     `rows` are those of the track in each column, one for each cutter point, shape (N,).
 
     Raises:
-        BrokenEdgeError: If an edge leaves reach, limits or IK branch between its ends.
+        BrokenEdgesError: If edges leave reach, limits or IK branch between their ends.
     """
     columns = np.arange(len(rows))
     q_node, t_node = nodes.along(rows), nodes.t_along(rows)
@@ -74,7 +77,9 @@ def fill_in(
             return GrindingPath(nodes.ik_branch[first], q, t, place, pass_index)
         halves = (place[coarse] + place[coarse + 1]) / 2.0
         place = np.insert(place, coarse + 1, halves)
-    raise BrokenEdgeError(int(place[coarse[0]]), "continuity")
+    raise BrokenEdgesError(
+        dict.fromkeys(np.unique(place[coarse].astype(int)).tolist(), "continuity")
+    )
 
 
 def _at_flat_end(cell: WorkCell, t_node: Array, same_pass: np.ndarray, place: Array) -> Array:
@@ -117,13 +122,17 @@ def _solve(
     q = nearest_turn(q, q_guess)
     at_node = place == np.floor(place)
     q[at_node] = q_node[place[at_node].astype(int)]
-    lost = np.isnan(q).any(axis=1)
+    lost, edge = np.isnan(q).any(axis=1), np.minimum(place.astype(int), len(q_node) - 2)
     if lost.any():
-        raise BrokenEdgeError(int(place[lost][0]), "reach")
+        raise BrokenEdgesError(dict.fromkeys(np.unique(edge[lost]).tolist(), "reach"))
     beyond = ~cell.within_limits(q)
     if beyond.any():
-        names = " ".join(cell.broken_limits(q))
-        raise BrokenEdgeError(int(place[beyond][0]), f"limits of {names}")
+        raise BrokenEdgesError(
+            {
+                column: f"limits of {' '.join(cell.broken_limits(q[edge == column]))}"
+                for column in np.unique(edge[beyond]).tolist()
+            }
+        )
     return q
 
 

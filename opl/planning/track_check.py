@@ -15,7 +15,7 @@ from opl.motion.whole_motion import (
     linked,
     whole_motion,
 )
-from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.filling import BrokenEdgesError, fill_in
 from opl.planning.nodes import NodeMatrix
 from opl.planning.problem import GrindingProblem
 
@@ -30,9 +30,9 @@ class Free:
 
 @dataclass(frozen=True)
 class NoMotion:
-    """An edge of the track cannot be filled in, or an approach or retract does not exist."""
+    """Edges of the track cannot be filled in, or an approach or retract does not exist."""
 
-    error: BrokenEdgeError | UnreachableApproachError
+    error: BrokenEdgesError | UnreachableApproachError
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def check_track(problem: GrindingProblem, nodes: NodeMatrix, rows: np.ndarray) -
     cell, points = problem.cell, problem.points
     try:
         path = fill_in(cell, points, nodes, rows, problem.interpolation)
-    except BrokenEdgeError as error:
+    except BrokenEdgesError as error:
         return NoMotion(error)
     return check_path(problem, path)
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from opl.cell.workcell import JointLimit
 from opl.motion.motion import MoveKind
 from opl.motion.whole_motion import UnreachableApproachError, whole_motion
-from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.filling import BrokenEdgesError, fill_in
 from opl.planning.multi_start import plan_recursive
 from opl.planning.nodes import build_nodes
 from opl.planning.reasons import explain
@@ -127,9 +127,9 @@ def test_a_step_and_an_approach_beyond_a_limit_are_refused_by_name():
     wanted = np.interp(path.contact_position[at_points], nodes.contact_position[0], np.arange(30))
     rows = np.round(wanted).astype(int)
     shut = replace(problem.cell, limits=(JointLimit("T", T, EVERYWHERE, EVERYWHERE + 1.0),))
-    with pytest.raises(BrokenEdgeError) as broken:
+    with pytest.raises(BrokenEdgesError) as broken:
         fill_in(shut, problem.points, nodes, rows, problem.interpolation)
-    assert broken.value.cause == "limits of T"
+    assert set(broken.value.causes.values()) == {"limits of T"}
 
 
 def test_reasons_and_states_tell_the_limit():

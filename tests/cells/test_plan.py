@@ -14,7 +14,7 @@ from opl.motion.joint_lines import RESOLUTION, densify
 from opl.motion.motion import MoveKind
 from opl.motion.timing import Cause, time_motion
 from opl.motion.whole_motion import UnreachableApproachError, whole_motion
-from opl.planning.filling import BrokenEdgeError, fill_in
+from opl.planning.filling import BrokenEdgesError, fill_in
 from opl.planning.fixed_contact import keep_contact, runs_of
 from opl.planning.multi_start import (
     plan_recursive,
@@ -166,7 +166,7 @@ def step_is_free(problem, nodes, column, here, there):
     rows = np.array([here, there])
     try:
         path = fill_in(problem.cell, points, cut, rows, problem.interpolation)
-    except BrokenEdgeError:
+    except BrokenEdgesError:
         return False
     return not problem.scene.collision.collides(densify(path.q, RESOLUTION)[0]).any()
 
