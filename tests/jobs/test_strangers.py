@@ -15,7 +15,7 @@ from opl.run.searches import search_path
 from tests.support.planned import problem_of
 
 # a process for each of their files, as in a run, but none that loads the readers first
-pytestmark = pytest.mark.usefixtures("warm_processes")
+pytestmark = pytest.mark.usefixtures("warm_processes", "no_pictures")
 
 
 @pytest.mark.parametrize("family", [*FAMILIES, *WALLED])
