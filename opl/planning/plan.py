@@ -19,6 +19,7 @@ from opl.planning.blocking import block
 from opl.planning.open_matrix import OpenMatrix, Track
 from opl.planning.problem import GrindingProblem
 from opl.planning.reasons import no_path
+from opl.planning.symmetry import flipped_alike
 from opl.planning.track_check import Collides, Free, check_track
 
 NEGLIGIBLE = 1e-4  # of travel in [rad] and the like: round-off along a path that rests adds up
@@ -173,6 +174,7 @@ def propose_and_check(
     first, begun = checks, problem.scene.work
     of_a_check = WORK_OF_A_CHECK * len(problem.points)
     collided = {} if collided is None else collided
+    sunk: dict[Same, Collides] = {}  # the other flip of the wrist moves the part alike
     proposing = 0.0
 
     def done() -> float:
@@ -186,9 +188,11 @@ def propose_and_check(
             continue
         matrix = matrices[track.matrix]
         # full turns bring the same bodies to the same places
-        same = matrix.nodes.ik_branch.tobytes(), matrix.nodes.t_along(track.rows).tobytes()
-        if same in collided:
-            block(problem, matrix, track.rows, collided[same])
+        at = matrix.nodes.t_along(track.rows).tobytes()
+        same = matrix.nodes.ik_branch.tobytes(), at
+        alike = flipped_alike(problem.cell.robot, matrix.nodes.ik_branch).tobytes(), at
+        if (known := collided.get(same) or sunk.get(alike)) is not None:
+            block(problem, matrix, track.rows, known)
             continue
         checks += 1
         found = check_track(problem, matrix.nodes, track.rows)
@@ -197,6 +201,8 @@ def propose_and_check(
         block(problem, matrix, track.rows, found)
         if isinstance(found, Collides):
             collided[same] = found
+            if (deep := found.of_part_and_wheel) is not None:
+                sunk[alike] = deep
         if checks == most_checks or done() >= most_work:
             return OutOfBudget(checks, matrices)
     return Exhausted(checks, matrices)

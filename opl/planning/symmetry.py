@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from opl.cell.robot import Robot
+from opl.cell.spherical_wrist import SphericalWristArm
 from opl.cell.workcell import WorkCell
 from opl.files.kernels import kernel
 from opl.geometry.frames import Array
@@ -72,6 +73,14 @@ def everywhere(
             made = Moved(q, exists, sign, shift, turns)
             found.append((near, len(found), NodeMatrix(ik_branch, made, t, index)))
     return [nodes for _, _, nodes in sorted(found, key=lambda entry: entry[:2])]
+
+
+def flipped_alike(robot: Robot, ik_branch: np.ndarray) -> np.ndarray:
+    """Return numbers of IK branches, the same for those that differ in the flip of the wrist.
+
+    What moves with the flange moves alike on both, from joint position to joint position as well.
+    """
+    return ik_branch % 4 if isinstance(robot.arm, SphericalWristArm) else ik_branch
 
 
 def twins(matrices: list[OpenMatrix], track: Track, robot: Robot) -> list[Track]:

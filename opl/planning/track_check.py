@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opl.cell.workcell import PART, WHEEL
 from opl.motion.collision_check import CollidingMove
 from opl.motion.motion import Motion
 from opl.motion.path import GrindingPath
@@ -41,6 +42,13 @@ class Collides:
 
     motion: Motion
     faults: tuple[CollidingMove, ...]
+
+    @property
+    def of_part_and_wheel(self) -> Collides | None:
+        """What is left of it without the robot: part and wheel while it grinds; None if nothing."""
+        kind = self.motion.kind
+        left = [f for f in self.faults if f.pair == (PART, WHEEL) and kind[f.move].on_wheel]
+        return replace(self, faults=tuple(left)) if left else None
 
 
 @dataclass(frozen=True)
