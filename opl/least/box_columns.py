@@ -26,7 +26,7 @@ from opl.walls.placement import Placement, allowed, families_of, placed
 from opl.walls.shut_leads import RESERVE, ShutLeads
 
 FINE = 33  # contact positions of a place at which a box is held against it
-SOLVED_OF_WORK, KNOWN_OF_WORK = 800, 2000  # postures that cost a unit of work
+SOLVED_OF_WORK, KNOWN_OF_WORK = 800, 900  # postures that cost a unit of work
 WITHIN = 9  # halvings of the way between places that is too deep in the wheel, but hardly
 CLOSER = 2  # times that places are sampled closer where collisions begin
 HIDDEN = 5e-5  # of the box: what a chord that meets it may stand off the postures

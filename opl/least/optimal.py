@@ -36,9 +36,9 @@ from opl.walls.placement import Placement
 MOST_GIVEN_UP = 3  # boxes in which no motion is near enough to the bound
 MOST_ADDED = 3  # walls at once
 NEARLY_DONE = 0.8  # of the work allowed: from then on motions are sought in larger boxes, too
-LAST_CHANCE = 0.9  # of it: from then on one of whatever size is sought, where none is known
+LAST_CHANCE = 0.85  # of it: from then on one of whatever size is sought, where none is known
 # in shares of the work allowed, and beyond it: what may be done for that, and to make it smaller
-ANYWHERE_SHARE, SMALLER_SHARE = 0.3, 0.2
+ANYWHERE_SHARE, SMALLER_SHARE = 0.25, 0.1
 
 
 class OptimalSearch:

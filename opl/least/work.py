@@ -16,9 +16,9 @@ from opl.walls.columns import ColumnWalls
 from opl.walls.families import Families
 
 # what makes a unit, or how many units one makes
-NUMBERS = 2.5e6  # worked on in linear programs
-SUBPROBLEMS = 6
-WORK_OF_A_WALL = 25.0
+NUMBERS = 1.4e6  # worked on in linear programs
+SUBPROBLEMS = 8
+WORK_OF_A_WALL = 12.0
 EARLY_SHARE = 0.3  # of the work: motions in boxes that are not proven to be the least
 FIRST_WORK = 300  # units that may be spent on those at once
 

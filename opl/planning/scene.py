@@ -14,7 +14,7 @@ from opl.motion.free_move_search import FreeMoveSearch
 
 # what makes a unit of work, which is counted so that it is the same on any machine
 QUERIES = 60  # configurations that coal looks at for collisions
-LOOKS = 20_000  # at spheres and triangles of the part, for its distance to the wheel
+LOOKS = 10_000  # at spheres and triangles of the part, for its distance to the wheel
 
 
 @dataclass(frozen=True)

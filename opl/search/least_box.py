@@ -29,7 +29,7 @@ from opl.search.walls import Image, Piece, Wall
 
 SETTLED = 0.04  # of the gap wanted: what the bend of the spans may lose where none is split further
 NUMBERS_OF_A_CELL = 30  # worked on to cut off what no box can hold
-NUMBERS_OF_A_SOURCE = 6  # that it is worth to tell whether a box can hold a piece in one image
+NUMBERS_OF_A_WALL, NUMBERS_OF_A_SOURCE = 1e5, 6  # worth to ask which of its images a box can hold
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 FURTHER = 1.5  # times a size: cells are at hand for boxes up to there
 FEWEST_BEFORE_ANEW = 256  # subproblems of a tree that is begun anew for walls added since
@@ -262,7 +262,7 @@ class BoxProof:
             keys = keys_left(node.spans, cells.pass_index)
         for wall in range(node.n_walls, n_walls):
             index = int(cells.pass_index[wall])
-            self.work += NUMBERS_OF_A_SOURCE * cells.n_sources(wall)
+            self.work += NUMBERS_OF_A_WALL + NUMBERS_OF_A_SOURCE * cells.n_sources(wall)
             new.append(
                 cells.spans_of(wall, node.low, node.high, closing, mirrored, keys.get(index))
             )

@@ -92,6 +92,7 @@ def least_box(  # type: ignore[no-untyped-def]
     # faces beyond the core: of the least box so far, of one that meets all, and one between
     beyond, best, between, around = np.zeros(12), np.full(12, np.inf), np.zeros(12), np.empty(12)
     for _ in range(MOST_LOOKS):
+        work += 24.0 * n_walls
         around[:] = 0.0
         for w in range(n_walls):
             for f in range(12):

@@ -33,8 +33,8 @@ from opl.walls.sides import ANY_SIDE, Side
 
 MOST_CUTS = 3  # of such cells, each finer than the one before
 ROW_PARTS = 8  # cells between two cutter points along a contact position, before any is cut finer
-PART_OF_A_CHAIN = 2.0  # times the work for a column
-PART_OF_A_WALL = 0.3  # of the work for one: a cell cut finer
+# of the work for a column: a chain, and each of its edges; a cell cut finer
+PART_OF_A_CHAIN, PART_OF_AN_EDGE, PART_OF_A_CELL = 0.5, 0.08, 0.07
 FINER = 8  # cells that one is cut into where a proof needs it
 
 Edge = tuple[int, float, float, float, float]  # number of a chain, place, t, place and t
@@ -92,7 +92,9 @@ class ColumnWalls:
             for side in self._sides[passes[number]]:
                 found = made.get(edge, [])
                 pieces[number] += [part for piece in found for part in side.parts(piece, at)]
-        self.made += sum(1.0 if len(corners) == 2 else PART_OF_A_CHAIN for corners in chains)
+        columns = sum(len(corners) == 2 for corners in chains)
+        self.made += columns + PART_OF_A_CHAIN * (len(chains) - columns)
+        self.made += PART_OF_AN_EDGE * (len(edges) - columns)
         return [
             Wall(int(passes[k]), (min(places) + max(places)) / 2.0, tuple(pieces[k]), chains[k])
             for k, places in enumerate([place for place, _ in corners] for corners in chains)
@@ -119,7 +121,7 @@ class ColumnWalls:
 
     def finer(self, piece: Piece, cell: int) -> tuple[Piece, ...]:
         """Return one cell of a wall as pieces with smaller cells."""
-        self.made += PART_OF_A_WALL
+        self.made += PART_OF_A_CELL
         grid = np.linspace(piece.at[cell], piece.at[cell + 1], FINER + 1)
         none = np.zeros(FINER, dtype=bool)
         T_workpiece_cutter = piece.line.T_workpiece_cutter

@@ -118,7 +118,7 @@ def test_with_little_work_a_motion_is_sought_in_larger_boxes_before_it_is_done(t
     """The bound rises slowly, and no box proposed meanwhile holds a motion."""
     draw_job(20261203, 10, 0, tmp_path)
     job = opl.load_job(tmp_path / "job.yaml")
-    little = replace(job.search.optimal, max_subproblems=3200)
+    little = replace(job.search.optimal, max_subproblems=2000)
     plan = search_path(replace(job.search, optimal=little), problem_of(job)).plan
     assert plan.open_because == "the work allowed for the proof was done before it was complete"
     assert plan.lower_bound >= 0.92 * plan.path.joint_range_sum
