@@ -29,7 +29,7 @@ from opl.search.walls import Image, Piece, Wall
 
 SETTLED = 0.04  # of the gap wanted: what the bend of the spans may lose where none is split further
 NUMBERS_OF_A_CELL = 30  # worked on to cut off what no box can hold
-NUMBERS_OF_A_WALL, NUMBERS_OF_A_SOURCE = 1e5, 6  # worth to ask which of its images a box can hold
+NUMBERS_OF_A_WALL, NUMBERS_OF_A_SOURCE = 1e5, 6  # that it is worth to ask one
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 FURTHER = 1.5  # times a size: cells are at hand for boxes up to there
 FEWEST_BEFORE_ANEW = 256  # subproblems of a tree that is begun anew for walls added since

@@ -18,7 +18,7 @@ from opl.planning.symmetry import flipped_alike, twins
 from opl.planning.track_check import Collides, Free, check_track
 from tests.support.planned import small_problem
 
-FOREARM = "link_4"
+FOREARM = "R_link"
 
 
 @pytest.fixture
