@@ -9,19 +9,25 @@ are there. It is the best of what was looked at, not proven to be the best of al
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from opl.geometry.frames import Array
 from opl.least.own_track import ABOUT, OwnTrack, nodes_about
+from opl.least.telling_places import way_prices
+from opl.least.track_over_chords import track_over_chords
 from opl.planning.costs import track_cost
 from opl.planning.filling import BrokenEdgesError, fill_in
 from opl.planning.nodes import NodeMatrix
 from opl.planning.open_matrix import open_matrices
 from opl.planning.problem import GrindingProblem
-from opl.planning.settings import CostWeights
+from opl.planning.settings import CostWeights, ObjectiveWeights
+from opl.planning.symmetry import everywhere
 from opl.planning.turned import Kept
 from opl.search.box import JointBox
 from opl.search.smooth import smoothest
+from opl.search.way_cells import WayPrices
 from opl.walls.images import wrist_flips
 from opl.walls.shut_leads import RESERVE, ShutLeads
 
@@ -33,9 +39,13 @@ CLOSER = 0.25  # times as far to either side next, where the track hardly gets c
 HARDLY = 0.0005  # of its cost
 # spacings of the field: no closer than that before more cutter points are put in, and at last
 CLOSEST_BETWEEN, CLOSEST = 0.25, 0.005
+NEAREST_WAY = 0.1  # likewise, of ways over chords: bent over so little they are as good as straight
 ALIKE = 1e-6  # tracks whose costs differ by less are images of one another
-LONGER = 0.005  # of the mean way from place to place: what a way may be longer than it is told
-MOST_HALVINGS = 4  # of ways that are
+# times the costs that decide between tracks that are charged alike: for travel few are, for time
+# most, whose motions take longer than is told from place to place where joints turn fast
+TIES_OF_TRAVEL, TIES_OF_TIME = 1e-4, 1e-3
+LONGER = 0.002  # of the mean way from place to place: what a way may be longer than it is told
+MOST_HALVINGS = 6  # of ways that are
 
 
 class PassTracks:
@@ -43,14 +53,18 @@ class PassTracks:
 
     Args:
         problem: What is to be planned.
-        prices: What a track is charged for.
+        weights: What a track is charged for.
+        costs: What decides between tracks that are charged alike.
 
     Attributes:
-        prices: The same.
+        prices: What is charged for, and a little of what decides.
     """
 
-    def __init__(self, problem: GrindingProblem, prices: CostWeights) -> None:
-        self._problem, self.prices = problem, prices
+    def __init__(
+        self, problem: GrindingProblem, weights: ObjectiveWeights, costs: CostWeights
+    ) -> None:
+        self._problem, self._weights = problem, weights
+        self.prices = _prices(weights, costs)
         self._scene = problem.scene.collision.wider(RESERVE)
         self._leads = ShutLeads(problem)
 
@@ -113,6 +127,45 @@ class PassTracks:
             begun = closer.at(_spread(columns, 2 * len(begun.places) - 1).astype(float))
         return self.about(begun, box)
 
+    def along_way(self, way: OwnTrack, other: OwnTrack | None = None) -> OwnTrack | None:
+        """Return the track over all cutter points that a way over some of a pass leads to.
+
+        Through places between them where that is longer. It is made with the flip and the full
+        turns that are farthest from the limits, or with the flip of another track if it can be.
+
+        Args:
+            way: The way, with the family of its postures for the IK branch.
+            other: That track, if any.
+        """
+        flips = [
+            (way.ik_branch + 4 * flip, *move)
+            for flip, move in enumerate(wrist_flips(self._problem.cell.robot.arm))
+        ]
+        t, q, chosen = way.t[:, None], way.q[:, None], np.ones((len(way.t), 1), dtype=bool)
+        made = everywhere(self._problem.cell, t, q, chosen, flips)
+        if not made:
+            return None
+        wanted = None if other is None else other.ik_branch[0] // 4
+        image = next((one for one in made if one.ik_branch[0] // 4 == wanted), made[0])
+        begun = OwnTrack(way.places, image.ik_branch, way.t, np.asarray(image.q)[:, 0])
+        found = self.over_all(begun)
+        return None if found is None else self.through_places(self.straightened(found))
+
+    def straightened(self, track: OwnTrack) -> OwnTrack:
+        """Return a track of one pass that is charged less, of ways over chords about it.
+
+        Nearer and nearer to it, as long as that is more than hardly anything; the same if none is.
+        """
+        about, best = ABOUT, self.charged(track).cost
+        while about > NEAREST_WAY:
+            way = track_over_chords(self._problem, self._way_prices(track), track, about)
+            found = None if way is None else self.about(way, None, CLOSEST, about * CLOSER)
+            if found is not None and (now := self.charged(found).cost) < best * (1.0 - HARDLY):
+                track, best = found, now
+            else:
+                about *= CLOSER
+        return track
+
     def through_places(self, track: OwnTrack, box: JointBox | None = None) -> OwnTrack:
         """Return a track of one pass through places between its own, where it is longer than told.
 
@@ -138,8 +191,12 @@ class PassTracks:
         found = (self.about(track, box, widest=times * ABOUT) for times in WIDER)
         return next(filter(None, found), None)
 
+    def charged(self, track: OwnTrack) -> OwnTrack:
+        """Return a track with what travel and time along it cost, without what decides."""
+        return replace(track, cost=float(self._costs(track).sum()))
+
     def _longer(self, track: OwnTrack) -> np.ndarray:
-        """Return after which places of a track joints turn farther than from place to place."""
+        """Return after which places of a track the way costs more than from place to place."""
         problem, nodes = self._over(
             track.places, track.ik_branch, track.t[:, None], track.q[:, None]
         )
@@ -148,10 +205,21 @@ class PassTracks:
             path = fill_in(problem.cell, problem.points, nodes, rows, problem.interpolation)
         except BrokenEdgesError as broken:
             return np.array(list(broken.causes))
-        turned = np.abs(np.diff(path.q, axis=0)).sum(axis=1)
-        between = np.bincount(path.cutter_point[:-1].astype(int), turned, len(track.places) - 1)
-        told = np.abs(np.diff(track.q, axis=0)).sum(axis=1)
-        return np.flatnonzero(between - told > LONGER * told.sum() / len(told))
+        if not len(told := self._costs(track)):
+            return np.empty(0, dtype=int)
+        before = path.cutter_point[:-1].astype(int)
+        places = np.interp(path.cutter_point, np.arange(len(track.places)), track.places)
+        filled = replace(track, places=places, t=path.contact_position, q=path.q)
+        costs = np.bincount(before, self._costs(filled), len(told))
+        return np.flatnonzero(costs - told > LONGER * told.sum() / len(told))
+
+    def _costs(self, track: OwnTrack) -> Array:
+        """Return what the ways from place to place of a track cost, shape (n - 1,)."""
+        prices = self._way_prices(track)
+        return prices.of(np.diff(track.q, axis=0), np.diff(track.t), prices.seconds)
+
+    def _way_prices(self, track: OwnTrack) -> WayPrices:
+        return way_prices(self._problem, self._weights.travel, self._weights.time, track.places)
 
     def _over(
         self, places: Array, ik_branch: np.ndarray, t: Array, q: Array
@@ -197,6 +265,20 @@ class PassTracks:
         family, flip = (ik_branch % 4, ik_branch // 4) if flips > 1 else (ik_branch, 0)
         T = self._problem.points.frames_at(np.array([place]))[0]
         return self._leads.at(T, family, flip, t, 0.0)
+
+
+def _prices(weights: ObjectiveWeights, costs: CostWeights) -> CostWeights:
+    """Return what adds up along a track, costs where it leaves a choice hardly charged for."""
+    share = max(TIES_OF_TRAVEL * weights.travel, TIES_OF_TIME * weights.time)
+    return CostWeights(
+        joint_weights=weights.travel + share * costs.joint_weights,
+        contact_weight=share * costs.contact_weight,
+        time_weight=weights.time,
+        limit_weight=share * costs.limit_weight,
+        singularity_weight=share * costs.singularity_weight,
+        push_away=0.0,
+        push_weight=0.0,
+    )
 
 
 def _spread(columns: np.ndarray, most: int) -> np.ndarray:

@@ -127,7 +127,7 @@ def posture_cells(walls: list[Wall], family: int, side: Side) -> PostureCells:
 
 
 def cut(
-    problem: GrindingProblem, places: np.ndarray, cells: PostureCells, chosen: np.ndarray
+    problem: GrindingProblem, places: Array, cells: PostureCells, chosen: np.ndarray
 ) -> PostureCells:
     """Return the cells, some of them cut into parts.
 
@@ -144,7 +144,7 @@ def cut(
     pad_low, pad_high = cells.pad_low[source], cells.pad_high[source]
     t[new] = t[new, :1] * (1.0 - share) + t[new, 1:] * share
     chord = q[new, :1] * (1.0 - share[..., None]) + q[new, 1:] * share[..., None]
-    frames = problem.points.Ts_workpiece_cutter[places[cells.column[source[new]]]]
+    frames = problem.points.frames_at(places)[cells.column[source[new]]]
     Ts_base_flange = problem.cell.Ts_base_flange(t[new], frames[:, None])
     there = inverse_kinematics(problem.cell.robot.arm, Ts_base_flange)[:, :, cells.family]
     q[new] = there + 2.0 * np.pi * np.round((chord - there) / (2.0 * np.pi))

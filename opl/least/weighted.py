@@ -29,11 +29,11 @@ from opl.search.box import JointBox
 WIDENINGS = (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0)
 MOST_BRANCHES = 2  # on which all passes are ground: those cheapest over few cutter points
 WORTH_CHANGING = 0.01  # of the sum: what is gained where passes lie on several IK branches
+WORTH_BRANCH = 1e-3  # of the cost of one pass: likewise
 ALIKE = 1e-4  # by which fraction the sums of images may differ
 MOST_TURNS = 6  # from tracks to their motion
-MOST_TRIED = 6  # proposals of which motions are made
+MOST_TRIED = 4  # proposals of which motions are made
 BOUND_BEGINS, MOTIONS_BEGIN = 0.4, 0.7  # of the work; tracks before
-TIES = 1e-3  # times the costs that decide between tracks of equal weighted sum
 
 
 def plan_weighted(
@@ -69,27 +69,40 @@ def plan_weighted(
         return not ended
 
     if weights.travel > 0.0 or weights.time > 0.0:
-        prices = _prices(weights, costs)
-        tracks = PassTracks(problem, prices)
+        tracks = PassTracks(problem, weights, costs)
         proposals = []
         for one in _proposals(tracks, weights, known):
             proposals.append(one)
             if not goes_on(0.0, lower_bound):
                 break
-        each = [[track.cost for track in one.passes] for one in proposals]
-        worth = np.min(each, axis=0) if each else np.full(problem.points.n_passes, np.inf)
-        of_ranges, attained = lower_bound, float(worth.sum())
+        cheapest = _cheapest_of_passes(tracks, proposals)
+        best_of = dict(enumerate(cheapest))
+        begun = [tracks.charged(track) for track in cheapest]
+        of_ranges, attained = lower_bound, sum(track.cost for track in begun)
 
         def rises(cost: float) -> bool:
             done = cost / attained if attained > 0.0 else 1.0
             return goes_on(BOUND_BEGINS + (MOTIONS_BEGIN - BOUND_BEGINS) * done, of_ranges + cost)
 
+        def attain(way: OwnTrack) -> OwnTrack | None:
+            index = int(problem.points.pass_index[int(way.places[0])])
+            found = tracks.along_way(way, best_of.get(index))
+            if found is not None and (index not in best_of or found.cost < best_of[index].cost):
+                best_of[index] = found
+            return None if found is None else tracks.charged(found)
+
         if not ended:
-            lower_bound += least_cost(problem, weights.travel, weights.time, worth, rises)
+            prices = weights.travel, weights.time
+            lower_bound += least_cost(problem, *prices, begun, rises, attain)
+        if len(best_of) == problem.points.n_passes:
+            passes = [best_of[index] for index in sorted(best_of)]
+            proposals.append(_proposal(weights, passes, None))
         for one in _different(proposals):
             # a motion costs hardly less than its track does at the cutter points
-            if ended or one.least >= value:
+            if ended:
                 break
+            if one.least >= value:
+                continue
             found = _motion(problem, tracks, one)
             if found is not None and (now := _value(problem, found, weights)) < value:
                 best, value = found, now
@@ -106,12 +119,14 @@ class _Proposal:
     """Tracks of all passes.
 
     Attributes:
-        least: Their weighted sum, told larger where passes lie on several IK branches.
+        least: Their weighted sum.
+        rank: The same, told larger where passes lie on several IK branches.
         passes: The tracks.
         box: Where they stay, if anywhere.
     """
 
     least: float
+    rank: float
     passes: list[OwnTrack]
     box: JointBox | None
 
@@ -136,11 +151,33 @@ def _motion(problem: GrindingProblem, tracks: PassTracks, proposal: _Proposal) -
     return None
 
 
+def _cheapest_of_passes(tracks: PassTracks, proposals: Sequence[_Proposal]) -> list[OwnTrack]:
+    """Return the cheapest track of each pass that is proposed, if any is.
+
+    On the IK branch of the best proposal, unless one of another is worth it.
+    """
+    if not proposals:
+        return []
+    best = min(proposals, key=lambda one: one.rank).passes
+    found = []
+    for own, of_pass in zip(
+        best, zip(*(one.passes for one in proposals), strict=True), strict=True
+    ):
+        cheapest = min(of_pass, key=lambda track: track.cost)
+        if cheapest.ik_branch[0] != own.ik_branch[0]:
+            alike = [one for one in of_pass if one.ik_branch[0] == own.ik_branch[0]]
+            nearly = min(alike, key=lambda track: track.cost)
+            if nearly.cost <= cheapest.cost * (1.0 + WORTH_BRANCH):
+                cheapest = nearly
+        found.append(tracks.through_places(tracks.straightened(cheapest)))
+    return found
+
+
 def _different(proposals: Iterable[_Proposal]) -> list[_Proposal]:
     """Return the best proposals, of images one."""
     found: list[_Proposal] = []
-    for one in sorted(proposals, key=lambda one: one.least):
-        if not found or one.least - found[-1].least > ALIKE * one.least:
+    for one in sorted(proposals, key=lambda one: one.rank):
+        if not found or one.rank - found[-1].rank > ALIKE * one.rank:
             found.append(one)
     return found[:MOST_TRIED]
 
@@ -164,11 +201,16 @@ def _proposals(
         for passes in (*near, *_on_branches(tracks, len(begun[0]), box)):
             found = [track for track in passes if track is not None]
             if len(found) == len(passes):
-                whole = joined(found)
-                range_sum = float(np.ptp(whole.q, axis=0).sum())
-                total = weights.joint_range * range_sum + whole.cost
-                changes = bool((whole.ik_branch != whole.ik_branch[0]).any())
-                yield _Proposal(total * (1.0 + WORTH_CHANGING * changes), found, box)
+                yield _proposal(weights, found, box)
+
+
+def _proposal(weights: ObjectiveWeights, passes: list[OwnTrack], box: JointBox | None) -> _Proposal:
+    """Return tracks of all passes as a proposal."""
+    whole = joined(passes)
+    range_sum = float(np.ptp(whole.q, axis=0).sum())
+    total = weights.joint_range * range_sum + whole.cost
+    changes = bool((whole.ik_branch != whole.ik_branch[0]).any())
+    return _Proposal(total, total * (1.0 + WORTH_CHANGING * changes), passes, box)
 
 
 def _on_branches(
@@ -207,20 +249,6 @@ def _cheapest(costs: Mapping[int, float]) -> list[int]:
         if not found or costs[branch] - costs[found[-1]] > ALIKE * costs[branch]:
             found.append(branch)
     return found[:MOST_BRANCHES]
-
-
-def _prices(weights: ObjectiveWeights, costs: CostWeights) -> CostWeights:
-    """Return what adds up along a track, costs where it leaves a choice hardly charged for."""
-    share = TIES * max(weights.travel, weights.time)
-    return CostWeights(
-        joint_weights=weights.travel + share * costs.joint_weights,
-        contact_weight=share * costs.contact_weight,
-        time_weight=weights.time,
-        limit_weight=share * costs.limit_weight,
-        singularity_weight=share * costs.singularity_weight,
-        push_away=0.0,
-        push_weight=0.0,
-    )
 
 
 def _value(problem: GrindingProblem, plan: Plan, weights: ObjectiveWeights) -> float:

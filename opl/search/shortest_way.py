@@ -20,17 +20,6 @@ from opl.search.way_cells import Cells, WayPrices
 BLOCK = 8  # cells beside each other that are left out at once
 
 
-def cheapest_over_ends(cells: Cells, prices: WayPrices) -> tuple[Array, int]:
-    """Return the cost of the cheapest way to each of `Cells.ends` over others, shape (m,).
-
-    And how many ways from cell to cell were looked at.
-    """
-    ends = cells.ends
-    total, nothing = np.zeros((2, len(ends.start)))
-    looked = _fill(ends, prices, nothing, nothing, False, total)
-    return np.asarray(total), looked
-
-
 def cheapest_ways(cells: Cells, prices: WayPrices, potential: Array) -> tuple[Array, int]:
     """Return what a way through each cell costs at the least, shape (n,).
 

@@ -59,10 +59,14 @@ class Cells:
         none = np.zeros_like(q)
         return Cells(q, none, none, none, t, t, first)
 
+    @cached_property
+    def at_start(self) -> np.ndarray:
+        """Which of `ends` is the start of each cell, shape (n,); the next is its other end."""
+        return np.asarray(np.arange(len(self.start)) + np.cumsum(self._last) - self._last)
+
     def at_ends(self, of_ends: Array) -> tuple[Array, Array]:
         """Return what is known of `ends` at the start and at the other end of each cell."""
-        at = np.arange(len(self.start)) + np.cumsum(self._last) - self._last
-        return of_ends[at], of_ends[at + 1]
+        return of_ends[self.at_start], of_ends[self.at_start + 1]
 
 
 @dataclass(frozen=True)
@@ -82,3 +86,18 @@ class WayPrices:
     seconds: Array
     max_speed: Array
     contact_speed: float
+
+    def of(self, turned: Array, slid: Array, seconds: Array) -> Array:
+        """Return what ways cost, from posture to posture, shape (...).
+
+        Args:
+            turned: By how much joints turn in [rad], shape (..., 6).
+            slid: By how much t changes in belt units, shape (...).
+            seconds: Least time of each in [s], shape (...).
+        """
+        turned = np.abs(turned)
+        lasts = np.maximum(
+            (turned / self.max_speed).max(axis=-1), np.abs(slid) / self.contact_speed
+        )
+        lasts = np.maximum(lasts, seconds)
+        return np.asarray(self.travel * turned.sum(axis=-1) + self.time * lasts)

@@ -11,9 +11,10 @@ from tests.support.planned import problem_of
 @pytest.mark.parametrize(
     ("seed", "index", "attempt", "most"),
     [
-        (20262001, 29, 0, 0.03),  # a hollow: the part sinks between cutter points, past barriers
-        (20262001, 14, 0, 0.05),  # a torus: the cheapest branch is not that of many cutter points
-        (20262002, 12, 0, 0.02),  # a blade: its retract does not exist where travel is least
+        (20262001, 29, 0, 0.02),  # a hollow: the part sinks between cutter points, past barriers
+        (20262001, 14, 0, 0.01),  # a torus: the cheapest branch is not that of many cutter points
+        (20262002, 12, 0, 0.001),  # a blade: its retract does not exist where travel is least
+        (20264803, 8, 0, 0.001),  # a wavy part: joints are held still along its passes
         (20262001, 28, 0, 0.0),  # a cylinder that rests
     ],
 )

@@ -9,16 +9,19 @@ from benchmarks.stranger_jobs import draw_job
 from opl.files.resources import folder
 from opl.job.load import load_job
 from opl.least.least_cost import least_cost
+from opl.least.pass_cost import NO_TRACK
 from opl.least.pass_tracks import FEWS, PassTracks
 from opl.motion.collision_check import colliding_moves
 from opl.motion.motion import Motion, MoveKind
 from opl.motion.path import PassEnd
 from opl.motion.whole_motion import UnreachableApproachError
+from opl.planning.settings import ObjectiveWeights
 from opl.run.surfacing import cut_surface
 from opl.walls.shut_leads import ShutLeads
 from tests.support.planned import problem_of, with_positions
 
 FINE = 400
+TRAVEL = ObjectiveWeights(joint_range=0.0, travel=1.0, time=0.0)
 
 
 def s_shape():
@@ -54,10 +57,15 @@ def cheapest_in(q, free):
     return float(cost.min())
 
 
+def costing(cost):
+    """Return a track of one pass of which nothing is known but what it costs."""
+    return [replace(NO_TRACK, cost=cost)]
+
+
 def check(job, points, near):
     fine = problem_of(with_positions(job, FINE), points)
     free, colliding = cheapest(fine, True), cheapest(fine, False)
-    bound = least_cost(problem_of(with_positions(job, 140), points), 1.0, 0.0, np.array([free]))
+    bound = least_cost(problem_of(with_positions(job, 140), points), 1.0, 0.0, costing(free))
     assert colliding < bound <= free
     assert bound > near * free
 
@@ -101,11 +109,11 @@ def test_where_a_pass_cannot_begin_or_end_no_way_does(tmp_path, monkeypatch):
             for row in some:
                 free[column, row] = lead_is_free(problem, kind, nodes, column, row)
         least = min(least, cheapest_in(nodes.q, free))
-    bound = least_cost(problem, 1.0, 0.0, np.array([least]))
+    bound = least_cost(problem, 1.0, 0.0, costing(least))
     monkeypatch.setattr(
         ShutLeads, "at", lambda self, T, family, flip, t, *reserve: np.zeros(len(t), bool)
     )
-    without = least_cost(problem, 1.0, 0.0, np.array([least]))
+    without = least_cost(problem, 1.0, 0.0, costing(least))
     assert 1.05 * without < bound <= least
 
 
@@ -115,13 +123,53 @@ def test_a_slanted_way_is_found_where_staircases_over_the_field_mislead(tmp_path
     job = load_job(drawn.job)
     points = cut_surface(job).points
     problem = problem_of(job, slice(*np.flatnonzero(points.pass_index == 1)[[0, -1]] + [0, 1]))
-    weights = replace(job.search.optimal.costs, joint_weights=np.ones(6))
-    prices = replace(weights, contact_weight=0.0, time_weight=0.0, limit_weight=0.0)
-    tracks = PassTracks(problem, prices)
+    tracks = PassTracks(problem, TRAVEL, job.search.optimal.costs)
     cost = {}
     for few in FEWS:
         found = [tracks.over_all(start) for start in tracks.over_few(0, few).values()]
         cost[few] = min(np.abs(np.diff(one.q, axis=0)).sum() for one in found if one is not None)
     cheapest = min(cost.values())
     assert cost[FEWS[0]] > 1.5 * cheapest
-    assert 0.9 * cheapest < least_cost(problem, 1.0, 0.0, np.array([cheapest])) <= cheapest
+    assert 0.9 * cheapest < least_cost(problem, 1.0, 0.0, costing(cheapest)) <= cheapest
+
+
+@pytest.fixture(scope="module")
+def wavy(tmp_path_factory):
+    """Return a random job: on its first pass, the least travel holds joints still."""
+    drawn = draw_job(20264803, 8, 0, tmp_path_factory.mktemp("wavy"))
+    job = load_job(drawn.job)
+    problem = problem_of(job, slice(0, 37))
+    return problem, PassTracks(problem, TRAVEL, job.search.optimal.costs)
+
+
+def test_a_track_is_drawn_straight_and_stays_free(wavy):
+    """Of a track over nodes of the field, which is a staircase."""
+    problem, tracks = wavy
+    begun = min(tracks.over_few(0, 37).values(), key=lambda track: track.cost)
+    straight = tracks.straightened(begun)
+    turned = np.abs(np.diff(straight.q, axis=0)).sum()
+    assert turned == pytest.approx(tracks.charged(straight).cost)
+    assert turned < 0.9 * tracks.charged(begun).cost
+    assert not problem.scene.collision.collides(straight.q).any()
+    points = problem.points.at_places(straight.places)
+    assert not problem.cuts_at(straight.places, points, straight.t[:, None]).any()
+
+
+def test_a_way_of_the_bound_leads_to_a_track_as_cheap_as_any_known(wavy):
+    problem, tracks = wavy
+    begun = filter(None, map(tracks.over_all, tracks.over_few(0).values()))
+    known = tracks.charged(min(begun, key=lambda track: track.cost))
+    found = []
+
+    def attain(way):
+        # a posture of one family for each place, at most half a turn from one to the next
+        assert (way.ik_branch == way.ik_branch[0]).all() and way.ik_branch[0] < 4
+        assert (np.abs(np.diff(way.q, axis=0)) <= np.pi).all()
+        track = tracks.along_way(way, known)
+        assert track is not None
+        found.append(tracks.charged(track))
+        return found[-1]
+
+    bound = least_cost(problem, 1.0, 0.0, [replace(known, cost=2.0 * known.cost)], attain=attain)
+    cheapest = min(track.cost for track in found)
+    assert bound <= cheapest < 1.002 * min(bound, known.cost)
