@@ -55,12 +55,12 @@ def telling_places(prices: WayPrices, track: OwnTrack, places: Array, most: int)
 
     cost = np.concatenate([[0.0], np.cumsum(straight(np.arange(n - 1), np.arange(1, n)))])
 
-    def untold(first: int, last: int) -> tuple[float, int, int]:
+    def shortfall(first: int, last: int) -> tuple[float, int, int]:
         """Return by how much a stretch costs more than straight from end to end, and its ends."""
         return float(cost[last] - cost[first] - straight(first, last)), first, last
 
     known = np.searchsorted(track.places, places)
-    left = [untold(*ends) for ends in pairwise(known.tolist())]
+    left = [shortfall(*ends) for ends in pairwise(known.tolist())]
     told: list[int] = []
     while left and len(told) < most:
         left.sort(key=lambda one: (-one[0], one[1]))
@@ -76,5 +76,5 @@ def telling_places(prices: WayPrices, track: OwnTrack, places: Array, most: int)
             best = int(np.argmax(np.abs(track.q[between] - chord).sum(axis=1)))
         middle = int(between[best])
         told.append(middle)
-        left += [untold(first, middle), untold(middle, last)]
+        left += [shortfall(first, middle), shortfall(middle, last)]
     return np.sort(track.places[told])

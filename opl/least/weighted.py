@@ -75,7 +75,7 @@ def plan_weighted(
             proposals.append(one)
             if not goes_on(0.0, lower_bound):
                 break
-        cheapest = _cheapest_of_passes(tracks, proposals)
+        cheapest = [] if ended else _cheapest_of_passes(tracks, proposals)
         best_of = dict(enumerate(cheapest))
         begun = [tracks.charged(track) for track in cheapest]
         of_ranges, attained = lower_bound, sum(track.cost for track in begun)
@@ -160,15 +160,11 @@ def _cheapest_of_passes(tracks: PassTracks, proposals: Sequence[_Proposal]) -> l
         return []
     best = min(proposals, key=lambda one: one.rank).passes
     found = []
-    for own, of_pass in zip(
-        best, zip(*(one.passes for one in proposals), strict=True), strict=True
-    ):
-        cheapest = min(of_pass, key=lambda track: track.cost)
-        if cheapest.ik_branch[0] != own.ik_branch[0]:
-            alike = [one for one in of_pass if one.ik_branch[0] == own.ik_branch[0]]
-            nearly = min(alike, key=lambda track: track.cost)
-            if nearly.cost <= cheapest.cost * (1.0 + WORTH_BRANCH):
-                cheapest = nearly
+    for index, own in enumerate(best):
+        of_pass = [one.passes[index] for one in proposals]
+        others = np.array([track.ik_branch[0] != own.ik_branch[0] for track in of_pass])
+        costs = np.array([track.cost for track in of_pass]) * (1.0 + WORTH_BRANCH * others)
+        cheapest = of_pass[int(np.argmin(costs))]
         found.append(tracks.through_places(tracks.straightened(cheapest)))
     return found
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from opl.files.kernels import kernel
 from opl.geometry.frames import Array
+from opl.search.cell_blocks import BLOCK, around_blocks, nearest_block
 from opl.search.way_cells import Cells, WayPrices
 
-BLOCK = 8  # chords beside each other that are left out at once
 STILL = 1e-12  # [rad] a joint that turns less over a chord is not held still by a choice of it
 
 
@@ -134,35 +134,22 @@ def _over_chords(  # type: ignore[no-untyped-def]
     Chords beside each other are looked at one by one only where a box around them is near enough.
     """
     n_joints, looked = start.shape[1], 0
-    away = np.empty(n_joints)
+    away, none = np.empty(n_joints), np.zeros_like(start)
     n_blocks = (len(start) + BLOCK - 1) // BLOCK
     lower, upper = np.empty((n_blocks, n_joints)), np.empty((n_blocks, n_joints))
-    block_least, far = np.empty(n_blocks), np.empty(n_blocks)
+    block_least, far, known = np.empty(n_blocks), np.empty(n_blocks), np.empty(len(start))
     for column in range(1, len(first) - 1):
         begin, end, least = first[column - 1], first[column], seconds[column - 1]
         blocks = (end - begin + BLOCK - 1) // BLOCK
-        for block in range(blocks):
-            lower[block], upper[block], block_least[block] = np.inf, -np.inf, np.inf
-            for come in range(begin + block * BLOCK, min(begin + (block + 1) * BLOCK, end)):
-                known = min(total[at_start[come]], total[at_start[come] + 1])
-                block_least[block] = min(block_least[block], known)
-                for joint in range(n_joints):
-                    one, other = start[come, joint], start[come, joint] + along[come, joint]
-                    lower[block, joint] = min(lower[block, joint], one, other)
-                    upper[block, joint] = max(upper[block, joint], one, other)
+        for come in range(begin, end):
+            known[come] = min(total[at_start[come]], total[at_start[come] + 1])
+        around_blocks(start, along, none, none, known, begin, end, lower, upper, block_least)
         for here in range(ends_first[column], ends_first[column + 1]):
-            nearest = 0
             looked += blocks
-            for block in range(blocks):
-                turned = 0.0
-                for joint in range(n_joints):
-                    middle = 0.5 * (lower[block, joint] + upper[block, joint]) - ends[here, joint]
-                    middle -= 2.0 * np.pi * np.round(middle / (2.0 * np.pi))
-                    half = 0.5 * (upper[block, joint] - lower[block, joint])
-                    turned += max(abs(middle) - half, 0.0)
-                far[block] = block_least[block] + travel * turned + time * least
-                if far[block] < far[nearest]:
-                    nearest = block
+            nearest = nearest_block(
+                lower, upper, block_least, blocks, ends[here], ends[here], travel, time, least,
+                max_speed, far,
+            )  # fmt: skip
             best = np.inf
             for turn in range(blocks):
                 # the nearest first, then all others

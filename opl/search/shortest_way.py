@@ -15,9 +15,8 @@ import numpy as np
 
 from opl.files.kernels import kernel
 from opl.geometry.frames import Array
+from opl.search.cell_blocks import BLOCK, around_blocks, nearest_block
 from opl.search.way_cells import Cells, WayPrices
-
-BLOCK = 8  # cells beside each other that are left out at once
 
 
 def cheapest_ways(cells: Cells, prices: WayPrices, potential: Array) -> tuple[Array, int]:
@@ -170,26 +169,22 @@ def _pass_on(  # type: ignore[no-untyped-def]
     lower, upper = np.empty(n_joints), np.empty(n_joints)
     n_blocks = (len(start) + BLOCK - 1) // BLOCK
     block_lower, block_upper = np.empty((n_blocks, n_joints)), np.empty((n_blocks, n_joints))
-    block_least, far = np.empty(n_blocks), np.empty(n_blocks)
+    block_least, far, known = np.empty(n_blocks), np.empty(n_blocks), np.empty(len(start))
     for step in range(1, n_columns):
         column = n_columns - 1 - step if backwards else step
         beside = column + 1 if backwards else column - 1
         least = seconds[min(column, beside)]
         begin, end = first[beside], first[beside + 1]
         blocks = (end - begin + BLOCK - 1) // BLOCK
-        for block in range(blocks):
-            block_lower[block], block_upper[block], block_least[block] = np.inf, -np.inf, np.inf
-            for come in range(begin + block * BLOCK, min(begin + (block + 1) * BLOCK, end)):
-                if backwards:
-                    known = total[come] - max(potential[come], potential_end[come])
-                else:
-                    known = total[come] + min(potential[come], potential_end[come])
-                block_least[block] = min(block_least[block], known)
-                for joint in range(n_joints):
-                    low = start[come, joint] + min(along[come, joint], 0.0) + pad_low[come, joint]
-                    high = start[come, joint] + max(along[come, joint], 0.0) + pad_high[come, joint]
-                    block_lower[block, joint] = min(block_lower[block, joint], low)
-                    block_upper[block, joint] = max(block_upper[block, joint], high)
+        for come in range(begin, end):
+            if backwards:
+                known[come] = total[come] - max(potential[come], potential_end[come])
+            else:
+                known[come] = total[come] + min(potential[come], potential_end[come])
+        around_blocks(
+            start, along, pad_low, pad_high, known, begin, end, block_lower, block_upper,
+            block_least,
+        )  # fmt: skip
         for cell in range(first[column], first[column + 1]):
             for joint in range(n_joints):
                 lower[joint] = start[cell, joint] + min(along[cell, joint], 0.0)
@@ -200,28 +195,16 @@ def _pass_on(  # type: ignore[no-untyped-def]
                 own = min(potential[cell], potential_end[cell])
             else:
                 own = -max(potential[cell], potential_end[cell])
-            nearest = 0
             looked += blocks
-            for block in range(blocks):
-                away, lasts = 0.0, least
-                for joint in range(n_joints):
-                    middle = block_lower[block, joint] + block_upper[block, joint]
-                    middle = 0.5 * (middle - lower[joint] - upper[joint])
-                    half = block_upper[block, joint] - block_lower[block, joint]
-                    half = 0.5 * (half + upper[joint] - lower[joint])
-                    middle -= 2.0 * np.pi * np.round(middle / (2.0 * np.pi))
-                    if half < np.pi:  # of all full turns, none is nearer than so much
-                        gap = max(abs(middle) - half, 0.0)
-                        away += gap
-                        lasts = max(lasts, gap / max_speed[joint])
-                far[block] = block_least[block] + own + travel * away + time * lasts
-                if far[block] < far[nearest]:
-                    nearest = block
+            nearest = nearest_block(
+                block_lower, block_upper, block_least, blocks, lower, upper, travel, time, least,
+                max_speed, far,
+            )  # fmt: skip
             best = np.inf
             for turn in range(blocks):
                 # the nearest first, then all others
                 block = nearest if turn == 0 else turn - int(turn <= nearest)
-                if far[block] >= best:
+                if far[block] + own >= best:
                     continue
                 looked += BLOCK
                 for come in range(begin + block * BLOCK, min(begin + (block + 1) * BLOCK, end)):
