@@ -117,10 +117,10 @@ class PassTracks:
         return found
 
     def over_all(self, begun: OwnTrack, box: JointBox | None = None) -> OwnTrack | None:
-        """Return the track over all cutter points that one over few of a pass leads to."""
+        """Return the track over all cutter points that one over some places of a pass leads to."""
         index = self._problem.points.pass_index
         columns = np.flatnonzero(index == index[int(begun.places[0])])
-        while len(begun.places) < len(columns):
+        while not np.isin(columns, begun.places).all():
             closer = self.about(begun, box, CLOSEST_BETWEEN)
             if closer is None:
                 return None

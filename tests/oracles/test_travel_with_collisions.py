@@ -173,3 +173,15 @@ def test_a_way_of_the_bound_leads_to_a_track_as_cheap_as_any_known(wavy):
     bound = least_cost(problem, 1.0, 0.0, [replace(known, cost=2.0 * known.cost)], attain=attain)
     cheapest = min(track.cost for track in found)
     assert bound <= cheapest < 1.002 * min(bound, known.cost)
+
+
+def test_a_way_over_many_places_but_not_all_cutter_points_leads_to_a_track_over_all(wavy):
+    _, tracks = wavy
+    few = tracks.over_few(0)
+    known = min(filter(None, map(tracks.over_all, few.values())), key=lambda track: track.cost)
+    halves = np.arange(0.0, 36.5, 0.5)
+    begun = known.at(halves[halves % 1.0 != 0.0])  # all between cutter points
+    ends = known.at(np.array([0.0, *begun.places, 36.0]))
+    found = tracks.over_all(ends)
+    assert found is not None
+    assert np.isin(np.arange(37.0), found.places).all()
