@@ -36,7 +36,7 @@ def _certified(report: opl.Report) -> Iterator[str]:
         yield (
             f"no motion along these passes has a {name} below {form.format(known.lower_bound)}, "
             f"{COVERED}: the one found has {form.format(known.value)}, at most "
-            f"{100.0 * known.gap:.1f} % of it too much{_why(path.open_because)}"
+            f"{100.0 * known.gap:.3f} % of it too much{_why(path.open_because)}"
         )
     bound, gap = path.lower_bound_rad, path.gap
     if bound is None or gap is None:
