@@ -88,7 +88,7 @@ class Cells:
         for family in around:
             pieces = [piece for piece in wall.pieces if piece.family == family]
             moves = self._moves_of(family)
-            numbers = self.reach.near(around, family, moves.sign, moves.shift)
+            numbers = self.reach.near(around, family, moves)
             sign, shift = moves.sign[numbers, None], moves.shift[numbers, None]
             ends = np.array([piece.ends for piece in pieces])[:, None]
             moved = (sign * ends + shift).reshape(-1, 2, 6)

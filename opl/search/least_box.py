@@ -32,7 +32,8 @@ NUMBERS_OF_A_CELL = 30  # worked on to cut off what no box can hold
 NUMBERS_OF_A_WALL, NUMBERS_OF_A_SOURCE = 1e5, 6  # that it is worth to ask one
 SHARPER = 1e-5  # of the size: so much less of interest, and a box is bounded again
 FURTHER = 1.5  # times a size: cells are at hand for boxes up to there
-FEWEST_BEFORE_ANEW = 256  # subproblems of a tree that is begun anew for walls added since
+FEWEST_BEFORE_ANEW, RARER = 256, 1.2  # subproblems of a tree that is begun anew; times that, then
+MORE_WALLS = 1.15  # times those that a tree was begun with: it is begun anew for them
 FEW = 40  # walls over which linear programs take little time
 OTHER_PART = 0.2  # of what the larger of two bounds rises by counts
 CLOSER = 2, 3  # looks at what is forbidden, each closer than the one before
@@ -72,7 +73,7 @@ class BoxProof:
         self.stuck = np.inf  # least bound of what could not be split
         self.subproblems = self._count = self.bounded = 0  # what might have become one is bounded
         self.work = 0.0  # how many numbers were worked on, about
-        self._anew_after = FEWEST_BEFORE_ANEW
+        self._anew_after: float = FEWEST_BEFORE_ANEW
         self._plant(0.0)
 
     def _plant(self, bound: float) -> None:
@@ -128,9 +129,9 @@ class BoxProof:
             Its box, where nothing is gained by splitting it further: the caller adds a wall that
             misses the box, or lowers the threshold, and puts it back; or gives it up.
         """
-        large = self.subproblems - self._planted >= self._anew_after
-        if large and len(self.walls) > self._walls_then and np.isinf(self.stuck):
-            self._anew_after *= 2
+        grown = len(self.walls) >= MORE_WALLS * self._walls_then
+        if grown and self.subproblems >= self._planted + self._anew_after and self.stuck == np.inf:
+            self._anew_after *= RARER
             self._plant(self._open.least_bound)
         node = self._open.take()
         self.subproblems += 1
@@ -279,10 +280,8 @@ class BoxProof:
         ]
         if not len(spans):
             return False
-        few = spans[worth_a_price(spans)]
-        bound, numbers = least_box(
-            table, cells.shifts, few, n_walls, low, high, closing, box, lost, prices
-        )
+        given = table, cells.shifts, spans[worth_a_price(spans)], n_walls, low, high
+        bound, numbers = least_box(*given, closing, box, lost, prices)
         self.work += numbers
         node.bound = max(node.bound, bound, float(sizes.max()))
         if node.bound >= closing:

@@ -15,7 +15,7 @@ import numpy as np
 from opl.search.subproblems import Subproblem
 
 LATE = 128  # subproblems taken since the last box: it is late
-DIVE_AFTER = 256  # subproblems that were taken without a box
+DIVE_AFTER = 64  # subproblems that were taken without a box
 ALIKE = 1e-9  # [rad] by which bounds differ and count as the same
 
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from opl.geometry.frames import Array
-from opl.search.walls import Piece
+from opl.search.walls import Moves, Piece
 
 Around = Mapping[int, Array]  # what holds the pieces of a wall, by family, as of `Piece.ends`
 
@@ -36,20 +36,24 @@ class Reach:
         self.size = size
         self._first: Around | None = None  # what holds the first wall
 
-    def near(self, around: Around, family: int, sign: Array, shift: Array) -> np.ndarray:
+    def near(self, around: Around, family: int, moves: Moves) -> np.ndarray:
         """Return which images of a family on a wall are within reach, by their numbers, (n,).
 
         Args:
             around: What holds the wall; the one asked about first is the first wall.
             family: The family.
-            sign: Of each of its images, shape (m, 6).
-            shift: Likewise, in [rad].
+            moves: Its images.
         """
         self._first = self._first or around
-        one, other = (sign * end + shift for end in around[family])
-        low, high = np.minimum(one, other), np.maximum(one, other)
-        least = np.full(len(sign), np.inf)
-        for first_low, first_high in self._first.values():
-            apart = np.maximum(low - first_high, first_low - high)
-            least = np.minimum(least, np.maximum(apart, 0.0).sum(axis=1))
-        return np.flatnonzero(least < self.size)
+        near = np.zeros(len(moves.sign), dtype=bool)
+        for first in self._first.values():
+            left, away = np.arange(len(near)), np.zeros(len(near))
+            for joint, (sign, shift, which) in enumerate(moves.of_joints):
+                one, other = (sign * end[joint] + shift for end in around[family])
+                above = np.minimum(one, other) - first[1, joint]
+                below = first[0, joint] - np.maximum(one, other)
+                away = away + np.maximum(np.maximum(above, below), 0.0)[which[left]]
+                kept = away < self.size
+                left, away = left[kept], away[kept]
+            near[left] = True
+        return np.flatnonzero(near)

@@ -133,20 +133,29 @@ class Moves(NamedTuple):
         shift: Of each in [rad], shape (n, 6).
         flip: Which flip of the wrist each is, shape (n,).
         first: The number of the first with each flip, shape (2,).
+        of_joints: For each joint, signs and shifts that differ, and which each image has, shapes
+            (m,), (m,) and (n,): few, as images are made of the turns of single joints.
     """
 
     sign: Array
     shift: Array
     flip: np.ndarray
     first: np.ndarray
+    of_joints: tuple[tuple[Array, Array, np.ndarray], ...]
 
     @classmethod
     def of(cls, images: Sequence[Image]) -> Moves:
         """Return those of some images."""
         flip = [image.flip for image in images]
         first = np.array([flip.index(one) if one in flip else 0 for one in range(FLIPS)])
-        sign, shift = ([getattr(image, name) for image in images] for name in ("sign", "shift"))
-        return cls(np.array(sign), np.array(shift), np.array(flip), first)
+        sign, shift = (
+            np.array([getattr(image, name) for image in images]) for name in ("sign", "shift")
+        )
+        of_joints = []
+        for one in (sign + 1j * shift).T:
+            both, which = np.unique(one, return_inverse=True)
+            of_joints.append((both.real, both.imag, which))
+        return cls(sign, shift, np.array(flip), first, tuple(of_joints))
 
 
 @dataclass(frozen=True)

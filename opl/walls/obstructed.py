@@ -20,7 +20,7 @@ from opl.walls.shut_leads import ShutLeads
 
 # into how many parts a cell is cut at each look, halvings of what is all in collision then, but not
 # deep enough to be sure, and how few of those are halved on: what begins there is known closely
-PARTS, WITHIN, FEW = (1, 4, 16), (2, 4, 6), (0, 0, 8)
+PARTS, WITHIN, FEW = (1, 4, 16), (4, 4, 6), (0, 0, 8)
 PART_OF_A_WALL = 0.07  # of the work for one: a look, beside what is asked of solids
 AROUND = 16  # cells on either side of those asked about that are looked at as well, at first
 
