@@ -62,12 +62,19 @@ def test_a_dive_that_ends_without_a_box_is_followed_by_another_later_only():
 
 
 def test_a_box_is_late_until_the_next_whatever_dives_end_without_one():
-    left = after_a_while()
-    assert LATE < DIVE_AFTER and left.box_is_late
-    left.dive([node(0.5, 3)])
-    left.take()
-    left.dive([])
-    left.take()
-    assert left.box_is_late
+    left, dives = OpenSubproblems(node(1.0)), 0
+    for taken in range(1, LATE + 2):
+        one = left.take()
+        assert left.box_is_late == (taken > LATE)
+        if left.diving:
+            dives += 1
+            left.dive([])  # nothing is left of it
+        elif left.dive_is_due:
+            left.dive([one])
+        else:
+            left.leave([one])
+        if not left.least_bound < np.inf:
+            left.leave([node(1.0)])
+    assert dives > 0
     left.note_box()
     assert not left.box_is_late
