@@ -96,10 +96,29 @@ class Rectangles:
             whole = bulge.last - bulge.first == 1.0
             if bulge.steep or not whole:
                 more.append(self._cut(bulge.first, bulge.last))
+            if bulge.steep and whole:
+                more += [self._cut(one, one + 1.0) for one in self._beside(bulge.first)]
         places = np.union1d(self.places, np.concatenate(more))
         new = len(places) > len(self.places)
         self.places = places
         return new
+
+    def _beside(self, place: float) -> list[float]:
+        """Return cutter points whose ways to the next are cut as well as that from one of them.
+
+        None at first, then half as many as are cut beside it: a sweep over the wheel that a finer
+        cut bars goes on beside it, where nothing is known of that.
+        """
+        cut = set(np.floor(self._between).tolist())
+        begin, end = self._ends_of_pass(place)
+        low, high = place, place + 1.0
+        while low - 1.0 in cut:
+            low -= 1.0
+        while high in cut:
+            high += 1.0
+        more = (high - low - 1.0) // 4.0  # on either side
+        first, last = max(low - more, begin), min(high + more, end)
+        return [*np.arange(first, low).tolist(), *np.arange(high, last).tolist()]
 
     def _cut(self, begin: float, end: float) -> Array:
         """Cut rectangles finer between two places; return the new ones."""

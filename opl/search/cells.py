@@ -169,7 +169,8 @@ class Cells:
         """
         if self._forbidden is None:
             return False
-        before = self.changes
+        touched: dict[tuple[int, int], None] = {}
+        before: list[tuple[slice, np.ndarray]] = []
         for _, _, source, first, end in spans.tolist():
             rows = int(self._sources[source, ROWS])
             number, flip = rows // ROWS_OF_A_PIECE, _flip_made(rows)
@@ -180,12 +181,15 @@ class Cells:
                 continue
             looked[cells] = looks
             self._forbidden.clear(piece, flip, cells.start, cells.stop, looks)
+            touched[number, flip] = None
+            before.append((slice(first, end), self.table[first:end].copy()))
+        for number, flip in touched:
             same = range(number * ROWS_OF_A_PIECE, (number + 1) * ROWS_OF_A_PIECE)
             entered = [one for one in same if self._first_cell[one] >= 0]
-            known = self.table[first:end].copy()
             self._enter([one for one in entered if _flip_made(one) == flip])
-            self.changes += int((self.table[first:end] != known).any())
-        return self.changes > before
+        changes = [(self.table[rows] != known).any() for rows, known in before]
+        self.changes += sum(map(bool, changes))
+        return any(changes)
 
     def reaching(self, reach: float) -> Cells:
         """Return the cells of the same walls for boxes up to another size in [rad]."""
