@@ -62,7 +62,7 @@ def test_drawn_jobs_are_cut_into_passes_and_repeat_byte_by_byte(tmp_path):
 
 def test_uncommon_jobs_repeat_and_are_read_or_refused_by_a_key(tmp_path):
     read, scanned = 0, 0
-    for index in range(12):
+    for index in range(8):
         texts = []
         for again in range(2):
             folder = tmp_path / f"{index}_{again}"
