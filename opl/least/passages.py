@@ -97,19 +97,24 @@ class Rectangles:
             if bulge.steep or not whole:
                 more.append(self._cut(bulge.first, bulge.last))
             if bulge.steep and whole:
-                more += [self._cut(one, one + 1.0) for one in self._beside(bulge.first)]
+                more += [self._cut(one, one + 1.0) for one in self._cut_beside(bulge.first)]
         places = np.union1d(self.places, np.concatenate(more))
         new = len(places) > len(self.places)
         self.places = places
         return new
 
-    def _beside(self, place: float) -> list[float]:
-        """Return cutter points whose ways to the next are cut as well as that from one of them.
+    @property
+    def _stretches(self) -> np.ndarray:
+        """The cutter points from which on stretches up to the next are cut finer, shape (n,)."""
+        return np.unique(np.floor(self._between))
 
-        None at first, then half as many as are cut beside it: a sweep over the wheel that a finer
-        cut bars goes on beside it, where nothing is known of that.
+    def _cut_beside(self, place: float) -> list[float]:
+        """Return from which cutter points on stretches are cut together with that from a place on.
+
+        None at first, then half as many as are cut beside it: a sweep over the wheel that is barred
+        where a stretch is cut finer goes on beside it, where nothing is known of that.
         """
-        cut = set(np.floor(self._between).tolist())
+        cut = set(self._stretches.tolist())
         begin, end = self._ends_of_pass(place)
         low, high = place, place + 1.0
         while low - 1.0 in cut:
@@ -200,7 +205,7 @@ class Rectangles:
 
     def _windows(self) -> list[Array]:
         """Return the places of each rectangle: what is cut finer, and cutter points around it."""
-        cut = np.unique(np.floor(self._between))
+        cut = self._stretches
         if not len(cut):
             return []
         passes = self._points.pass_index[cut.astype(int)]

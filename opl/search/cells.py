@@ -170,7 +170,7 @@ class Cells:
         if self._forbidden is None:
             return False
         touched: dict[tuple[int, int], None] = {}
-        before: list[tuple[slice, np.ndarray]] = []
+        before: list[tuple[slice, np.ndarray]] = []  # rows of the table, as they were
         for _, _, source, first, end in spans.tolist():
             rows = int(self._sources[source, ROWS])
             number, flip = rows // ROWS_OF_A_PIECE, _flip_made(rows)
@@ -187,9 +187,9 @@ class Cells:
             same = range(number * ROWS_OF_A_PIECE, (number + 1) * ROWS_OF_A_PIECE)
             entered = [one for one in same if self._first_cell[one] >= 0]
             self._enter([one for one in entered if _flip_made(one) == flip])
-        changes = [(self.table[rows] != known).any() for rows, known in before]
-        self.changes += sum(map(bool, changes))
-        return any(changes)
+        changed = sum(bool((self.table[at] != known).any()) for at, known in before)
+        self.changes += changed
+        return changed > 0
 
     def reaching(self, reach: float) -> Cells:
         """Return the cells of the same walls for boxes up to another size in [rad]."""

@@ -151,22 +151,24 @@ def test_a_box_meets_no_posture_of_the_chains_that_stand_in_its_way():
     assert passages(box.widened(10.0), placements).open
 
 
-def test_a_sweep_that_is_barred_again_and_again_beside_itself_soon_has_all_of_its_ways_cut():
-    """One more way at each look would take as many looks as there are ways."""
+def test_a_sweep_that_is_barred_again_and_again_beside_itself_soon_has_all_stretches_cut():
+    """One more at each look would take as many looks as there are stretches."""
     rectangles, (box, _) = space().rectangles, smaller(0.3)
-    n_ways = len(v_row().points) - 1
+    n_stretches = len(v_row().points) - 1
 
     def cut():
         return set(np.floor(rectangles.places[rectangles.places % 1.0 > 0.0]).astype(int).tolist())
 
     looks, numbers = 0, []
-    for way in range(n_ways):
-        if way not in cut():
+    for first in range(n_stretches):
+        if first not in cut():
             looks += 1
-            assert rectangles.refine([Bulge(float(way), way + 1.0, 8, True)], box.widened(looks))
+            assert rectangles.refine(
+                [Bulge(float(first), first + 1.0, 8, True)], box.widened(looks)
+            )
             numbers.append(len(cut()))
     assert numbers[:4] == [1, 2, 3, 4]  # few are mostly enough
-    assert cut() == set(range(n_ways))
-    assert looks < n_ways / 2
+    assert cut() == set(range(n_stretches))
+    assert looks < n_stretches / 2
     counts = np.unique(np.floor(rectangles.places), return_counts=True)[1]
     assert (counts[:-1] == 8).all()  # none twice
